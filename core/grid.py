@@ -1,0 +1,170 @@
+"""Where a grid lies in the map frame, and the occupancy grid itself."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from closedrooms.core.arrays import BoolArray, CellArray, FloatArray, IntArray, frozen
+from closedrooms.core.errors import InvalidInputError
+
+UNKNOWN, FREE, OCCUPIED = -1, 0, 100
+# map_server's defaults (nav2_map_server): above the first a cell is occupied, below the second it is free.
+OCCUPIED_ABOVE, FREE_BELOW = 65, 19.6
+
+
+@dataclass(frozen=True, slots=True)
+class GridFrame:
+    """Frame of a grid: the only place where metres and cells are converted.
+
+    Row 0 is at y-min, column 0 at x-min. ``origin`` is the lower-left corner of cell (0, 0).
+
+    Attributes:
+        resolution: Metres per cell.
+        origin_x: Map x of the lower-left corner [m].
+        origin_y: Map y of the lower-left corner [m].
+        rows: Cells along y.
+        cols: Cells along x.
+    """
+
+    resolution: float
+    origin_x: float
+    origin_y: float
+    rows: int
+    cols: int
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.resolution) and self.resolution > 0.0):
+            raise InvalidInputError(f"grid resolution {self.resolution}", expected="metres per cell above 0")
+        if not (math.isfinite(self.origin_x) and math.isfinite(self.origin_y)):
+            raise InvalidInputError(f"grid origin ({self.origin_x}, {self.origin_y})", expected="finite metres")
+        if self.rows <= 0 or self.cols <= 0:
+            raise InvalidInputError(f"grid of {self.rows} x {self.cols} cells", expected="at least one cell")
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """``(rows, cols)``."""
+        return (self.rows, self.cols)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """``(x_min, y_min, x_max, y_max)`` [m]."""
+        return (
+            self.origin_x,
+            self.origin_y,
+            self.origin_x + self.cols * self.resolution,
+            self.origin_y + self.rows * self.resolution,
+        )
+
+    def to_cells(self, points: FloatArray) -> IntArray:
+        """Cells ``(row, col)`` that hold map points ``(x, y)``, shape (..., 2); may lie outside the grid."""
+        points = np.asarray(points, dtype=np.float64)
+        cols = np.floor((points[..., 0] - self.origin_x) / self.resolution)
+        rows = np.floor((points[..., 1] - self.origin_y) / self.resolution)
+        return np.stack((rows, cols), axis=-1).astype(np.int64)
+
+    def to_points(self, cells: IntArray) -> FloatArray:
+        """Centres ``(x, y)`` [m] of cells ``(row, col)``, shape (..., 2)."""
+        cells = np.asarray(cells)
+        x = self.origin_x + (cells[..., 1] + 0.5) * self.resolution
+        y = self.origin_y + (cells[..., 0] + 0.5) * self.resolution
+        return np.stack((x, y), axis=-1).astype(np.float64)
+
+    def to_corners(self, points: FloatArray) -> FloatArray:
+        """Map points ``(x, y)``, shape (..., 2), in continuous cell units ``(col, row)`` from the lower-left corner."""
+        origin = np.array([self.origin_x, self.origin_y])
+        corners: FloatArray = (np.asarray(points, dtype=np.float64) - origin) / self.resolution
+        return corners
+
+    def contains(self, cells: IntArray) -> BoolArray:
+        """Which cells ``(row, col)``, shape (..., 2), lie in the grid."""
+        cells = np.asarray(cells)
+        inside: BoolArray = (
+            (cells[..., 0] >= 0) & (cells[..., 0] < self.rows) & (cells[..., 1] >= 0) & (cells[..., 1] < self.cols)
+        )
+        return inside
+
+    def cropped(self, row: int, col: int, rows: int, cols: int) -> "GridFrame":
+        """The frame of a window whose lower-left cell is ``(row, col)``; may reach outside (negative, or larger)."""
+        return GridFrame(
+            self.resolution,
+            self.origin_x + col * self.resolution,
+            self.origin_y + row * self.resolution,
+            rows,
+            cols,
+        )
+
+    def covering(self, x_min: float, y_min: float, x_max: float, y_max: float) -> "GridFrame":
+        """This frame grown by whole cells until it holds the given bounds [m]."""
+        low = self.to_cells(np.array([x_min, y_min]))
+        high = np.ceil(self.to_corners(np.array([x_max, y_max])) - 1e-9).astype(int)
+        row, col = min(int(low[0]), 0), min(int(low[1]), 0)
+        return self.cropped(row, col, max(int(high[1]), self.rows) - row, max(int(high[0]), self.cols) - col)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OccupancyGrid:
+    """A map as nav_msgs/OccupancyGrid: int8 cells, -1 unknown, 0..100 probability, row 0 at y-min.
+
+    Attributes:
+        frame: Where the cells lie.
+        cells: Shape ``frame.shape``, int8, read-only.
+    """
+
+    frame: GridFrame
+    cells: CellArray
+
+    def __post_init__(self) -> None:
+        cells = frozen(self.cells, np.int8)
+        if cells.shape != self.frame.shape:
+            raise InvalidInputError(f"grid cells of shape {cells.shape}", expected=f"shape {self.frame.shape}")
+        object.__setattr__(self, "cells", cells)
+
+    @property
+    def free(self) -> BoolArray:
+        """Cells known to be free, shape (rows, cols)."""
+        return (self.cells >= 0) & (self.cells < FREE_BELOW)
+
+    @property
+    def occupied(self) -> BoolArray:
+        """Cells known to be occupied, shape (rows, cols)."""
+        return self.cells > OCCUPIED_ABOVE
+
+    @property
+    def unknown(self) -> BoolArray:
+        """Cells neither free nor occupied, shape (rows, cols)."""
+        return ~(self.free | self.occupied)
+
+    @property
+    def known(self) -> BoolArray:
+        """Cells free or occupied, shape (rows, cols)."""
+        return self.free | self.occupied
+
+    def known_bounds(self) -> tuple[int, int, int, int] | None:
+        """Window ``(row, col, rows, cols)`` of the known cells, ``None`` when all is unknown."""
+        known = self.known
+        rows, cols = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+        if rows.size == 0:
+            return None
+        return (int(rows[0]), int(cols[0]), int(rows[-1] - rows[0] + 1), int(cols[-1] - cols[0] + 1))
+
+    def on(self, frame: GridFrame) -> "OccupancyGrid":
+        """The same cells in a window ``frame`` of the same lattice; what lies outside this grid is unknown.
+
+        Raises:
+            InvalidInputError: ``frame`` has another resolution or is not shifted by whole cells.
+        """
+        shift = np.array([self.frame.origin_x - frame.origin_x, self.frame.origin_y - frame.origin_y])
+        cells_shift = shift / frame.resolution
+        if (
+            abs(self.frame.resolution - frame.resolution) > 1e-9
+            or np.abs(cells_shift - cells_shift.round()).max() > 1e-3
+        ):
+            raise InvalidInputError("a grid of another lattice", expected=f"resolution {self.frame.resolution}")
+        col, row = (int(v) for v in cells_shift.round())
+        cells = np.full(frame.shape, UNKNOWN, dtype=np.int8)
+        r0, c0 = max(row, 0), max(col, 0)
+        r1, c1 = min(row + self.frame.rows, frame.rows), min(col + self.frame.cols, frame.cols)
+        if r1 > r0 and c1 > c0:
+            cells[r0:r1, c0:c1] = self.cells[r0 - row : r1 - row, c0 - col : c1 - col]
+        return OccupancyGrid(frame, cells)

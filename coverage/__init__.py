@@ -1,0 +1,1 @@
+"""Topological graph, coverage tour and cost estimates (paper, section 5)."""

@@ -1,0 +1,1 @@
+"""Runs every stage: explore, run, record, evaluate, and the command line."""

@@ -1,0 +1,1 @@
+"""The simulated world, its robot, lidar, odometry and door sightings."""

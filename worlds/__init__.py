@@ -1,0 +1,1 @@
+"""Floor plans: model, JSON, importers, generator, extrusion and rasterised ground truth."""
