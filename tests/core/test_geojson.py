@@ -1,0 +1,103 @@
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from shapely.geometry import MultiPolygon, box
+
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.geojson import read_doors, read_rooms, write_doors, write_rooms
+from closedrooms.core.pose import Pose2
+from closedrooms.core.room import Room
+
+
+def collection(path: Path, *features: dict[str, Any]) -> Path:
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": list(features)}))
+    return path
+
+
+def point(x: Any, y: Any, **properties: Any) -> dict[str, Any]:
+    geometry = {"type": "Point", "coordinates": [x, y]}
+    return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+
+def test_doors_are_read_back_with_segment_or_midpoint(tmp_path: Path) -> None:
+    doors = [
+        ClosedDoor("d00", (1.5, 2.0), ((1.0, 2.0), (2.0, 2.0)), 1.0),
+        ClosedDoor("d07", (-3.25, 4.0)),
+    ]
+    write_doors(tmp_path / "doors.geojson", doors)
+    assert read_doors(tmp_path / "doors.geojson") == doors
+    written = json.loads((tmp_path / "doors.geojson").read_text())
+    assert written["frame"] == "map"
+    assert written["units"] == "m"
+
+
+def test_doors_without_an_id_are_numbered_around_those_that_have_one(tmp_path: Path) -> None:
+    path = collection(tmp_path / "d", point(0, 0), point(1, 0, id="d00"), point(2, 0))
+    assert [door.id for door in read_doors(path)] == ["d01", "d00", "d02"]
+
+
+def test_open_doors_are_left_out(tmp_path: Path) -> None:
+    path = collection(tmp_path / "d", point(0, 0, id="a", state="open"), point(1, 0, id="b", state="closed"))
+    assert [door.id for door in read_doors(path)] == ["b"]
+
+
+def test_rooms_are_read_back(tmp_path: Path) -> None:
+    rooms = [
+        Room(box(0, 0, 2, 3), ("d00",), "border", 1.25, bounded=True),
+        Room(MultiPolygon([box(0, 0, 1, 1), box(5, 5, 6, 6)]), ("d01", "d02"), "dependent", None),
+    ]
+    write_rooms(tmp_path / "rooms.geojson", rooms)
+    again = read_rooms(tmp_path / "rooms.geojson")
+    assert [(r.doors, r.kind, r.score, r.bounded) for r in again] == [
+        (r.doors, r.kind, r.score, r.bounded) for r in rooms
+    ]
+    assert all(a.polygon.equals(b.polygon) for a, b in zip(again, rooms, strict=True))
+
+
+def test_a_bow_tie_is_repaired(tmp_path: Path) -> None:
+    ring = [[0, 0], [2, 2], [2, 0], [0, 2], [0, 0]]
+    feature = {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    (room,) = read_rooms(collection(tmp_path / "r", feature))
+    assert room.polygon.area == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("feature", "message"),
+    [
+        (point(0, float("nan")), "JSON"),
+        (point("a", "b"), "geometry"),
+        ({"type": "Feature", "properties": {}, "geometry": None}, "geometry"),
+        (
+            {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, 1], [0, 0]]]}},
+            "Polygon",
+        ),
+        (point(0, 0, width=-1), "width"),
+        (3, "geometry"),
+    ],
+)
+def test_a_wrong_door_is_one_clear_line(tmp_path: Path, feature: Any, message: str) -> None:
+    path = collection(tmp_path / "d.geojson", feature)
+    with pytest.raises(InvalidInputError, match=message) as error:
+        read_doors(path)
+    assert str(error.value).endswith(str(path))
+
+
+def test_rejects_two_doors_of_one_id_and_other_json(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="two doors"):
+        read_doors(collection(tmp_path / "d", point(0, 0, id="a"), point(1, 0, id="a")))
+    (tmp_path / "x").write_text("[1, 2]")
+    with pytest.raises(InvalidInputError, match="FeatureCollection"):
+        read_doors(tmp_path / "x")
+    (tmp_path / "x").write_text("{")
+    with pytest.raises(InvalidInputError, match="broken JSON"):
+        read_doors(tmp_path / "x")
+
+
+def test_a_moved_door_keeps_its_width() -> None:
+    door = ClosedDoor("d", (1.0, 0.0), ((0.5, 0.0), (1.5, 0.0)), 1.0).moved(Pose2(0.0, 0.0, 1.5707963267948966))
+    assert door.midpoint == pytest.approx((0.0, 1.0))
+    assert door.segment is not None
+    assert door.segment[1] == pytest.approx((0.0, 1.5))

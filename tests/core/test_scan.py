@@ -1,0 +1,21 @@
+import math
+
+import numpy as np
+import pytest
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.scan import LaserScan
+
+
+def test_only_beams_that_ended_on_something_have_points() -> None:
+    scan = LaserScan(np.array([1.0, np.nan, np.inf, 0.01, 2.0]), -math.pi / 2, math.pi / 4, 10.0, range_min=0.05)
+    assert scan.hits.tolist() == [True, False, False, False, True]
+    assert scan.points_sensor() == pytest.approx(np.array([[0.0, -1.0], [0.0, 2.0]]), abs=1e-12)
+    assert not scan.ranges.flags.writeable
+
+
+def test_rejects_ranges_of_wrong_shape_and_impossible_limits() -> None:
+    with pytest.raises(InvalidInputError, match="shape"):
+        LaserScan(np.zeros((2, 2)), 0.0, 0.1, 10.0)
+    with pytest.raises(InvalidInputError, match="range_min"):
+        LaserScan(np.zeros(2), 0.0, 0.1, 0.0)

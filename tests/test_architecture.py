@@ -1,0 +1,56 @@
+"""Who may import whom: ground truth cannot leak into an estimate."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+MAY_IMPORT = {
+    "core": {"core"},
+    "worlds": {"core", "worlds"},
+    "sim": {"core", "worlds", "sim"},
+    "mapping": {"core", "mapping"},
+    "predictor": {"core", "predictor"},
+    "coverage": {"core", "coverage", "predictor"},
+    "pipeline": {"core", "worlds", "sim", "mapping", "predictor", "coverage", "pipeline"},
+}
+
+
+def imported(path: Path) -> set[str]:
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path} imports relatively"
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+@pytest.mark.parametrize("folder", MAY_IMPORT)
+def test_a_folder_imports_only_what_the_design_allows(folder: str) -> None:
+    paths = list((ROOT / folder).rglob("*.py"))
+    assert paths
+    for path in paths:
+        ours = {name.split(".")[1] for name in imported(path) if name.startswith("closedrooms.")}
+        assert ours <= MAY_IMPORT[folder], f"{path.relative_to(ROOT)} imports {sorted(ours - MAY_IMPORT[folder])}"
+
+
+def test_only_the_recorder_imports_rerun() -> None:
+    users = {
+        path.relative_to(ROOT).as_posix()
+        for folder in MAY_IMPORT
+        for path in (ROOT / folder).rglob("*.py")
+        if any(name.split(".")[0] == "rerun" for name in imported(path))
+    }
+    assert all(user.startswith("pipeline/") for user in users), users
+
+
+def test_every_folder_of_code_is_in_the_wheel() -> None:
+    import tomllib
+
+    packages = set(tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"])
+    for folder in MAY_IMPORT:
+        for path in (ROOT / folder).rglob("*.py"):
+            assert "closedrooms." + ".".join(path.relative_to(ROOT).parent.parts) in packages, path
