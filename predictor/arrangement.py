@@ -1,0 +1,109 @@
+"""Faces between lines: the planar arrangement, exactly (paper, section 3.1)."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Polygon
+
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.predictor.lines import Line
+
+# Slanted lines that meet nearly in a point leave slivers; smaller faces and shorter edges mean nothing [m2, m].
+MIN_FACE, MIN_EDGE = 1e-6, 1e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arrangement:
+    """Faces of the lines inside the box of the boundary lines.
+
+    Every face is convex: it lies between full lines.
+
+    Attributes:
+        lines: All lines, the boundary included.
+        faces: Polygons [m], counter-clockwise.
+        areas: Area of each face [m2], shape (n,).
+        edges: Ends of each edge [m], shape (m, 2, 2).
+        edge_faces: The faces on either side, shape (m, 2); the second is -1 on the boundary and beside a sliver.
+        edge_lengths: Shape (m,) [m].
+        boundary: Edges on a boundary line, shape (m,).
+        border: Faces with an edge on the boundary, shape (n,).
+        neighbours: For each face, its edges: ``{neighbouring face: edge}``.
+    """
+
+    lines: tuple[Line, ...]
+    faces: tuple[Polygon, ...]
+    areas: FloatArray
+    edges: FloatArray
+    edge_faces: IntArray
+    edge_lengths: FloatArray
+    boundary: BoolArray
+    border: BoolArray
+    neighbours: tuple[dict[int, int], ...]
+
+
+def arrange(lines: Sequence[Line], boundary: Sequence[Line]) -> Arrangement:
+    """Node all lines and polygonize them inside the box.
+
+    Args:
+        lines: Representative lines and splits.
+        boundary: Four lines, two and two parallel.
+    """
+    box = box_of(boundary)
+    reach = 2.0 * float(np.hypot(*np.ptp(shapely.get_coordinates(box), axis=0))) + 1.0
+    centre = np.array(box.centroid.coords[0])
+    strings = [_string(line, centre, reach) for line in (*lines, *boundary)]
+    noded = shapely.unary_union(shapely.multilinestrings(strings))
+    pieces = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
+    middles = shapely.get_coordinates(shapely.centroid(pieces))
+    kept = shapely.contains_xy(box, middles[:, 0], middles[:, 1]) & (shapely.area(pieces) > MIN_FACE)
+    faces = _ordered([shapely.geometry.polygon.orient(p) for p in pieces[kept]])
+    return _connect((*lines, *boundary), faces, box)
+
+
+def box_of(boundary: Sequence[Line]) -> Polygon:
+    """The parallelogram between two pairs of parallel boundary lines."""
+    a, b, c, d = boundary
+    return Polygon([_crossing(p, q) for p, q in ((a, c), (a, d), (b, d), (b, c))])
+
+
+def _crossing(a: Line, b: Line) -> FloatArray:
+    return np.asarray(np.linalg.solve(np.stack((a.normal, b.normal)), np.array([a.offset, b.offset])))
+
+
+def _string(line: Line, centre: FloatArray, reach: float) -> LineString:
+    """The line where it passes ``centre``, ``reach`` both ways: beyond the box, so that no end lies on its edge."""
+    foot = centre - line.distance(centre) * line.normal
+    return LineString((foot - reach * line.along, foot + reach * line.along))
+
+
+def _ordered(faces: list[Polygon]) -> tuple[Polygon, ...]:
+    """Faces in an order that depends on where they are only."""
+    return tuple(sorted(faces, key=lambda face: tuple(np.round(face.centroid.coords[0], 6))))
+
+
+def _connect(lines: tuple[Line, ...], faces: tuple[Polygon, ...], box: Polygon) -> Arrangement:
+    """Adjacency from a dictionary of edges: noding gives both faces of an edge the same two points."""
+    sides: dict[tuple[tuple[float, ...], tuple[float, ...]], list[int]] = {}
+    for number, face in enumerate(faces):
+        ring = [tuple(point) for point in shapely.get_coordinates(face.exterior)]
+        for start, end in itertools.pairwise(ring):
+            sides.setdefault((min(start, end), max(start, end)), []).append(number)
+    kept = [(ends, owners) for ends, owners in sorted(sides.items()) if np.hypot(*np.subtract(*ends)) > MIN_EDGE]
+    edges = np.array([ends for ends, _ in kept], dtype=np.float64).reshape(-1, 2, 2)
+    edge_faces = np.array([([*owners, -1])[:2] for _, owners in kept], dtype=np.int64).reshape(-1, 2)
+    border = np.zeros(len(faces), dtype=np.bool_)
+    boundary = (edge_faces[:, 1] < 0) & (
+        shapely.distance(shapely.points(edges.mean(axis=1)), box.exterior) < 10 * MIN_EDGE
+    )
+    border[edge_faces[boundary, 0]] = True
+    neighbours: tuple[dict[int, int], ...] = tuple({} for _ in faces)
+    for edge, (a, b) in enumerate(edge_faces.tolist()):
+        if b >= 0:
+            neighbours[a][b] = edge
+            neighbours[b][a] = edge
+    areas = np.array([face.area for face in faces])
+    edge_lengths = np.hypot(*(edges[:, 1] - edges[:, 0]).T) if len(edges) else np.zeros(0)
+    return Arrangement(lines, faces, areas, edges, edge_faces, edge_lengths, boundary, border, neighbours)

@@ -1,0 +1,183 @@
+"""Settings of the predictor; lengths in metres, angles in radians. Imports nothing heavy."""
+
+import math
+from dataclasses import dataclass, field, fields, replace
+from typing import Literal
+
+from closedrooms.core.errors import InvalidInputError
+
+PresetName = Literal["paper", "best"]
+Structure = Literal["hough", "rose"]
+Phi = Literal["as-run", "as-printed"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StructureConfig:
+    """How walls become lines (paper, section 3.1). Defaults: read in the authors' published structure extraction."""
+
+    resolution: float = 0.05
+    """Cell size that a map is brought to before walls are looked for [m]."""
+
+    canny_low: float = 90.0
+    """Lower hysteresis threshold of the Canny detector [grey levels]."""
+
+    canny_high: float = 100.0
+    """Upper hysteresis threshold of the Canny detector [grey levels]."""
+
+    canny_aperture: int = 5
+    """Size of the Sobel kernel of the Canny detector [cells], 3, 5 or 7."""
+
+    hough_votes: float = 1.0
+    """Length of wall that must vote for a line before a segment is traced on it [m]."""
+
+    hough_angle: float = math.radians(1.0)
+    """Step of the Hough transform in angle [rad]."""
+
+    min_segment: float = 0.15
+    """Shortest segment kept [m]."""
+
+    max_gap: float = 0.0
+    """Longest gap inside one segment [m]."""
+
+    angle_bandwidth: float = math.radians(12.0)
+    """Half width of the mean shift kernel over wall directions [rad]."""
+
+    min_direction_length: float = 2.0
+    """A direction needs this much wall in segments that vote by themselves [m]; less is noise of the raster."""
+
+    min_direction_share: float = 0.03
+    """A direction needs this share of the wall of the strongest direction."""
+
+    collinear_distance: float = 0.35
+    """Segments of one direction closer than this belong to one wall [m]."""
+
+    merge_distance: float = 0.50
+    """Walls of one direction whose lines are closer than this share a line [m]."""
+
+    border_margin: float = 1.0
+    """Distance of the boundary lines from the outermost segments [m]."""
+
+    def __post_init__(self) -> None:
+        positive = ("resolution", "hough_votes", "hough_angle", "angle_bandwidth", "border_margin")
+        _check_numbers(self, positive)
+        if self.canny_aperture not in {3, 5, 7}:
+            raise InvalidInputError(f"canny_aperture {self.canny_aperture}", expected="3, 5 or 7")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weights:
+    """Weights of the evaluation functions (paper, section 3.4; values of section 4.1)."""
+
+    area: float = 1.2
+    """w1, per metre of sqrt(area): the paper's 0.06 per cell of 0.05 m."""
+
+    hull: float = 10.0
+    """w2, of the convex hull ratio."""
+
+    free_independent: float = 7.0
+    """w3, of the free edges of an independent room."""
+
+    free_faces: float = 10.0
+    """w4, of the penalty for faces with several free edges."""
+
+    free_dependent: float = 2.5
+    """w5, of the free edges of a dependent room."""
+
+    proportion: float = 2.0
+    """w6, of long side over short side."""
+
+    joint_area: float = 1.0
+    """w7, of the similarity in area of two adjacent rooms."""
+
+    joint_faces: float = 2.0
+    """w8, of the faces with several free edges of two adjacent rooms."""
+
+    def __post_init__(self) -> None:
+        _check_numbers(self, ())
+
+
+@dataclass(frozen=True, kw_only=True)
+class PredictorConfig:
+    """All settings of ``predict``; take one from :func:`preset`."""
+
+    preset: PresetName = "paper"
+    """``paper``: what the authors describe and ran; ``best``: as good as we can."""
+
+    structure: Structure = "hough"
+    """Where lines come from: ``hough`` (section 3.1) or ``rose`` (section 4.2)."""
+
+    phi: Phi = "as-run"
+    """Evaluation function as the authors' logs show it, or as the text prints it."""
+
+    lines: StructureConfig = field(default_factory=StructureConfig)
+    """Segments, directions and lines."""
+
+    weights: Weights = field(default_factory=Weights)
+    """Weights of the evaluation functions."""
+
+    min_unknown: float = 0.30
+    """A face is unknown when at least this share of it is unknown, or ``max_free`` holds."""
+
+    max_free: float = 0.50
+    """A face is unknown when at most this share of it is free."""
+
+    max_level: int = 9
+    """Largest k of the expansion."""
+
+    exact_candidates: int = 12
+    """Up to this many candidate faces every subset is scored; more are searched by branch and bound."""
+
+    max_nodes: int = 1000
+    """Nodes of one branch and bound search; a cut is said in the result (``bounded``)."""
+
+    door_reach: float = 1.0
+    """A door further than this from every line lies on no wall [m]."""
+
+    same_door: float = 0.30
+    """Doors closer than this are the same door [m]."""
+
+    door_width: float = 0.80
+    """Width of the passages drawn at doors [m] (section 3.7)."""
+
+    wall_thickness: float | None = None
+    """Thickness of walls not counted as room [m]; measured in the map when not given, 0 draws rooms up to the lines."""
+
+    average_border_depth: bool = True
+    """Adjacent dependent border rooms share their mean depth (section 3.6)."""
+
+    joint_layout: bool = True
+    """Adjacent dependent rooms may swap faces at the end (section 3.5)."""
+
+    keep_trace: bool = False
+    """Keep segments, lines, faces and levels in the result, for recordings and pictures."""
+
+    def __post_init__(self) -> None:
+        _check_numbers(self, ("door_reach", "door_width"))
+        if not 0.0 <= self.min_unknown <= 1.0 or not 0.0 <= self.max_free <= 1.0:
+            raise InvalidInputError(
+                f"min_unknown {self.min_unknown}, max_free {self.max_free}", expected="shares between 0 and 1"
+            )
+        if not 0 <= self.exact_candidates <= 16:
+            raise InvalidInputError(f"exact_candidates {self.exact_candidates}", expected="0 to 16")
+
+
+def preset(name: PresetName) -> PredictorConfig:
+    """The settings of a preset.
+
+    Raises:
+        InvalidInputError: There is no preset of that name.
+    """
+    if name not in {"paper", "best"}:
+        raise InvalidInputError(f"preset {name!r}", expected="paper or best")
+    return replace(PredictorConfig(), preset=name)
+
+
+def _check_numbers(config: object, positive: tuple[str, ...]) -> None:
+    """Every plain number is finite and not negative, those in ``positive`` above zero."""
+    for item in fields(config):  # type: ignore[arg-type]
+        value = getattr(config, item.name)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            continue
+        if not math.isfinite(value) or value < 0.0 or (item.name in positive and value == 0.0):
+            wanted = "a finite number above 0" if item.name in positive else "a finite number of at least 0"
+            raise InvalidInputError(f"{item.name} {value}", expected=wanted)

@@ -1,0 +1,111 @@
+"""Predicted rooms drawn into the map (paper, section 3.7)."""
+
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
+from closedrooms.predictor.prediction import Shape
+
+
+def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Shape]) -> OccupancyGrid:
+    """Complete a map: unknown cells inside a room become free, those on its outline occupied, doors are opened.
+
+    Args:
+        grid: The input map; what it observed stays, but for the passages.
+        shapes: Free interior of the rooms, map frame [m].
+        passages: What to clear at the doors, map frame [m].
+
+    Returns:
+        A map on the same lattice, grown by whole cells where a room leaves the frame.
+    """
+    frame = grid.frame
+    resolution = frame.resolution
+    if shapes:
+        x0, y0, x1, y1 = shapely.total_bounds([*shapes, *passages])
+        frame = frame.covering(x0 - 2 * resolution, y0 - 2 * resolution, x1 + 2 * resolution, y1 + 2 * resolution)
+    out = grid.on(frame)
+    cells = out.cells.copy()
+    unknown = out.unknown
+    inside = np.zeros(frame.shape, dtype=np.bool_)
+    ring = np.zeros(frame.shape, dtype=np.bool_)
+    for shape in shapes:
+        _fill(shape, frame, inside)
+        _trace(shape, frame, ring)
+    cells[unknown & inside & ~ring] = FREE
+    cells[unknown & ring] = OCCUPIED
+    cleared = np.zeros(frame.shape, dtype=np.bool_)
+    for passage in passages:
+        _fill(passage, frame, cleared)
+    cells[cleared] = FREE
+    return OccupancyGrid(frame, cells)
+
+
+def _fill(shape: Shape, frame: GridFrame, mask: BoolArray) -> None:
+    """Mark cells whose centre lies in a shape."""
+    if shape.is_empty:
+        return
+    x0, y0, x1, y1 = shape.bounds
+    (r0, c0), (r1, c1) = frame.to_cells(np.array([[x0, y0], [x1, y1]]))
+    rows = np.arange(max(r0, 0), min(r1, frame.rows - 1) + 1)
+    cols = np.arange(max(c0, 0), min(c1, frame.cols - 1) + 1)
+    if rows.size == 0 or cols.size == 0:
+        return
+    points = frame.to_points(np.stack(np.meshgrid(rows, cols, indexing="ij"), axis=-1))
+    shapely.prepare(shape)
+    mask[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1] |= shapely.contains_xy(shape, points[..., 0], points[..., 1])
+
+
+def _trace(shape: Shape, frame: GridFrame, mask: BoolArray) -> None:
+    """Mark cells that the outline of a shape passes, one cell wide."""
+    for part in shapely.get_parts(shape):
+        for ring in (part.exterior, *part.interiors):
+            points = shapely.get_coordinates(ring)
+            for a, b in itertools.pairwise(points):
+                steps = max(math.ceil(float(np.abs(b - a).max()) / frame.resolution * 2), 1)
+                cells = frame.to_cells(a + np.linspace(0.0, 1.0, steps + 1)[:, None] * (b - a))
+                cells = cells[frame.contains(cells)]
+                mask[cells[:, 0], cells[:, 1]] = True
+
+
+def passage(
+    grid: OccupancyGrid,
+    room: Shape,
+    door: FloatArray,
+    along: FloatArray,
+    inward: FloatArray,
+    *,
+    width: float,
+    reach: float,
+) -> Shape:
+    """What to clear at a door: ``width`` wide, from the free cells before it into the room.
+
+    Args:
+        grid: The input map.
+        room: Free interior of the room [m].
+        door: Mid-point [m], shape (2,).
+        along: Unit vector of the wall, shape (2,).
+        inward: Unit vector from the door into the room, shape (2,).
+        width: Of the passage [m] (section 3.7: 0.80 m).
+        reach: How far free space is looked for on either side [m].
+
+    Returns:
+        A rectangle [m]; empty where no free space lies within reach on one of the sides.
+    """
+    resolution = grid.frame.resolution
+    steps = np.arange(0.0, reach + resolution, resolution / 2)
+    before = grid.frame.to_cells(door - steps[:, None] * inward)
+    seen = grid.frame.contains(before)
+    free = np.zeros(steps.size, dtype=np.bool_)
+    free[seen] = grid.free[before[seen, 0], before[seen, 1]]
+    ahead = door + steps[:, None] * inward
+    inside = shapely.contains_xy(room.buffer(-1.5 * resolution), ahead[:, 0], ahead[:, 1])
+    if not free.any() or not inside.any():
+        return shapely.Polygon()
+    low, high = -(steps[free.argmax()] + resolution), steps[inside.argmax()] + resolution
+    a, b = door - width / 2 * along, door + width / 2 * along
+    return shapely.Polygon((a + low * inward, b + low * inward, b + high * inward, a + high * inward))

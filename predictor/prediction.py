@@ -1,0 +1,71 @@
+"""What the predictor returns."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from shapely.geometry import MultiPolygon, Polygon
+
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.room import Room
+
+Shape = Polygon | MultiPolygon
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Level:
+    """Layouts after one step of the expansion.
+
+    Attributes:
+        k: Step, 0 for the initial faces; the steps after the last k are the joint layout and the border rooms.
+        layouts: Layout by door id, map frame [m].
+        scores: Value of the evaluation function by door id.
+    """
+
+    k: int
+    layouts: Mapping[str, Shape]
+    scores: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PredictionTrace:
+    """Every stage of one prediction, for recordings and pictures; all coordinates in the map frame [m].
+
+    Attributes:
+        segments: Wall segments ``x0, y0, x1, y1``, shape (n, 4).
+        clusters: Line that each segment belongs to, -1 for none, shape (n,).
+        lines: Lines clipped to the box, ``x0, y0, x1, y1``, shape (m, 4).
+        line_kinds: ``wall``, ``border`` or ``split`` a line.
+        faces: Faces of the arrangement.
+        unknown: Which faces count as unknown, shape (faces,).
+        border: Which faces have an edge on a boundary line, shape (faces,).
+        initial: Initial face (an index into ``faces``) by door id.
+        levels: The expansion, step by step.
+    """
+
+    segments: FloatArray
+    clusters: IntArray
+    lines: FloatArray
+    line_kinds: tuple[str, ...]
+    faces: tuple[Polygon, ...]
+    unknown: BoolArray
+    border: BoolArray
+    initial: dict[str, int]
+    levels: tuple[Level, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prediction:
+    """A completed map with the rooms that complete it.
+
+    Attributes:
+        grid: M_pred: covers the frame of the input on the same lattice, extended where a room leaves it.
+        rooms: Predicted rooms, in the order of the doors given.
+        failures: Why a door could not be predicted, by door id.
+        trace: Every stage, where asked for.
+    """
+
+    grid: OccupancyGrid
+    rooms: tuple[Room, ...]
+    failures: dict[str, str] = field(default_factory=dict)
+    trace: PredictionTrace | None = None
