@@ -1,0 +1,154 @@
+"""From room outlines that share edges to walls and doors: what the generator and the importers have in common."""
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Polygon
+
+from closedrooms.core.door import Point, Segment
+from closedrooms.worlds.geometry import distance_along
+from closedrooms.worlds.plan import Wall
+
+Pair = tuple[int, int | None]
+# Directions and offsets closer than this are one straight line [rad, m].
+STRAIGHT = 2e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A straight piece of the boundary between two rooms, or of the outside (``rooms[1]`` is ``None``).
+
+    Attributes:
+        segment: Building frame [m].
+        rooms: Indices of the rooms on both sides, the smaller first.
+    """
+
+    segment: Segment
+    rooms: Pair
+
+    @property
+    def length(self) -> float:
+        """Metres."""
+        return math.dist(*self.segment)
+
+    def point(self, along: float) -> Point:
+        """The point at ``along`` metres from the first end."""
+        (x0, y0), (x1, y1) = self.segment
+        t = along / self.length
+        return (x0 + t * (x1 - x0), y0 + t * (y1 - y0))
+
+    def part(self, centre: float, width: float) -> Segment:
+        """The piece of ``width`` metres around ``centre`` metres from the first end."""
+        return (self.point(centre - width / 2), self.point(centre + width / 2))
+
+
+def shared_edges(polygons: Sequence[Polygon]) -> list[Edge]:
+    """The straight edges of rooms that form a coverage (neighbours share their vertices).
+
+    Returns:
+        Each edge once, longest possible for its pair of rooms, in order of the pairs.
+    """
+    owners: defaultdict[tuple[Point, Point], list[int]] = defaultdict(list)
+    for index, polygon in enumerate(polygons):
+        for ring in (polygon.exterior, *polygon.interiors):
+            points = [(round(x, 4) + 0.0, round(y, 4) + 0.0) for x, y, *_ in ring.coords]
+            for a, b in zip(points, points[1:], strict=False):
+                if a != b:
+                    owners[min(a, b), max(a, b)].append(index)
+    by_pair: defaultdict[Pair, list[Segment]] = defaultdict(list)
+    for segment, rooms in owners.items():
+        first, second = (min(rooms), max(rooms)) if len(rooms) > 1 else (rooms[0], None)
+        if first != second:
+            by_pair[first, second].append(segment)
+    ordered = sorted(by_pair.items(), key=lambda item: (item[0][0], -1 if item[0][1] is None else item[0][1]))
+    return [Edge(segment, pair) for pair, segments in ordered for segment in joined(segments)]
+
+
+def joined(segments: Iterable[Segment]) -> list[Segment]:
+    """Segments with collinear neighbours that touch put together."""
+    pieces = sorted({(min(s), max(s)) for s in segments})
+    at: defaultdict[Point, list[int]] = defaultdict(list)
+    for index, (a, b) in enumerate(pieces):
+        at[a].append(index)
+        at[b].append(index)
+    parent = list(range(len(pieces)))
+
+    def root(index: int) -> int:
+        while parent[index] != index:
+            parent[index] = parent[parent[index]]
+            index = parent[index]
+        return index
+
+    for meeting in at.values():
+        for k, i in enumerate(meeting):
+            for j in meeting[k + 1 :]:
+                if _collinear(pieces[i], pieces[j]):
+                    parent[max(root(i), root(j))] = min(root(i), root(j))
+    groups: defaultdict[int, list[Point]] = defaultdict(list)
+    for index, piece in enumerate(pieces):
+        groups[root(index)] += piece
+    return [(min(points), max(points)) for points in groups.values()]
+
+
+def _collinear(first: Segment, second: Segment) -> bool:
+    longer, shorter = (second, first) if math.dist(*first) < math.dist(*second) else (first, second)
+    (x0, y0), length = longer[0], math.dist(*longer)
+    ux, uy = (longer[1][0] - x0) / length, (longer[1][1] - y0) / length
+    return all(abs(ux * (y - y0) - uy * (x - x0)) <= STRAIGHT for x, y in shorter)
+
+
+def walls_along(edges: Sequence[Edge], thickness: Callable[[Edge], float]) -> list[Wall]:
+    """One wall along each straight run of edges of one thickness; edges of thickness 0 carry no wall."""
+    by_thickness: defaultdict[float, list[Segment]] = defaultdict(list)
+    for edge in edges:
+        value = thickness(edge)
+        if value > 0.0:
+            by_thickness[value].append(edge.segment)
+    runs = [(segment, value) for value in sorted(by_thickness) for segment in joined(by_thickness[value])]
+    runs.sort()
+    return [Wall(f"w{number:03d}", segment, value) for number, (segment, value) in enumerate(runs)]
+
+
+def free_spans(edge: Edge, edges: Sequence[Edge], taken: Iterable[Segment], margin: float) -> list[tuple[float, float]]:
+    """Stretches of an edge, in metres from its first end, where a door may stand.
+
+    Args:
+        edge: Of the wall.
+        edges: All edges; where one of them meets this one, ``margin`` metres stay clear on both sides.
+        taken: Doors and openings already placed.
+        margin: Metres kept clear of corners, crossing walls and other passages.
+    """
+    line = LineString(edge.segment)
+    blocked = [(-1e9, margin), (edge.length - margin, 1e9)]
+    for other in edges:
+        if other is edge:
+            continue
+        for point in other.segment:
+            if line.distance(shapely.Point(point)) < 0.05 and not _collinear(edge.segment, other.segment):
+                at = distance_along(edge.segment, point)
+                blocked.append((at - margin, at + margin))
+    for segment in taken:
+        if all(line.distance(shapely.Point(p)) < 0.3 for p in segment):
+            ends = sorted(distance_along(edge.segment, p) for p in segment)
+            blocked.append((ends[0] - margin, ends[1] + margin))
+    blocked.sort()
+    spans, at = [], -1e9
+    for low, high in blocked:
+        if low > at and at > -1e8:
+            spans.append((at, low))
+        at = max(at, high)
+    return spans
+
+
+def coverage(polygons: Sequence[Polygon], *, gap: float = 0.0, snap: float = -1.0) -> list[Polygon]:
+    """Room outlines made to share their edges exactly: overlaps cut, gaps up to ``gap`` metres filled."""
+    cleaned = shapely.coverage_clean(np.array(polygons, dtype=object), gap_width=gap, snapping_distance=snap)
+    result = []
+    for area in cleaned:
+        parts = [part for part in shapely.get_parts(area) if isinstance(part, Polygon)]
+        result.append(max(parts, key=lambda part: part.area, default=Polygon()))
+    return result

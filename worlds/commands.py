@@ -1,0 +1,100 @@
+"""What the command line's ``closedrooms worlds`` does, as plain functions."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.worlds.library import DEFAULT_WORLD, PLANS, bundled_names, load_world, read_world
+from closedrooms.worlds.plan import FloorPlan
+
+# Resolution of maps written by ``convert`` [m].
+MAP_RESOLUTION = 0.05
+
+
+def list_worlds() -> list[str]:
+    """One line a bundled world, its name first."""
+    import shapely
+
+    from closedrooms.worlds.closing import closable_rooms
+    from closedrooms.worlds.geometry import wall_area
+    from closedrooms.worlds.jsonfile import read_plan
+
+    lines = []
+    for name in bundled_names():
+        plan = read_plan(PLANS / f"{name}.json")
+        x_min, y_min, x_max, y_max = shapely.bounds(wall_area(plan))
+        size = f"{x_max - x_min:.0f} x {y_max - y_min:.0f} m"
+        default = "  (default)" if name == DEFAULT_WORLD else ""
+        lines.append(
+            f"{name:<10} {size:>11}  {len(plan.rooms):3d} rooms  {len(plan.doors):3d} doors  "
+            f"{len(closable_rooms(plan)):2d} closable  {plan.meta.get('shape', ''):<6}{default}".rstrip()
+        )
+    return lines
+
+
+def show_world(world: str, out_png: str | Path, *, level: str | None = None) -> FloorPlan:
+    """Write a picture of a world; returns its plan.
+
+    Raises:
+        InvalidInputError: See :func:`closedrooms.worlds.library.load_world`.
+        OutputError: The picture cannot be written.
+    """
+    from closedrooms.worlds.picture import draw_plan
+
+    plan = load_world(world, level=level)
+    draw_plan(plan, out_png)
+    return plan
+
+
+def generate_world(kind: str, seed: int, out_json: str | Path, *, furniture: bool = False) -> FloorPlan:
+    """Write a generated world as JSON; returns its plan.
+
+    Raises:
+        InvalidInputError: An unknown kind, a negative seed.
+        OutputError: The file cannot be written.
+    """
+    from closedrooms.worlds.generator import generate
+    from closedrooms.worlds.jsonfile import write_plan
+
+    plan = generate(kind, seed, furniture=furniture)
+    write_plan(out_json, plan)
+    return plan
+
+
+def convert_world(src: str, dst: str | Path, to: str, *, level: str | None = None) -> FloorPlan:
+    """Write a world of any known format in the format ``to``; returns its plan.
+
+    Raises:
+        InvalidInputError: See :func:`closedrooms.worlds.library.load_world`; an unknown format.
+        OutputError: The file cannot be written.
+    """
+    formats = exporters()
+    if to not in formats:
+        raise InvalidInputError(f"unknown format {to!r}", expected=f"one of {', '.join(formats)}")
+    plan = read_world(src, level=level)
+    formats[to](Path(dst), plan)
+    return plan
+
+
+def exporters() -> dict[str, Callable[[Path, FloorPlan], None]]:
+    """Writers of floor plans by the name of their format."""
+    from closedrooms.worlds.jsonfile import write_plan
+
+    return {"json": write_plan, "rosmap": write_ros_map}
+
+
+def write_ros_map(path: Path, plan: FloorPlan) -> None:
+    """Write the true map of a plan in the building frame, ``<stem>.yaml`` and ``<stem>.png``, at 0.05 m."""
+    import math
+
+    from closedrooms.core.grid import GridFrame
+    from closedrooms.core.pose import Pose2
+    from closedrooms.core.rosmap import write_map
+    from closedrooms.worlds.truth import rasterise, truth_bounds
+
+    x_min, y_min, x_max, y_max = truth_bounds(plan, Pose2())
+    col, row = math.floor(x_min / MAP_RESOLUTION) - 10, math.floor(y_min / MAP_RESOLUTION) - 10
+    cols, rows = math.ceil(x_max / MAP_RESOLUTION) + 10 - col, math.ceil(y_max / MAP_RESOLUTION) + 10 - row
+    frame = GridFrame(MAP_RESOLUTION, round(col * MAP_RESOLUTION, 9), round(row * MAP_RESOLUTION, 9), rows, cols)
+    stem = path.with_suffix("") if path.suffix in {".yaml", ".yml", ".png", ".pgm"} else path
+    write_map(stem, rasterise(plan, frame, Pose2()))

@@ -1,0 +1,179 @@
+"""The walls of a plan as areas: the single truth for meshes, collisions and rasters."""
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.strtree import STRtree
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.door import Point, Segment
+from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom, Wall
+
+# A gap is cut this much deeper than the wall on both sides, so that no sliver of the wall stays in it [m].
+GAP_MARGIN = 0.01
+# Depth of a gap whose passage lies on no wall (rooms that simply meet) [m].
+BARE_GAP = 0.1
+# A usual interior door leaf is 40 to 50 mm thick [m].
+LEAF_THICKNESS = 0.05
+# Ends of walls closer than this are one corner [m].
+CORNER = 1e-3
+# Corners sharper than this many half thicknesses are cut off instead of drawn to a point.
+MITRE_LIMIT = 4.0
+
+
+def wall_area(plan: FloorPlan) -> Polygon | MultiPolygon:
+    """Every wall as a solid, minus the gaps of doors and openings, building frame [m].
+
+    Doors and openings to the outside of the plan (a side that is ``None``) are cut out too.
+    """
+    walls = solid_walls(plan.walls)
+    passages = [*plan.doors, *plan.openings]
+    if not passages:
+        return walls
+    lines = WallLines(plan)
+    gaps = shapely.union_all([lines.gap(passage.segment) for passage in passages])
+    return areal(shapely.difference(walls, gaps))
+
+
+def solid_walls(walls: Sequence[Wall]) -> Polygon | MultiPolygon:
+    """Walls as one solid without any gap; outer corners are mitred, free ends are flat."""
+    if not walls:
+        return MultiPolygon()
+    segments = np.array([wall.segment for wall in walls], dtype=np.float64)
+    halves = np.array([wall.thickness / 2 for wall in walls], dtype=np.float64)
+    bodies = shapely.polygons(rectangles(segments, halves))
+    return areal(shapely.union_all([*bodies, *_corners(segments, halves)]))
+
+
+def rectangles(segments: FloatArray, halves: FloatArray) -> FloatArray:
+    """Corners, shape (n, 4, 2), of the strips of half width ``halves`` (n,) around ``segments`` (n, 2, 2)."""
+    along = segments[:, 1] - segments[:, 0]
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    normal = np.column_stack((-along[:, 1], along[:, 0])) / np.where(length > 0.0, length, 1.0)
+    side = normal * halves[:, None]
+    a, b = segments[:, 0], segments[:, 1]
+    return np.stack((a - side, b - side, b + side, a + side), axis=1)
+
+
+def _corners(segments: FloatArray, halves: FloatArray) -> list[Polygon]:
+    """The pieces that fill the outer side of corners where two walls end at one point."""
+    ends: defaultdict[tuple[int, int], list[tuple[float, float, FloatArray]]] = defaultdict(list)
+    for (a, b), half in zip(segments, halves, strict=True):
+        for node, other in ((a, b), (b, a)):
+            key = (round(node[0] / CORNER), round(node[1] / CORNER))
+            ends[key].append((math.atan2(other[1] - node[1], other[0] - node[0]), float(half), node))
+    pieces = []
+    for meeting in ends.values():
+        meeting.sort(key=lambda end: end[:2])
+        for (a1, h1, node), (a2, h2, _) in zip(meeting, meeting[1:] + meeting[:1], strict=True):
+            gap = (a2 - a1) % (2 * math.pi)
+            if math.pi + 1e-3 < gap < 2 * math.pi - 1e-3:
+                pieces.append(_mitre(node, a1, h1, a2, h2))
+    return pieces
+
+
+def _mitre(node: FloatArray, a1: float, h1: float, a2: float, h2: float) -> Polygon:
+    """The piece between the left face of a wall leaving at ``a1`` and the right face of one leaving at ``a2``."""
+    u1, u2 = np.array([math.cos(a1), math.sin(a1)]), np.array([math.cos(a2), math.sin(a2)])
+    n1, n2 = h1 * np.array([-u1[1], u1[0]]), h2 * np.array([u2[1], -u2[0]])
+    s = (n2 - n1) @ np.array([u2[1], -u2[0]]) / (u1[0] * u2[1] - u1[1] * u2[0])
+    tip = n1 + s * u1
+    corners = [node, node + n1, node + tip, node + n2]
+    if np.hypot(*tip) > MITRE_LIMIT * max(h1, h2):
+        del corners[2]
+    return shapely.convex_hull(shapely.multipoints(corners))
+
+
+class WallLines:
+    """Centre lines of a plan's walls, to look up the wall under a door."""
+
+    def __init__(self, plan: FloorPlan) -> None:
+        self._thickness = np.array([wall.thickness for wall in plan.walls])
+        self._segments = np.array([wall.segment for wall in plan.walls], dtype=np.float64).reshape(-1, 2, 2)
+        self._tree = STRtree(shapely.linestrings(self._segments)) if len(plan.walls) else None
+
+    def thickness(self, segment: Segment) -> float | None:
+        """Thickness [m] of the wall along ``segment``, the thickest where several lie there; ``None`` without one."""
+        if self._tree is None:
+            return None
+        (x0, y0), (x1, y1) = segment
+        middle = shapely.Point((x0 + x1) / 2, (y0 + y1) / 2)
+        near = np.sort(self._tree.query(middle, predicate="dwithin", distance=0.02))
+        along = self._segments[near, 1] - self._segments[near, 0]
+        length = math.hypot(x1 - x0, y1 - y0) * np.linalg.norm(along, axis=1)
+        sine = np.abs(along[:, 0] * (y1 - y0) - along[:, 1] * (x1 - x0)) / np.maximum(length, 1e-12)
+        parallel = near[sine < 0.05]
+        return float(self._thickness[parallel].max()) if parallel.size else None
+
+    def gap(self, segment: Segment) -> Polygon:
+        """The piece of wall that a passage along ``segment`` takes away, slightly deeper than the wall."""
+        thickness = self.thickness(segment)
+        half = (thickness if thickness is not None else BARE_GAP) / 2 + GAP_MARGIN
+        return Polygon(rectangles(np.array([segment], dtype=np.float64), np.array([half]))[0])
+
+
+def wall_thickness_at(plan: FloorPlan, door: PlanDoor | Opening) -> float:
+    """Thickness [m] of the wall that ``door`` stands in; that of a bare gap where there is no wall."""
+    thickness = WallLines(plan).thickness(door.segment)
+    return BARE_GAP if thickness is None else thickness
+
+
+def door_leaf(plan: FloorPlan, door: PlanDoor) -> Polygon:
+    """The closed leaf: from jamb to jamb on the wall's centre line, never thicker than the wall."""
+    half = min(LEAF_THICKNESS, wall_thickness_at(plan, door)) / 2
+    return Polygon(rectangles(np.array([door.segment], dtype=np.float64), np.array([half]))[0])
+
+
+def door_gap(plan: FloorPlan, door: PlanDoor | Opening) -> Polygon:
+    """The volume of wall that a door or opening takes away, from wall face to wall face."""
+    half = wall_thickness_at(plan, door) / 2
+    return Polygon(rectangles(np.array([door.segment], dtype=np.float64), np.array([half]))[0])
+
+
+def room_interior(plan: FloorPlan, room_id: str) -> Polygon:
+    """The free floor of one room, wall face to wall face, building frame [m]; doorways are not part of it.
+
+    Raises:
+        KeyError: No such room.
+    """
+    return room_interiors(plan, [room_id])[room_id]
+
+
+def room_interiors(plan: FloorPlan, room_ids: Sequence[str]) -> dict[str, Polygon]:
+    """The free floors of several rooms, by id; see :func:`room_interior`."""
+    rooms = {room.id: room for room in plan.rooms}
+    lines = shapely.linestrings(np.array([wall.segment for wall in plan.walls], dtype=np.float64).reshape(-1, 2, 2))
+    tree = STRtree(lines)
+    reach = max((wall.thickness for wall in plan.walls), default=0.0)
+    interiors = {}
+    for room_id in room_ids:
+        room = rooms[room_id]
+        near = np.sort(tree.query(room.polygon, predicate="dwithin", distance=reach))
+        interiors[room_id] = _interior(room, [plan.walls[i] for i in near])
+    return interiors
+
+
+def _interior(room: PlanRoom, walls: Sequence[Wall]) -> Polygon:
+    """The largest piece that the walls leave of a room."""
+    left = areal(shapely.difference(room.polygon, solid_walls(walls)))
+    parts = left.geoms if isinstance(left, MultiPolygon) else [left]
+    return max(parts, key=lambda part: part.area, default=Polygon())
+
+
+def areal(geometry: BaseGeometry) -> Polygon | MultiPolygon:
+    """The polygons of any geometry, without points, lines and slivers below 1e-6 square metres."""
+    parts = shapely.get_parts(geometry)
+    parts = [p for g in parts for p in shapely.get_parts(g) if isinstance(p, Polygon) and p.area > 1e-6]
+    return parts[0] if len(parts) == 1 else MultiPolygon(parts)
+
+
+def distance_along(line: Segment, point: Point) -> float:
+    """How far along ``line`` the foot of ``point`` lies [m], from the line's first end."""
+    (x0, y0), (x1, y1) = line
+    length = math.hypot(x1 - x0, y1 - y0)
+    return ((point[0] - x0) * (x1 - x0) + (point[1] - y0) * (y1 - y0)) / length

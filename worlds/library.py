@@ -1,0 +1,104 @@
+"""Worlds by name or file: the bundled ones, and every format that the importers read."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.worlds.passages import without_entrances
+from closedrooms.worlds.plan import FloorPlan
+
+# An office of about 40 x 30 m.
+DEFAULT_WORLD = "office-05"
+PLANS = Path(__file__).parent / "plans"
+# Enough of a file to tell its format.
+HEAD_BYTES = 65_536
+
+
+@dataclass(frozen=True, slots=True)
+class Importer:
+    """A format that worlds are read from.
+
+    Attributes:
+        name: Short name.
+        what: For messages.
+        recognises: Whether a file is of this format, from its path and its first bytes as text.
+        read: Reads and validates; the level is ``None`` but for formats with several floors a file.
+    """
+
+    name: str
+    what: str
+    recognises: Callable[[Path, str], bool]
+    read: Callable[[Path, str | None], FloorPlan]
+
+
+def bundled_names() -> list[str]:
+    """Names of the bundled worlds, sorted."""
+    return sorted(path.stem for path in PLANS.glob("*.json"))
+
+
+def load_world(name_or_path: str, *, level: str | None = None) -> FloorPlan:
+    """A bundled world by its name, or a file of any known format, told by its content.
+
+    Doors to the outside are walled up (``meta["sealed"]``): a robot that maps a floor must not leave it.
+
+    Args:
+        name_or_path: A name wins over a file of the same name.
+        level: Which floor, for files that hold several.
+
+    Raises:
+        InvalidInputError: Neither a name nor a file (the message lists the names), an unknown format, a plan that
+            is not valid.
+    """
+    return without_entrances(read_world(name_or_path, level=level))
+
+
+def read_world(name_or_path: str, *, level: str | None = None) -> FloorPlan:
+    """As :func:`load_world`, entrances included."""
+    from closedrooms.worlds.jsonfile import read_plan
+
+    if name_or_path in bundled_names():
+        return read_plan(PLANS / f"{name_or_path}.json")
+    path = Path(name_or_path)
+    if not path.exists():
+        names = ", ".join(bundled_names())
+        raise InvalidInputError(f"unknown world {name_or_path!r}", expected=f"a floor plan file or one of {names}")
+    return importer_of(path).read(path, level)
+
+
+def importer_of(path: Path) -> Importer:
+    """The importer that recognises the content of a file.
+
+    Raises:
+        InvalidInputError: It cannot be read, or no importer knows it.
+    """
+    formats = importers()
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD_BYTES).decode("utf-8-sig", errors="replace")
+    except OSError as error:
+        raise InvalidInputError(f"cannot read ({error.strerror})", expected="a floor plan", where=path) from error
+    for importer in formats:
+        if importer.recognises(path, head):
+            return importer
+    known = ", ".join(importer.what for importer in formats)
+    raise InvalidInputError("a file of no known format", expected=known, where=path)
+
+
+def importers() -> list[Importer]:
+    """Every importer, the more specific ones first."""
+    from closedrooms.worlds.jsonfile import read_plan
+    from closedrooms.worlds.luperto import read_luperto
+
+    return [
+        Importer("luperto", "Luperto XML", _is_luperto, lambda path, _: read_luperto(path)),
+        Importer("json", "closedrooms JSON", _is_json, lambda path, _: read_plan(path)),
+    ]
+
+
+def _is_json(path: Path, head: str) -> bool:
+    return head.lstrip().startswith(("{", "[")) or (not head.strip() and path.suffix == ".json")
+
+
+def _is_luperto(path: Path, head: str) -> bool:
+    return head.lstrip().startswith("<") or (not head.strip() and path.suffix == ".xml")

@@ -1,0 +1,180 @@
+"""What a floor plan must satisfy before anything is built from it."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+from shapely.strtree import STRtree
+
+from closedrooms.core.door import Segment
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.worlds.geometry import wall_area
+from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
+
+# Jambs lie on a wall's centre line within this [m].
+ON_WALL = 0.02
+# A door's middle lies within this of both its rooms, beside half the wall's thickness [m].
+AT_ROOM = 0.15
+# Rooms may overlap by this share of the smaller one, no more.
+OVERLAP = 0.2
+# The largest building read, and the largest coordinate [m].
+MAX_COORDINATE = 10_000.0
+# A robot stands free of walls by this radius at the start [m].
+START_RADIUS = 0.15
+
+
+def validate(plan: FloorPlan, where: str = "") -> None:
+    """Check a plan, element by element.
+
+    Args:
+        plan: As read or made.
+        where: The file, for the message.
+
+    Raises:
+        InvalidInputError: Names the first element that is wrong and says what was expected.
+    """
+    if not plan.rooms:
+        raise InvalidInputError("a plan without rooms", expected="at least one room", where=where)
+    _check_names(plan, where)
+    _check_rooms(plan, where)
+    _check_walls(plan, where)
+    _check_passages(plan, where)
+    _check_furniture(plan, where)
+    _check_start(plan, where)
+
+
+def _check_names(plan: FloorPlan, where: str) -> None:
+    kinds = {"room": plan.rooms, "wall": plan.walls, "furniture": plan.furniture}
+    names = [(kind, element.id) for kind, elements in kinds.items() for element in elements]
+    names += [("door or opening", p.id) for p in (*plan.doors, *plan.openings)]
+    seen: set[tuple[str, str]] = set()
+    for kind, name in names:
+        if (kind, name) in seen:
+            raise InvalidInputError(f"two {kind}s with the id {name!r}", expected="ids used once", where=where)
+        seen.add((kind, name))
+
+
+def _check_rooms(plan: FloorPlan, where: str) -> None:
+    for room in plan.rooms:
+        _check_polygon(f"room {room.id} ({room.label})", room.polygon, where)
+    polygons = [room.polygon for room in plan.rooms]
+    first, second = STRtree(polygons).query(polygons, predicate="overlaps")
+    contained = STRtree(polygons).query(polygons, predicate="contains_properly")
+    for i, j in {(min(a, b), max(a, b)) for a, b in (*zip(first, second, strict=True), *contained.T)}:
+        if i == j:
+            continue
+        shared = polygons[i].intersection(polygons[j]).area
+        if shared > OVERLAP * min(polygons[i].area, polygons[j].area):
+            raise InvalidInputError(
+                f"rooms {plan.rooms[i].id} and {plan.rooms[j].id} overlap by {shared:.2f} square metres",
+                expected="rooms side by side", where=where,
+            )  # fmt: skip
+
+
+def _check_polygon(name: str, polygon: Polygon, where: str) -> None:
+    points = shapely.get_coordinates(polygon)
+    if not points.size or not np.isfinite(points).all() or np.abs(points).max() > MAX_COORDINATE:
+        raise InvalidInputError(
+            f"{name} has no usable coordinates", expected=f"metres within +-{MAX_COORDINATE:g}", where=where
+        )
+    if not polygon.is_valid:
+        reason = shapely.is_valid_reason(polygon)
+        raise InvalidInputError(f"{name} has an invalid polygon ({reason})", expected="a simple ring", where=where)
+    if polygon.area < 0.01:
+        raise InvalidInputError(f"{name} has an area of {polygon.area:.4f} square metres", expected=">= 0.01",
+                                where=where)  # fmt: skip
+
+
+def _check_walls(plan: FloorPlan, where: str) -> None:
+    if not plan.walls:
+        raise InvalidInputError("a plan without walls", expected="at least one wall", where=where)
+    for wall in plan.walls:
+        _check_segment(f"wall {wall.id}", wall.segment, 1e-4, where)
+        if not (math.isfinite(wall.thickness) and 0.01 <= wall.thickness <= 5.0):
+            raise InvalidInputError(
+                f"wall {wall.id} of thickness {wall.thickness:g} m", expected="0.01 to 5 m", where=where
+            )
+
+
+def _check_segment(name: str, segment: Segment, shortest: float, where: str) -> None:
+    (x0, y0), (x1, y1) = segment
+    if not all(math.isfinite(v) and abs(v) <= MAX_COORDINATE for v in (x0, y0, x1, y1)):
+        raise InvalidInputError(
+            f"{name} has no usable coordinates", expected=f"metres within +-{MAX_COORDINATE:g}", where=where
+        )
+    if math.hypot(x1 - x0, y1 - y0) < shortest:
+        raise InvalidInputError(f"{name} is {math.hypot(x1 - x0, y1 - y0):.3f} m long",
+                                expected=f"at least {shortest:g} m", where=where)  # fmt: skip
+
+
+def _check_passages(plan: FloorPlan, where: str) -> None:
+    rooms = {room.id: room.polygon for room in plan.rooms}
+    thickest = max(wall.thickness for wall in plan.walls)
+    on_wall = _on_walls(plan, [door.segment for door in plan.doors])
+    for number, passage in enumerate((*plan.doors, *plan.openings)):
+        kind = "door" if isinstance(passage, PlanDoor) else "opening"
+        name = f"{kind} {passage.id}"
+        _check_segment(name, passage.segment, 0.3, where)
+        _check_sides(name, passage, rooms, where)
+        if number < len(plan.doors) and not on_wall[number]:
+            raise InvalidInputError(f"{name} stands on no wall", expected="both jambs on a wall", where=where)
+        (x0, y0), (x1, y1) = passage.segment
+        middle = shapely.Point((x0 + x1) / 2, (y0 + y1) / 2)
+        for room in passage.rooms:
+            if room is not None and rooms[room].distance(middle) > thickest / 2 + AT_ROOM:
+                raise InvalidInputError(
+                    f"{name} is {rooms[room].distance(middle):.2f} m away from room {room}",
+                    expected="a door at the wall of its rooms", where=where,
+                )  # fmt: skip
+        if isinstance(passage, PlanDoor) and passage.opens_into not in passage.rooms:
+            raise InvalidInputError(
+                f"{name} opens into {passage.opens_into!r}", expected=f"one of its rooms {passage.rooms}", where=where
+            )
+
+
+def _check_sides(name: str, passage: PlanDoor | Opening, rooms: dict[str, Polygon], where: str) -> None:
+    for room in passage.rooms:
+        if room is not None and room not in rooms:
+            raise InvalidInputError(f"{name} leads to the unknown room {room!r}", expected="a room id", where=where)
+    if passage.rooms[0] == passage.rooms[1]:
+        raise InvalidInputError(
+            f"{name} has {passage.rooms[0]!r} on both sides", expected="two different sides", where=where
+        )
+
+
+def _on_walls(plan: FloorPlan, segments: Sequence[Segment]) -> list[bool]:
+    """Whether each segment lies on the walls' centre lines along its whole length."""
+    lines = shapely.linestrings(np.array([wall.segment for wall in plan.walls], dtype=np.float64))
+    tree = STRtree(lines)
+    result = []
+    for segment in segments:
+        probe = shapely.LineString(segment)
+        near = np.sort(tree.query(probe, predicate="dwithin", distance=ON_WALL))
+        strip = shapely.union_all(shapely.buffer(lines[near], ON_WALL, cap_style="square", quad_segs=2))
+        result.append(bool(near.size) and bool(strip.buffer(1e-6).covers(probe)))
+    return result
+
+
+def _check_furniture(plan: FloorPlan, where: str) -> None:
+    for thing in plan.furniture:
+        _check_polygon(f"furniture {thing.id}", thing.polygon, where)
+
+
+def _check_start(plan: FloorPlan, where: str) -> None:
+    if plan.start is None:
+        return
+    x, y, heading = plan.start
+    name = f"the start ({x:g}, {y:g})"
+    if not all(map(math.isfinite, (x, y, heading))):
+        raise InvalidInputError(f"{name} is not finite", expected="[x, y, heading]", where=where)
+    point = shapely.Point(x, y)
+    if wall_area(plan).distance(point) < START_RADIUS:
+        raise InvalidInputError(
+            f"{name} lies inside a wall", expected=f"at least {START_RADIUS} m from every wall", where=where
+        )
+    if not any(room.polygon.covers(point) for room in plan.rooms):
+        raise InvalidInputError(f"{name} lies in no room", expected="a start inside a room", where=where)
+    if any(thing.polygon.distance(point) < START_RADIUS for thing in plan.furniture):
+        raise InvalidInputError(f"{name} lies inside furniture", expected="a free place", where=where)

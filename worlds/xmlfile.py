@@ -1,0 +1,52 @@
+"""Untrusted XML, read without entities and without regard to the case of names."""
+
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import ParseError
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files import read_text
+
+MAX_BYTES = 100_000_000
+
+
+def parse_xml(path: Path, *, what: str) -> Any:
+    """The root element of an XML file.
+
+    Raises:
+        InvalidInputError: Missing, too large, no XML, or XML with entities.
+    """
+    from defusedxml import DefusedXmlException, ElementTree
+
+    content = read_text(path, what=what, max_bytes=MAX_BYTES)
+    try:
+        # As bytes: ElementTree refuses text with an encoding declaration.
+        return ElementTree.fromstring(content.encode())
+    except ParseError as error:
+        raise InvalidInputError(f"broken XML ({error})", expected=what, where=path) from error
+    except DefusedXmlException as error:
+        raise InvalidInputError("XML with entities", expected=f"{what} without them", where=path) from error
+    except (ValueError, LookupError) as error:
+        raise InvalidInputError(f"broken XML ({error})", expected=what, where=path) from error
+
+
+def child(element: Any, name: str) -> Any:
+    """The first child called ``name`` in any case; ``None`` without one, or of ``None``."""
+    return next(iter(children(element, name)), None)
+
+
+def children(element: Any, name: str) -> list[Any]:
+    """The children called ``name`` in any case."""
+    if element is None:
+        return []
+    return [c for c in element if isinstance(c.tag, str) and c.tag.rpartition("}")[2].lower() == name.lower()]
+
+
+def attribute(element: Any, name: str) -> str | None:
+    """An attribute spelt in any case."""
+    return next((value for key, value in element.attrib.items() if key.lower() == name.lower()), None)
+
+
+def text(element: Any) -> str:
+    """The text of an element, empty without one."""
+    return "" if element is None else (element.text or "")
