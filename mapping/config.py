@@ -1,0 +1,121 @@
+"""Settings of the mapper: grid, scan matching, keyframes, loop closure."""
+
+from dataclasses import dataclass, field
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.mapping.navigation_config import NavigationConfig
+
+__all__ = ["LoopConfig", "MapperConfig", "MatcherConfig", "NavigationConfig"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MatcherConfig:
+    """How a scan is matched to the map; one set of values for every sensor and noise level."""
+
+    field_sigma: float = 0.08
+    """Standard deviation of the likelihood around a mapped hit [m]: sensor noise and half a cell together."""
+
+    new_surface: float = 0.6
+    """Hits whose likelihood is at least this are on a known surface and do not stamp the field again [0..1]; keeps
+    walls as sharp as they were first seen."""
+
+    point_spacing: float = 0.10
+    """Distance along the scan between the points that are matched [m]; evens out near and far walls."""
+
+    max_points: int = 320
+    """Most points of a scan that are matched."""
+
+    min_points: int = 20
+    """Fewest points worth matching."""
+
+    lost_score: float = 0.15
+    """Mean likelihood [0..1] below which a scan fits nowhere and odometry is kept."""
+
+    iterations: int = 8
+    """Most Gauss-Newton steps of a refinement."""
+
+    prior_weight: float = 0.02
+    """Weight of the odometry against the likelihood of one point at one sigma."""
+
+    min_score: float = 0.45
+    """Mean likelihood [0..1] below which a refinement is doubted and a search is made."""
+
+    doubt: float = 0.8
+    """Share of the usual score below which a refinement is doubted and a search is made."""
+
+    search_distance: float = 0.30
+    """Motion since the last match above which a search precedes the refinement [m]."""
+
+    search_angle: float = 0.35
+    """Turn since the last match above which a search precedes the refinement [rad]."""
+
+    window_sigmas: float = 3.0
+    """Half width of the search window in standard deviations of the odometry."""
+
+    max_window: float = 0.60
+    """Largest half width of the search window [m]."""
+
+    max_window_angle: float = 0.60
+    """Largest half width of the search window [rad]."""
+
+    odometry_distance: float = 0.08
+    """Standard deviation of the odometry after 1 m [m]; its variance grows with the way."""
+
+    odometry_turn_per_metre: float = 0.07
+    """Standard deviation of the odometry's heading after 1 m [rad]."""
+
+    odometry_turn: float = 0.20
+    """Standard deviation of the odometry's heading after one radian of turning [rad]; 8 % of a full turn, its
+    variance linear in the turn."""
+
+    odometry_floor: float = 0.004
+    """Standard deviation of the odometry that is left when the robot hardly moves [m] and, halved, [rad]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopConfig:
+    """When a place is recognised and how the pose graph is solved."""
+
+    enabled: bool = True
+    """Close loops."""
+
+    horizon: float = 20.0
+    """Way along the pose graph [m] within which keyframes are taken as consistent with the present: only they are
+    matched against, what lies beyond is a candidate for a loop."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapperConfig:
+    """How scans become a map."""
+
+    resolution: float = 0.05
+    """Cell size of the map [m]."""
+
+    keyframe_distance: float = 0.35
+    """Way after which a scan becomes a keyframe and enters the map [m]."""
+
+    keyframe_angle: float = 0.40
+    """Turn after which a scan becomes a keyframe and enters the map [rad]."""
+
+    max_range: float = 25.0
+    """Longest range that is mapped [m]; longer ones clear the way up to here."""
+
+    log_odds_hit: float = 3.2
+    """Evidence of one hit for a cell being occupied (natural log-odds): more than two passes, less than three."""
+
+    log_odds_pass: float = 1.45
+    """Evidence of one beam passing for a cell being free (natural log-odds): once is enough for p < 0.196."""
+
+    log_odds_limit: float = 12.0
+    """Largest evidence either way that a cell reports (natural log-odds)."""
+
+    matcher: MatcherConfig = field(default_factory=MatcherConfig)
+    """Scan matching."""
+
+    loops: LoopConfig = field(default_factory=LoopConfig)
+    """Loop closure."""
+
+    def __post_init__(self) -> None:
+        for name in ("resolution", "keyframe_distance", "keyframe_angle", "max_range"):
+            if not getattr(self, name) > 0.0:
+                raise InvalidInputError(f"mapper {name} {getattr(self, name)}", expected="a number above 0")

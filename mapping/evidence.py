@@ -1,0 +1,113 @@
+"""The log-odds grid: evidence of hits and passes per cell, from which scans can be taken back exactly."""
+
+import cv2
+import numpy as np
+
+from closedrooms.core.arrays import CellArray, FloatArray
+from closedrooms.core.grid import UNKNOWN, OccupancyGrid
+from closedrooms.core.pose import Pose2
+from closedrooms.mapping.beams import Beams
+from closedrooms.mapping.config import MapperConfig
+from closedrooms.mapping.lattice import Lattice
+
+SUBCELL_BITS = 6
+"""Fraction bits of OpenCV's fixed-point polygon corners: 1/64 cell."""
+Window = tuple[int, int, int, int]
+
+
+class EvidenceGrid:
+    """Occupancy after Moravec and Elfes as counts of hits and passes; log-odds are their weighted difference.
+
+    A scan counts once per cell. Counts are sums, so a keyframe that moved is taken out at its old pose and put in at
+    its new one without drawing the others again.
+    """
+
+    def __init__(self, config: MapperConfig) -> None:
+        self._config = config
+        self._lattice = Lattice(config.resolution)
+        shape = self._lattice.frame.shape
+        self._hits = np.zeros(shape, dtype=np.int32)
+        self._passes = np.zeros(shape, dtype=np.int32)
+        self._cells: CellArray = np.full(shape, UNKNOWN, dtype=np.int8)
+        self._dirty: Window | None = None
+
+    def add(self, beams: Beams, map_T_robot: Pose2, *, sign: int = 1) -> None:
+        """Count a scan in (``sign`` 1) or out again (-1, at the very pose it was added at).
+
+        Free are the cells wholly inside the outline of what the beams crossed; the boundary itself is not, so that
+        a wall which is seen at a grazing angle is not worn away by the beams along it.
+        """
+        outline, points = map_T_robot.transform(beams.outline), map_T_robot.transform(beams.points)
+        if len(outline) == 0:
+            return
+        low, high = outline.min(axis=0), outline.max(axis=0)
+        if len(points):
+            low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+        self._grow(low, high)
+        lattice = self._lattice
+        (row_low, row_high), (col_low, col_high) = lattice.cells(np.vstack((low, high)))
+        window = (int(row_low), int(col_low), int(row_high - row_low + 1), int(col_high - col_low + 1))
+        rows, cols = slice(window[0], window[0] + window[2]), slice(window[1], window[1] + window[3])
+        mask = self._crossed(outline, window)
+        if len(points):
+            hit_rows, hit_cols = lattice.cells(points)
+            flat = np.unique((hit_rows - window[0]) * window[3] + hit_cols - window[1])
+            mask.ravel()[flat] = 0
+            hits = self._hits[rows, cols]
+            hits[flat // window[3], flat % window[3]] += sign
+        passes = self._passes[rows, cols]
+        if sign > 0:
+            passes += mask
+        else:
+            passes -= mask
+        self._dirty = window if self._dirty is None else _union(self._dirty, window)
+
+    def _crossed(self, outline: FloatArray, window: Window) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+        lattice = self._lattice
+        # OpenCV puts integer coordinates on cell centres.
+        corner = np.array([lattice.col0 + window[1], lattice.row0 + window[0]]) + 0.5
+        vertices = np.rint((outline / lattice.resolution - corner) * (1 << SUBCELL_BITS)).astype(np.int32)
+        mask = np.zeros((window[2], window[3]), dtype=np.uint8)
+        cv2.fillPoly(mask, [vertices], 1, cv2.LINE_8, SUBCELL_BITS)
+        cv2.polylines(mask, [vertices], True, 0, 1, cv2.LINE_8, SUBCELL_BITS)
+        return mask
+
+    def _grow(self, low: FloatArray, high: FloatArray) -> None:
+        padding = self._lattice.cover(low, high, margin=2)
+        if padding is None:
+            return
+        self._hits = np.pad(self._hits, padding)
+        self._passes = np.pad(self._passes, padding)
+        self._cells = np.pad(self._cells, padding, constant_values=UNKNOWN)
+        if self._dirty is not None:
+            row, col, rows, cols = self._dirty
+            self._dirty = (row + padding[0][0], col + padding[1][0], rows, cols)
+
+    def grid(self) -> OccupancyGrid:
+        """The map: probability in percent where anything was observed, else unknown."""
+        if self._dirty is not None:
+            row, col, n_rows, n_cols = self._dirty
+            rows, cols = slice(row, row + n_rows), slice(col, col + n_cols)
+            self._cells[rows, cols] = self._probabilities(self._hits[rows, cols], self._passes[rows, cols])
+            self._dirty = None
+        return OccupancyGrid(self._lattice.frame, self._cells.copy())
+
+    def _probabilities(
+        self,
+        hits: np.ndarray[tuple[int, ...], np.dtype[np.int32]],
+        passes: np.ndarray[tuple[int, ...], np.dtype[np.int32]],
+    ) -> CellArray:
+        config = self._config
+        odds = hits * np.float32(config.log_odds_hit) - passes * np.float32(config.log_odds_pass)
+        # Rounded to a thousandth: the table below is exact and quick, an exponential per cell is not.
+        steps = np.clip(np.rint(odds * 10.0), -10 * config.log_odds_limit, 10 * config.log_odds_limit).astype(np.int32)
+        limit = round(10 * config.log_odds_limit)
+        table = np.rint(100.0 / (1.0 + np.exp(-np.arange(-limit, limit + 1) / 10.0))).astype(np.int8)
+        cells = table[steps + limit]
+        cells[(hits == 0) & (passes == 0)] = UNKNOWN
+        return cells
+
+
+def _union(a: Window, b: Window) -> Window:
+    row, col = min(a[0], b[0]), min(a[1], b[1])
+    return (row, col, max(a[0] + a[2], b[0] + b[2]) - row, max(a[1] + a[3], b[1] + b[3]) - col)

@@ -1,0 +1,43 @@
+"""Keyframes: the scans that make the map, kept so that it can be redrawn from corrected poses."""
+
+from dataclasses import dataclass, field
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.door import DoorSighting, Segment
+from closedrooms.core.pose import Pose2
+from closedrooms.mapping.beams import Beams
+
+
+@dataclass(slots=True, eq=False)
+class Keyframe:
+    """One scan at a pose that may still be corrected.
+
+    Attributes:
+        index: Its place in the list of keyframes.
+        stamp: Time of the scan [s].
+        pose: ``map_T_robot``, the current estimate.
+        beams: The cleaned scan, robot frame.
+        points: The points that are matched, robot frame, shape (n, 2) [m].
+        way: Distance driven up to here [m].
+        drawn: The pose at which it is drawn into the map, ``None`` while it is not.
+        sightings: Closed doors seen while this was the latest keyframe, by id: the nearest sighting in the
+            keyframe's frame and its distance from the robot [m].
+    """
+
+    index: int
+    stamp: float
+    pose: Pose2
+    beams: Beams
+    points: FloatArray
+    way: float
+    drawn: Pose2 | None = None
+    sightings: dict[str, tuple[Segment, float]] = field(default_factory=dict)
+
+    def remember(self, sighting: DoorSighting, keyframe_T_robot: Pose2) -> None:
+        """Keep a sighting relative to this keyframe, if it is the nearest of its door so far."""
+        a, b = sighting.segment_robot
+        distance = ((a[0] + b[0]) ** 2 + (a[1] + b[1]) ** 2) ** 0.5 / 2.0
+        known = self.sightings.get(sighting.id)
+        if known is None or distance < known[1]:
+            start, end = keyframe_T_robot @ Pose2(*a), keyframe_T_robot @ Pose2(*b)
+            self.sightings[sighting.id] = (((start.x, start.y), (end.x, end.y)), distance)

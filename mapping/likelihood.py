@@ -1,0 +1,62 @@
+"""The likelihood field: how likely a scan point lies somewhere, given the surfaces seen so far."""
+
+import functools
+
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.mapping.config import MatcherConfig
+from closedrooms.mapping.lattice import Lattice
+
+Float32Array = np.ndarray[tuple[int, ...], np.dtype[np.float32]]
+REACH_SIGMAS = 3.5
+"""Distance [sigma] beyond which a surface has no influence: exp(-3.5^2 / 2) = 0.002."""
+BORDER = 4
+"""Cells of zeros kept around the field, so that clipped look-ups read zero."""
+
+
+class LikelihoodField:
+    """Likelihood field (Thrun et al., Probabilistic Robotics, 6.4) kept up to date by stamping hits.
+
+    Each hit raises the cells around it to ``exp(-d^2 / 2 sigma^2)``. Only hits on surfaces that the field does not
+    know yet are stamped: what was seen first, at the smallest drift, stays, and a wall does not grow thick with the
+    noise of every scan.
+    """
+
+    def __init__(self, resolution: float, config: MatcherConfig) -> None:
+        self._config = config
+        self._resolution = resolution
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget every surface."""
+        self.lattice = Lattice(self._resolution)
+        self.values: Float32Array = np.zeros(self.lattice.frame.shape, dtype=np.float32)
+
+    def add(self, points: FloatArray) -> None:
+        """Stamp the hits, map frame, shape (n, 2) [m], that lie on no known surface."""
+        if len(points) == 0:
+            return
+        offsets, weights, reach = _kernel(self._config.field_sigma, self.lattice.resolution)
+        padding = self.lattice.cover(points.min(axis=0), points.max(axis=0), margin=reach + BORDER)
+        if padding is not None:
+            self.values = np.pad(self.values, padding)
+        rows, cols = self.lattice.cells(points)
+        flat = np.unique(rows * self.lattice.cols + cols)
+        values = self.values.reshape(-1)
+        flat = flat[values[flat] < self._config.new_surface]
+        if flat.size:
+            shifts = offsets[:, 0] * self.lattice.cols + offsets[:, 1]
+            targets = (flat[:, None] + shifts).ravel()
+            np.maximum.at(values, targets, np.broadcast_to(weights, (flat.size, weights.size)).ravel())
+
+
+@functools.cache
+def _kernel(sigma: float, resolution: float) -> tuple[np.ndarray, Float32Array, int]:  # type: ignore[type-arg]
+    reach = max(1, round(REACH_SIGMAS * sigma / resolution))
+    axis = np.arange(-reach, reach + 1)
+    rows, cols = np.meshgrid(axis, axis, indexing="ij")
+    squared = (rows**2 + cols**2) * resolution**2
+    inside = squared <= (REACH_SIGMAS * sigma) ** 2
+    offsets = np.column_stack((rows[inside], cols[inside]))
+    return offsets, np.exp(-squared[inside] / (2.0 * sigma**2)).astype(np.float32), reach

@@ -1,0 +1,109 @@
+"""Match a scan to the map, starting from odometry."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.pose import Pose2
+from closedrooms.mapping.config import MatcherConfig
+from closedrooms.mapping.correlative import Window, search
+from closedrooms.mapping.likelihood import LikelihoodField
+from closedrooms.mapping.refinement import Refined, refine
+
+ADVANTAGE = 0.03
+"""Mean likelihood by which a searched pose must beat the refined odometry to replace it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What the odometry says since the last match, and how far to trust it.
+
+    Attributes:
+        way: Distance driven [m].
+        turn: Absolute turn [rad].
+    """
+
+    way: float = 0.0
+    turn: float = 0.0
+
+    def sigmas(self, config: MatcherConfig) -> tuple[float, float]:
+        """Standard deviations of the predicted position [m] and heading [rad]; the variance grows with the way."""
+        distance = math.sqrt(config.odometry_floor**2 + config.odometry_distance**2 * self.way)
+        angle = math.sqrt(
+            (config.odometry_floor / 2.0) ** 2
+            + config.odometry_turn_per_metre**2 * self.way
+            + config.odometry_turn**2 * self.turn
+        )
+        return distance, angle
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Match:
+    """A scan on the map.
+
+    Attributes:
+        pose: ``map_T_robot``.
+        score: Mean likelihood [0..1].
+        hessian: Curvature of the field at the pose, shape (3, 3).
+        searched: The refinement alone was not trusted.
+    """
+
+    pose: Pose2
+    score: float
+    hessian: FloatArray
+    searched: bool
+
+
+def match_scan(
+    field: LikelihoodField,
+    points: FloatArray,
+    guess: Pose2,
+    motion: Motion,
+    *,
+    usual_score: float,
+    config: MatcherConfig,
+) -> Match | None:
+    """Refine the pose that odometry predicts, so that the scan lies on the surfaces of the field.
+
+    Small motions are refined at once (:func:`refine`); after a large motion, or when the fit is worse than usual, the
+    window that the odometry leaves open is searched first (:func:`search`).
+
+    Args:
+        field: Surfaces known so far.
+        points: Scan points in the robot frame, shape (n, 2) [m].
+        guess: ``map_T_robot`` as predicted.
+        motion: Since the last match.
+        usual_score: Mean likelihood of recent matches.
+        config: Search window and thresholds.
+
+    Returns:
+        The match, or ``None`` when the scan has too few points or fits nowhere (the caller keeps odometry).
+    """
+    if len(points) < config.min_points:
+        return None
+    sigma_distance, sigma_angle = motion.sigmas(config)
+    information = config.prior_weight * np.diag([sigma_distance**-2, sigma_distance**-2, sigma_angle**-2])
+
+    def refined(start: Pose2) -> Refined:
+        return refine(field, points, start, prior=guess, prior_information=information, iterations=config.iterations)
+
+    doubted = max(config.min_score, config.doubt * usual_score)
+    far = motion.way > config.search_distance or motion.turn > config.search_angle
+    direct = refined(guess)
+    if not far and direct.score >= doubted:
+        return Match(direct.pose, direct.score, direct.hessian, searched=False)
+    window = Window(
+        min(max(config.window_sigmas * sigma_distance, 3 * field.lattice.resolution), config.max_window),
+        min(max(config.window_sigmas * sigma_angle, 0.05), config.max_window_angle),
+    )
+    found = search(field, points, guess, window, prior_sigmas=(sigma_distance, sigma_angle))
+    best = direct
+    if found.score > 0.0:
+        other = refined(found.pose)
+        if other.score > direct.score + ADVANTAGE:
+            best = other
+    if best.score < config.lost_score:
+        return None
+    return Match(best.pose, best.score, best.hessian, searched=True)
