@@ -1,0 +1,186 @@
+"""The command line: one function a command, options from the configuration dataclasses.
+
+Exit status: 0 done, 1 bad input, 2 wrong usage, 3 part of the work failed and the rest is written, 130 on Ctrl-C.
+Heavy libraries are imported by the command that needs them, so that ``--help`` is quick.
+"""
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+from closedrooms.core.errors import ClosedroomsError
+
+DONE, BAD_INPUT, WRONG_USAGE, PARTLY_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+
+Config = TypeVar("Config")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status.
+
+    Args:
+        arguments: Words after the program's name; ``sys.argv`` by default.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if not words or words[0] in {"-h", "--help"}:
+        _say(_usage())
+        return DONE if words else WRONG_USAGE
+    if words[0] == "--version":
+        from importlib.metadata import version
+
+        _say(f"closedrooms {version('closedrooms')}")
+        return DONE
+    command = COMMANDS.get(words[0])
+    if command is None:
+        _complain(f"unknown command {words[0]!r}; expected one of {', '.join(COMMANDS)}")
+        return WRONG_USAGE
+    return _guarded(command[1], words[1:])
+
+
+def _guarded(command: Callable[[Sequence[str]], int], words: Sequence[str]) -> int:
+    """Run a command; what a user can cause is one line and a status, never a traceback."""
+    try:
+        return command(words)
+    except ClosedroomsError as error:
+        _complain(str(error))
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        _complain("interrupted; nothing half-written was left behind")
+        return INTERRUPTED
+    except BrokenPipeError:
+        # The reader (`| head`) has what it wanted; stdout goes nowhere, so that the interpreter's own flush is silent.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+
+
+def _usage() -> str:
+    width = max(map(len, COMMANDS))
+    lines = [f"  {name:<{width}}  {summary}" for name, (summary, _) in COMMANDS.items()]
+    return "\n".join(
+        [
+            "usage: closedrooms COMMAND [ARGUMENTS] [OPTIONS]",
+            "",
+            "Predicts the layout of rooms behind closed doors and completes a robot's map with them.",
+            "",
+            "commands:",
+            *lines,
+            "",
+            "closedrooms COMMAND --help lists the options of a command.",
+        ]
+    )
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text + "\n")
+
+
+def _complain(text: str) -> None:
+    sys.stderr.write(f"closedrooms: {' '.join(text.split())}\n")
+
+
+def _parse(config: type[Config], name: str, words: Sequence[str], summary: str) -> Config:
+    """Options of one command; wrong usage ends the program with status 2, ``--help`` with 0 (both by tyro)."""
+    import tyro
+
+    return tyro.cli(config, prog=f"closedrooms {name}", description=summary, args=list(words))
+
+
+def _run(words: Sequence[str]) -> int:
+    from closedrooms.pipeline.config import RunConfig
+
+    config = _parse(RunConfig, "run", words, COMMANDS["run"][0])
+    from closedrooms.pipeline.run import run
+    from closedrooms.pipeline.terminal import Terminal
+
+    with Terminal() as terminal:
+        result = run(config, progress=terminal)
+    terminal.table(result.title, result.table())
+    terminal.say(f"written to {result.folder}")
+    return PARTLY_FAILED if result.failures else DONE
+
+
+def _predict(words: Sequence[str]) -> int:
+    from closedrooms.pipeline.config import PredictConfig
+
+    config = _parse(PredictConfig, "predict", words, COMMANDS["predict"][0])
+    from closedrooms.pipeline.predict_map import predict_map
+    from closedrooms.pipeline.terminal import Terminal
+
+    with Terminal() as terminal:
+        result = predict_map(config, progress=terminal)
+    terminal.table(result.title, result.table())
+    terminal.say(f"written to {result.folder}")
+    return PARTLY_FAILED if result.failures else DONE
+
+
+def _cover(words: Sequence[str]) -> int:
+    from closedrooms.pipeline.config import CoverConfig
+
+    config = _parse(CoverConfig, "cover", words, COMMANDS["cover"][0])
+    from closedrooms.pipeline.cover_map import cover_map
+    from closedrooms.pipeline.terminal import Terminal
+
+    with Terminal() as terminal:
+        result = cover_map(config, progress=terminal)
+    terminal.table(result.title, result.table())
+    terminal.say(f"written to {result.folder}")
+    return PARTLY_FAILED if result.failures else DONE
+
+
+def _map(words: Sequence[str]) -> int:
+    from closedrooms.pipeline.config import MapConfig
+
+    config = _parse(MapConfig, "map", words, COMMANDS["map"][0])
+    from closedrooms.pipeline.map_log import map_log
+    from closedrooms.pipeline.terminal import Terminal
+
+    with Terminal() as terminal:
+        result = map_log(config, progress=terminal)
+    terminal.table(result.title, result.table())
+    terminal.say(f"written to {result.folder}")
+    return PARTLY_FAILED if result.failures else DONE
+
+
+def _worlds(words: Sequence[str]) -> int:
+    from closedrooms.pipeline.config import WORLD_ACTIONS
+
+    if not words or words[0] in {"-h", "--help"}:
+        width = max(map(len, WORLD_ACTIONS))
+        actions = [f"  {name:<{width}}  {summary}" for name, (summary, _) in WORLD_ACTIONS.items()]
+        _say("\n".join(["usage: closedrooms worlds ACTION [ARGUMENTS] [OPTIONS]", "", "actions:", *actions]))
+        return DONE if words else WRONG_USAGE
+    if words[0] not in WORLD_ACTIONS:
+        _complain(f"unknown action {words[0]!r} of worlds; expected one of {', '.join(WORLD_ACTIONS)}")
+        return WRONG_USAGE
+    summary, config_type = WORLD_ACTIONS[words[0]]
+    config = _parse(config_type, f"worlds {words[0]}", words[1:], summary)
+    from closedrooms.pipeline.world_actions import act
+
+    for line in act(config):
+        _say(line)
+    return DONE
+
+
+def _evaluate(words: Sequence[str]) -> int:
+    from closedrooms.pipeline.evaluate_config import EvaluateConfig
+
+    config = _parse(EvaluateConfig, "evaluate", words, COMMANDS["evaluate"][0])
+    from closedrooms.pipeline.evaluate import evaluate
+    from closedrooms.pipeline.terminal import Terminal
+
+    with Terminal() as terminal:
+        result = evaluate(config, progress=terminal)
+    terminal.table(result.title, result.table())
+    terminal.say(f"written to {result.folder}")
+    return PARTLY_FAILED if result.failures else DONE
+
+
+COMMANDS: dict[str, tuple[str, Callable[[Sequence[str]], int]]] = {
+    "run": ("Simulate a robot in a building with closed doors, map it, predict the closed rooms, plan a tour.", _run),
+    "predict": ("Predict the rooms behind the closed doors of a ROS map.", _predict),
+    "cover": ("Plan a coverage tour on a ROS map.", _cover),
+    "map": ("Build the map of a recorded run.", _map),
+    "worlds": ("List, show, generate and convert floor plans.", _worlds),
+    "evaluate": ("Compare predictions with the truth over a dataset.", _evaluate),
+}

@@ -1,0 +1,216 @@
+"""Options of every command. Nothing heavy is imported, so that ``--help`` is quick."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.coverage.config import CoverageConfig
+from closedrooms.mapping.config import MapperConfig
+from closedrooms.mapping.navigation_config import NavigationConfig
+from closedrooms.predictor.config import Phi, PredictorConfig, PresetName, Structure
+from closedrooms.sim.config import SimConfig
+
+NoiseName = Literal["none", "low", "medium", "high"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunConfig:
+    """Options of ``closedrooms run``."""
+
+    world: tyro.conf.Positional[str] = "office-01"
+    """Name of a bundled world (see ``closedrooms worlds list``) or a file that the importers read."""
+
+    close: int | None = None
+    """How many rooms to close, drawn by the seed; 5, or as many as the world has, when no doors are named either."""
+
+    close_doors: str | None = None
+    """Doors to close by name, with commas between them, e.g. ``d03,d07``."""
+
+    several_doors: bool = False
+    """Also close rooms that have more than one door."""
+
+    noise: NoiseName = "medium"
+    """Noise of lidar and odometry; each of its numbers can be set by itself under ``--sim.noise``."""
+
+    seed: int = 0
+    """The one seed of the run: which rooms are closed, and every source of noise."""
+
+    preset: PresetName = "best"
+    """Predictor: ``paper`` is what the authors describe and ran, ``best`` as good as we can."""
+
+    structure: Structure = "hough"
+    """Where the predictor finds structure: ``hough`` (paper, section 3.1) or ``rose`` (section 4.2)."""
+
+    phi: Phi = "as-run"
+    """Evaluation function as the authors ran it or as the paper prints it (section 3.4)."""
+
+    drive: bool = False
+    """After the prediction, open the doors and drive the tour that was planned on the predicted map."""
+
+    record: bool = True
+    """Write the recording ``run.rrd`` for the rerun viewer."""
+
+    keep_scans: bool = False
+    """Write ``scans.npz``: every scan with odometry, estimated and true pose."""
+
+    out: Path | None = None
+    """The run directory; ``runs/<world>-<seed>`` when not given."""
+
+    level: str | None = None
+    """Which level of a file with several."""
+
+    sim: SimConfig = field(default_factory=SimConfig)
+    """Robot, lidar and odometry."""
+
+    mapper: MapperConfig = field(default_factory=MapperConfig)
+    """The mapper."""
+
+    navigation: NavigationConfig = field(default_factory=NavigationConfig)
+    """Exploration and driving."""
+
+    predictor: tyro.conf.OmitArgPrefixes[Annotated[PredictorConfig, tyro.conf.Suppress]] = field(
+        default_factory=PredictorConfig
+    )
+    """The predictor, for use as a library; ``preset``, ``structure`` and ``phi`` above are laid over it."""
+
+    coverage: CoverageConfig = field(default_factory=CoverageConfig)
+    """Graph and tour."""
+
+    def __post_init__(self) -> None:
+        if self.close is not None and self.close_doors is not None:
+            raise InvalidInputError("both --close and --close-doors", expected="one of them")
+        if self.close is not None and self.close < 0:
+            raise InvalidInputError(f"--close {self.close}", expected="a number of rooms of at least 0")
+        if self.seed < 0:
+            raise InvalidInputError(f"--seed {self.seed}", expected="a whole number of at least 0")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PredictConfig:
+    """Options of ``closedrooms predict``."""
+
+    map: tyro.conf.Positional[Path]
+    """The map: a ROS map_server YAML."""
+
+    doors: Path
+    """Closed doors: GeoJSON Points or LineStrings in the map frame, metres."""
+
+    out: Path
+    """Folder to write."""
+
+    preset: PresetName = "best"
+    """``paper`` is what the authors describe and ran, ``best`` as good as we can."""
+
+    structure: Structure = "hough"
+    """Where structure is found: ``hough`` (paper, section 3.1) or ``rose`` (section 4.2)."""
+
+    phi: Phi = "as-run"
+    """Evaluation function as the authors ran it or as the paper prints it (section 3.4)."""
+
+    record: bool = False
+    """Write the recording ``run.rrd`` for the rerun viewer."""
+
+    predictor: tyro.conf.OmitArgPrefixes[Annotated[PredictorConfig, tyro.conf.Suppress]] = field(
+        default_factory=PredictorConfig
+    )
+    """All settings, for use as a library; the three above are laid over it."""
+
+
+def predictor_config(config: RunConfig | PredictConfig) -> PredictorConfig:
+    """Settings of the predictor with the options ``preset``, ``structure`` and ``phi`` laid over them."""
+    return replace(config.predictor, preset=config.preset, structure=config.structure, phi=config.phi)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoverConfig:
+    """Options of ``closedrooms cover``."""
+
+    map: tyro.conf.Positional[Path]
+    """The map: a ROS map_server YAML."""
+
+    out: Path
+    """Folder to write."""
+
+    doors: Path | None = None
+    """Closed doors whose positions the tour shall visit too: GeoJSON in the map frame, metres."""
+
+    coverage: tyro.conf.OmitArgPrefixes[CoverageConfig] = field(default_factory=CoverageConfig)
+    """Graph and tour."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapConfig:
+    """Options of ``closedrooms map``."""
+
+    log: tyro.conf.Positional[Path]
+    """A recorded run: CARMEN log (also gzipped), rosbag or MCAP, or ``scans.npz`` of a run."""
+
+    out: Path
+    """Folder to write."""
+
+    record: bool = True
+    """Write the recording ``run.rrd`` for the rerun viewer."""
+
+    scan_topic: str | None = None
+    """Topic of the laser scans, where a bag holds several."""
+
+    odometry_topic: str | None = None
+    """Topic of the odometry, where a bag holds several."""
+
+    mapper: tyro.conf.OmitArgPrefixes[MapperConfig] = field(default_factory=MapperConfig)
+    """The mapper."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ListWorlds:
+    """Options of ``closedrooms worlds list``."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShowWorld:
+    """Options of ``closedrooms worlds show``."""
+
+    world: tyro.conf.Positional[str]
+    """Name of a bundled world or a file that the importers read."""
+
+    out: Path
+    """Picture to write (PNG)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GenerateWorld:
+    """Options of ``closedrooms worlds generate``."""
+
+    kind: Literal["office", "school"]
+    """What kind of building."""
+
+    out: Path
+    """Floor plan to write (JSON)."""
+
+    seed: int = 0
+    """Same kind, seed and generator version: the same building."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConvertWorld:
+    """Options of ``closedrooms worlds convert``."""
+
+    source: tyro.conf.Positional[str]
+    """Name of a bundled world or a file that the importers read."""
+
+    destination: tyro.conf.Positional[Path]
+    """File to write."""
+
+    to: str
+    """Format to write."""
+
+
+WORLD_ACTIONS: dict[str, tuple[str, type[ListWorlds | ShowWorld | GenerateWorld | ConvertWorld]]] = {
+    "list": ("List the bundled worlds, one a line, its name first.", ListWorlds),
+    "show": ("Draw a floor plan.", ShowWorld),
+    "generate": ("Generate a floor plan.", GenerateWorld),
+    "convert": ("Convert a floor plan to another format.", ConvertWorld),
+}

@@ -1,0 +1,39 @@
+"""What ``run.json`` says of how a result came about."""
+
+import dataclasses
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+# The libraries whose version can change a result.
+LIBRARIES = (
+    "closedrooms", "pybullet", "numpy", "scipy", "opencv-python-headless", "shapely", "scikit-learn", "scikit-image",
+    "networkx", "ortools", "trimesh", "rerun-sdk",
+)  # fmt: skip
+
+
+def versions() -> dict[str, str]:
+    """Version of every library that can change a result."""
+    found = {}
+    for name in LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def resolved(config: Any, *, leave_out: tuple[str, ...] = ("out",)) -> dict[str, Any]:
+    """A configuration as plain JSON values; fields that hold paths of this run (``leave_out``) are not in it."""
+    values = dataclasses.asdict(config)
+    return {name: _plain(value) for name, value in values.items() if name not in leave_out}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, Path):
+        return str(value)
+    return value

@@ -1,0 +1,72 @@
+"""Figures that compare one run with the truth."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from closedrooms.core.arrays import BoolArray
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.pose import Pose2
+from closedrooms.core.room import Room
+from closedrooms.worlds.geometry import room_interior
+from closedrooms.worlds.plan import FloorPlan
+
+# Spacing of the points at which it is asked whether a room was seen [m], and the share of them that makes it seen.
+SEEN_SPACING, SEEN_SHARE = 0.25, 0.5
+
+
+def area_mapped(grid: OccupancyGrid, reachable: BoolArray) -> float:
+    """Share (0..1) of the reachable true free cells that the map knows; NaN when nothing is reachable.
+
+    Args:
+        grid: The map.
+        reachable: True free cells connected to the start with the closed doors shut, shape of ``grid``.
+    """
+    cells = int(reachable.sum())
+    return float((grid.known & reachable).sum() / cells) if cells else float("nan")
+
+
+def room_iou(predicted: Sequence[Room], truth: Sequence[Room]) -> dict[str, float]:
+    """Intersection over union of predicted and true room by door id (paper, section 4.1), 0 without a prediction.
+
+    Args:
+        predicted: Predicted rooms, map frame.
+        truth: True rooms behind closed doors, map frame.
+    """
+    by_door = {door: room.polygon for room in predicted for door in room.doors}
+    figures = {}
+    for room in truth:
+        for door in room.doors:
+            shape = by_door.get(door)
+            figures[door] = 0.0 if shape is None else _iou(shape, room.polygon)
+    return dict(sorted(figures.items()))
+
+
+def _iou(a: BaseGeometry, b: BaseGeometry) -> float:
+    union = a.union(b).area
+    return float(a.intersection(b).area / union) if union else 0.0
+
+
+def mean(figures: Mapping[str, float]) -> float | None:
+    """Mean of some figures, ``None`` without any."""
+    return float(np.mean(list(figures.values()))) if figures else None
+
+
+def rooms_seen(plan: FloorPlan, grid: OccupancyGrid, map_T_world: Pose2) -> int:
+    """How many true rooms the robot saw: |R| of section 5.2. A room counts when half of it is known in ``grid``."""
+    known = grid.known
+    seen = 0
+    for room in plan.rooms:
+        interior = room_interior(plan, room.id)
+        if interior.is_empty:
+            continue
+        x_min, y_min, x_max, y_max = interior.bounds
+        xs, ys = np.meshgrid(np.arange(x_min, x_max, SEEN_SPACING), np.arange(y_min, y_max, SEEN_SPACING))
+        inside = shapely.contains_xy(interior, xs.ravel(), ys.ravel())
+        points = np.column_stack((xs.ravel()[inside], ys.ravel()[inside]))
+        cells = grid.frame.to_cells(map_T_world.transform(points))
+        cells = cells[grid.frame.contains(cells)]
+        seen += bool(len(points)) and int(known[cells[:, 0], cells[:, 1]].sum()) >= SEEN_SHARE * len(points)
+    return seen

@@ -1,0 +1,38 @@
+"""Tables of results for people."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from closedrooms.pipeline.run import RunResult
+
+Rows = list[tuple[str, str]]
+
+
+def run_rows(result: "RunResult") -> Rows:
+    """The table at the end of ``closedrooms run``; the first row is the head."""
+    metrics = result.metrics
+    missed = [door for door in result.closed if door not in result.seen]
+    rows: Rows = [
+        ("figure", "value"),
+        ("doors closed", f"{len(result.closed)}" + (f": {', '.join(result.closed)}" if result.closed else "")),
+        ("doors seen", f"{len(result.seen)}" + (f"; never seen: {', '.join(missed)}" if missed else "")),
+        ("area mapped", f"{100 * metrics['area_mapped']:.1f} %"),
+        ("trajectory error (ATE RMSE)", f"{metrics['ate_m']:.3f} m"),
+    ]
+    if not result.closed:
+        rows.append(("closed rooms", "none: no door was closed"))
+    rows += [(f"IoU behind {door}", f"{iou:.3f}") for door, iou in metrics["room_iou"].items()]
+    if metrics["room_iou_mean"] is not None:
+        rows.append(("IoU mean", f"{metrics['room_iou_mean']:.3f}"))
+    rows += [(f"not predicted: {door}", reason) for door, reason in result.failures.items()]
+    rows += tour_rows(metrics["tour"])
+    rows += [(f"time: {stage}", f"{seconds:.2f} s") for stage, seconds in result.durations.items()]
+    return rows
+
+
+def tour_rows(tour: dict[str, dict[str, float]]) -> Rows:
+    """Lengths of the tours and the errors of the estimates (paper, section 5.3)."""
+    names = {"closed": "map with closed doors", "predicted": "predicted map", "truth": "true map"}
+    rows = [(f"tour on the {text}", f"{tour[name]['length_m']:.1f} m") for name, text in names.items() if name in tour]
+    errors = tour.get("errors_percent", {})
+    return rows + [(f"tour error, {name}", f"{error:.1f} %") for name, error in errors.items()]
