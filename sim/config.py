@@ -1,0 +1,229 @@
+"""What the simulated robot is like: its lidar, its drive, its noise, and how doors move."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from closedrooms.core.errors import InvalidInputError
+
+FULL_TURN = 2.0 * math.pi
+
+
+def _check(owner: str, condition: bool, what: str, expected: str) -> None:
+    if not condition:
+        raise InvalidInputError(f"{owner} {what}", expected=expected)
+
+
+def _finite(*values: float) -> bool:
+    return all(map(math.isfinite, values))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LidarConfig:
+    """A planar laser scanner that looks horizontally."""
+
+    beams: int = 720
+    """Rays of one sweep."""
+    field_of_view: float = FULL_TURN
+    """Angle from the first beam to the last, centred on the forward axis [rad]; a full turn has no double beam."""
+    range_min: float = 0.1
+    """Shortest distance that is measured [m]; nearer things give no measurement (NaN)."""
+    range_max: float = 20.0
+    """Longest distance that is measured [m]; beyond it there is no return (infinity)."""
+    rate: float = 10.0
+    """Sweeps a second [Hz]."""
+    height: float = 0.3
+    """Height of the scan plane above the floor [m]; below every wall, door and piece of furniture."""
+    mount: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where the sensor sits on the robot: x, y [m] and heading [rad]."""
+
+    def __post_init__(self) -> None:
+        numbers = (self.field_of_view, self.range_min, self.range_max, self.rate, self.height, *self.mount)
+        _check("lidar", _finite(*numbers), "with a setting that is not finite", "finite numbers")
+        _check("lidar", 1 <= self.beams <= 100_000, f"with {self.beams} beams", "1 to 100000")
+        _check("lidar", 0 < self.field_of_view <= FULL_TURN + 1e-9, f"field of view {self.field_of_view:g}",
+               "above 0, at most a full turn (6.2832 rad)")  # fmt: skip
+        _check("lidar", 0 <= self.range_min < self.range_max, f"range {self.range_min:g} to {self.range_max:g} m",
+               "0 <= range_min < range_max")  # fmt: skip
+        _check("lidar", self.rate > 0, f"rate {self.rate:g} Hz", "above 0")
+        _check("lidar", 0 < self.height < 0.7, f"height {self.height:g} m", "above 0, below 0.7 (furniture's top)")
+
+    @property
+    def angle_increment(self) -> float:
+        """Angle from one beam to the next [rad]."""
+        if self.field_of_view > FULL_TURN - 1e-6:
+            return FULL_TURN / self.beams
+        return self.field_of_view / max(self.beams - 1, 1)
+
+    @property
+    def angle_min(self) -> float:
+        """Angle of the first beam [rad]."""
+        return -self.field_of_view / 2.0
+
+
+# Figures of the makers' data sheets: field of view, angular step, distances and sweeps a second.
+LIDAR_PRESETS: Mapping[str, LidarConfig] = MappingProxyType(
+    {
+        "default": LidarConfig(),
+        # Hokuyo UTM-30LX: 270 deg in steps of 0.25 deg, 0.1 to 30 m, 25 ms a scan.
+        "hokuyo-utm-30lx": LidarConfig(
+            beams=1081, field_of_view=math.radians(270), range_min=0.1, range_max=30.0, rate=40.0
+        ),
+        # Hokuyo URG-04LX-UG01: 240 deg in 683 steps of 360/1024 deg, 0.02 to 5.6 m, 100 ms a scan.
+        "hokuyo-urg-04lx": LidarConfig(
+            beams=683, field_of_view=math.radians(682 * 360 / 1024), range_min=0.02, range_max=5.6, rate=10.0
+        ),
+        # SICK LMS111: 270 deg in steps of 0.5 deg at 50 Hz, 0.5 to 20 m.
+        "sick-lms111": LidarConfig(
+            beams=541, field_of_view=math.radians(270), range_min=0.5, range_max=20.0, rate=50.0
+        ),
+        # Slamtec RPLIDAR A2M8: 360 deg, 8000 samples a second at 10 Hz, 0.2 to 12 m.
+        "rplidar-a2": LidarConfig(beams=800, range_min=0.2, range_max=12.0, rate=10.0),
+        # Robotis LDS-01 (TurtleBot3): 360 beams of 1 deg, 0.12 to 3.5 m, 300 turns a minute.
+        "robotis-lds-01": LidarConfig(beams=360, range_min=0.12, range_max=3.5, rate=5.0),
+    }
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotConfig:
+    """A round differential-drive robot."""
+
+    radius: float = 0.2
+    """Radius of the body [m]."""
+    height: float = 0.5
+    """Height of the body [m]."""
+    max_speed: float = 1.0
+    """Fastest drive, forwards and backwards [m/s]."""
+    max_turn_rate: float = 2.0
+    """Fastest turn [rad/s]."""
+    max_acceleration: float = 1.5
+    """Strongest change of speed, braking included [m/s^2]."""
+    max_turn_acceleration: float = 6.0
+    """Strongest change of the turn rate [rad/s^2]."""
+
+    def __post_init__(self) -> None:
+        for name in ("radius", "height", "max_speed", "max_turn_rate", "max_acceleration", "max_turn_acceleration"):
+            value = getattr(self, name)
+            _check("robot", math.isfinite(value) and value > 0, f"{name} {value:g}", "a finite number above 0")
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoiseConfig:
+    """How wrong the lidar and the odometry are.
+
+    The odometry's figures are standard deviations after one metre driven or one full turn. Errors have zero mean and a
+    variance that grows linearly with the way (Thrun, Burgard, Fox: Probabilistic Robotics, section 5.4, with its
+    variances per metre and per radian), so that they do not depend on the length of a step. What is systematic is a
+    bias of its own.
+    """
+
+    range_sd: float = 0.03
+    """Standard deviation of a measured distance [m]."""
+    dropouts: float = 0.005
+    """Share of beams that give no measurement (NaN) [0..1]."""
+    outliers: float = 0.002
+    """Share of beams that give a distance drawn uniformly over the sensor's range [0..1]."""
+    way: float = 0.03
+    """Error of the way after 1 m [m]."""
+    turn_per_metre: float = math.radians(1.5)
+    """Error of the heading after 1 m driven [rad]."""
+    turn: float = 0.03
+    """Error of the heading after one full turn, as a share of that turn."""
+    way_per_turn: float = 0.0
+    """Error of the way after one full turn [m]."""
+    bias_way: float = 0.0
+    """Systematic error of the way, the same the whole run, as a share of the way."""
+    bias_turn_per_metre: float = 0.0
+    """Systematic turn for each metre driven, the same the whole run [rad]."""
+    bias_turn: float = 0.0
+    """Systematic error of turns, the same the whole run, as a share of the turn."""
+
+    def __post_init__(self) -> None:
+        for name in ("range_sd", "way", "turn_per_metre", "turn", "way_per_turn"):
+            value = getattr(self, name)
+            _check("noise", math.isfinite(value) and value >= 0, f"{name} {value:g}", "a finite number, at least 0")
+        for name in ("dropouts", "outliers"):
+            value = getattr(self, name)
+            _check("noise", 0 <= value <= 1, f"{name} {value:g}", "a share from 0 to 1")
+        biases = (self.bias_way, self.bias_turn_per_metre, self.bias_turn)
+        _check("noise", _finite(*biases), "with a bias that is not finite", "finite numbers")
+
+    @property
+    def alphas(self) -> tuple[float, float, float, float]:
+        """The motion model's alpha 1 to 4 (Probabilistic Robotics, table 5.6) for variances linear in the way.
+
+        Variance of the heading per radian turned [rad], of the heading per metre driven [rad^2/m], of the way per metre
+        driven [m], of the way per radian turned [m^2/rad].
+        """
+        return (
+            (self.turn * FULL_TURN) ** 2 / FULL_TURN,
+            self.turn_per_metre**2,
+            self.way**2,
+            self.way_per_turn**2 / FULL_TURN,
+        )
+
+
+NOISE_LEVELS: Mapping[str, NoiseConfig] = MappingProxyType(
+    {
+        "none": NoiseConfig(range_sd=0.0, dropouts=0.0, outliers=0.0, way=0.0, turn_per_metre=0.0, turn=0.0),
+        "low": NoiseConfig(
+            range_sd=0.01, dropouts=0.001, outliers=0.0, way=0.01, turn_per_metre=math.radians(0.5), turn=0.01
+        ),
+        "medium": NoiseConfig(),
+        "high": NoiseConfig(
+            range_sd=0.05, dropouts=0.02, outliers=0.01, way=0.08, turn_per_metre=math.radians(4.0), turn=0.08
+        ),
+    }
+)
+
+
+def noise_level(name: str) -> NoiseConfig:
+    """The noise of a level: ``none``, ``low``, ``medium`` or ``high``.
+
+    Raises:
+        InvalidInputError: No such level.
+    """
+    if name not in NOISE_LEVELS:
+        raise InvalidInputError(f"unknown noise level {name!r}", expected=f"one of {', '.join(NOISE_LEVELS)}")
+    return NOISE_LEVELS[name]
+
+
+def lidar_preset(name: str) -> LidarConfig:
+    """The lidar of that name, see ``LIDAR_PRESETS``.
+
+    Raises:
+        InvalidInputError: No such lidar.
+    """
+    if name not in LIDAR_PRESETS:
+        raise InvalidInputError(f"unknown lidar {name!r}", expected=f"one of {', '.join(LIDAR_PRESETS)}")
+    return LIDAR_PRESETS[name]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimConfig:
+    """The simulated world and the robot in it."""
+
+    lidar: LidarConfig = field(default_factory=LidarConfig)
+    """The laser scanner."""
+    robot: RobotConfig = field(default_factory=RobotConfig)
+    """Body and drive."""
+    noise: NoiseConfig = field(default_factory=NoiseConfig)
+    """Errors of lidar and odometry; the default is the level ``medium``."""
+    heading: float | None = None
+    """Heading of the start, and so of the map frame, against the building [rad]; the plan's where not given."""
+    swing: float = math.radians(95.0)
+    """How far hinged doors open where nothing is in the way [rad]."""
+    door_seconds: float = 2.0
+    """Time that a door takes to open wholly [s]; 0 opens it at once."""
+
+    def __post_init__(self) -> None:
+        heading_ok = self.heading is None or math.isfinite(self.heading)
+        _check("simulation", heading_ok, f"heading {self.heading}", "a finite angle [rad]")
+        _check("simulation", 0 < self.swing <= math.pi, f"swing {self.swing:g} rad", "above 0, at most half a turn")
+        seconds_ok = math.isfinite(self.door_seconds) and self.door_seconds >= 0
+        _check("simulation", seconds_ok, f"door_seconds {self.door_seconds:g}", "a finite time, at least 0")
+        x, y, _ = self.lidar.mount
+        _check("simulation", math.hypot(x, y) <= self.robot.radius, f"lidar mounted at ({x:g}, {y:g}) m",
+               f"a place on the robot (radius {self.robot.radius:g} m)")  # fmt: skip

@@ -1,0 +1,147 @@
+"""A differential drive: velocities that follow their command within limits, and arcs driven exactly."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from closedrooms.sim.config import RobotConfig
+from closedrooms.sim.contacts import SKIN, Edge, Obstacles, distance, move_disc
+
+# While velocities change, an arc is driven with the mean of so much time [s]: an error below 0.1 mm.
+RAMP_SECONDS = 0.05
+# One arc is at most this long [m] and turns by no more than this [rad].
+ARC_LENGTH = 0.3
+ARC_TURN = 0.5
+# Beside obstacles an arc is cut into chords of this length [m] and turn [rad]: they leave it by less than 0.3 mm.
+CHORD_LENGTH = 0.02
+CHORD_TURN = 0.1
+
+
+class Motion(NamedTuple):
+    """A piece of the way as it was really driven, in the robot frame at its start.
+
+    Attributes:
+        dx: Forwards [m].
+        dy: To the left [m].
+        turn: Change of the heading [rad].
+    """
+
+    dx: float
+    dy: float
+    turn: float
+
+
+class Drive:
+    """Pose and velocity of the robot; it cannot pass through anything.
+
+    The robot is a disc that is moved, not pushed: contacts are found in the plane, against the very edges that the
+    walls are extruded from. It slides along what it meets at an angle and stops at what it meets head-on. A wheeled
+    body in PyBullet costs 65 microseconds a step and is stopped within millimetres only; this is exact and nearly free.
+    """
+
+    def __init__(self, config: RobotConfig, obstacles: Obstacles, x: float, y: float, theta: float) -> None:
+        self.config = config
+        self.x, self.y, self.theta = x, y, theta
+        self.v = 0.0
+        self.w = 0.0
+        self.collided = False
+        self._obstacles = obstacles
+
+    @staticmethod
+    def reach(config: RobotConfig) -> float:
+        """How far from its centre the robot may meet something within one arc [m]."""
+        return config.radius + ARC_LENGTH + 2 * SKIN
+
+    def clearance(self) -> float:
+        """Distance of the body from what is near [m]; infinity where nothing is."""
+        return distance(self.x, self.y, self._obstacles.near(self.x, self.y)) - self.config.radius
+
+    def advance(self, v: float, w: float, duration: float, sink: Callable[[Motion], None]) -> None:
+        """Follow a velocity command for some time.
+
+        Args:
+            v: Commanded speed [m/s]; the limits are applied.
+            w: Commanded turn rate [rad/s]; the limits are applied.
+            duration: Time [s].
+            sink: Takes every piece of the way, in order.
+        """
+        limits = self.config
+        v = min(max(v, -limits.max_speed), limits.max_speed)
+        w = min(max(w, -limits.max_turn_rate), limits.max_turn_rate)
+        left = duration
+        while left > 1e-12:
+            time = self._piece(v, w, left)
+            v0, w0 = self.v, self.w
+            self.v = _towards(v0, v, limits.max_acceleration * time)
+            self.w = _towards(w0, w, limits.max_turn_acceleration * time)
+            motion = self._arc((v0 + self.v) / 2 * time, (w0 + self.w) / 2 * time, time)
+            sink(motion)
+            left -= time
+
+    def _piece(self, v: float, w: float, left: float) -> float:
+        """How long to go on with one arc: until a ramp ends, and never too far."""
+        time = left
+        for now, wanted, rate in (
+            (self.v, v, self.config.max_acceleration),
+            (self.w, w, self.config.max_turn_acceleration),
+        ):
+            if now != wanted:
+                time = min(time, RAMP_SECONDS, max(abs(wanted - now) / rate, 1e-9))
+        fastest = max(abs(self.v), abs(v)) if self.v != v else abs(v)
+        turning = max(abs(self.w), abs(w)) if self.w != w else abs(w)
+        if fastest * time > ARC_LENGTH:
+            time = ARC_LENGTH / fastest
+        if turning * time > ARC_TURN:
+            time = ARC_TURN / turning
+        return time
+
+    def _arc(self, way: float, turn: float, time: float) -> Motion:
+        edges = self._obstacles.near(self.x, self.y) if way else ()
+        if not edges or distance(self.x, self.y, edges) > self.config.radius + SKIN + abs(way):
+            motion = Motion(*_chord(way, turn), turn)
+            self._apply(motion)
+            return motion
+        return self._arc_beside(way, turn, time, edges)
+
+    def _arc_beside(self, way: float, turn: float, time: float, edges: Sequence[Edge]) -> Motion:
+        """An arc that may meet something, chord by chord."""
+        x0, y0, theta0 = self.x, self.y, self.theta
+        chords = max(math.ceil(abs(way) / CHORD_LENGTH), math.ceil(abs(turn) / CHORD_TURN), 1)
+        step_x, step_y = _chord(way / chords, turn / chords)
+        touched = False
+        for _ in range(chords):
+            c, s = math.cos(self.theta), math.sin(self.theta)
+            dx, dy = c * step_x - s * step_y, s * step_x + c * step_y
+            self.x, self.y, touch = move_disc(self.x, self.y, dx, dy, self.config.radius, edges)
+            self.theta += turn / chords
+            touched |= touch
+        dx, dy = self.x - x0, self.y - y0
+        c, s = math.cos(theta0), math.sin(theta0)
+        motion = Motion(c * dx + s * dy, c * dy - s * dx, turn)
+        if touched:
+            self.collided = True
+            # What stops the body stalls the wheels: the next piece speeds up from what was really driven.
+            driven = (dx * math.cos(theta0 + turn / 2) + dy * math.sin(theta0 + turn / 2)) / time
+            self.v = math.copysign(min(abs(driven), abs(self.v)), self.v) if driven * self.v > 0 else 0.0
+        return motion
+
+    def _apply(self, motion: Motion) -> None:
+        c, s = math.cos(self.theta), math.sin(self.theta)
+        self.x += c * motion.dx - s * motion.dy
+        self.y += s * motion.dx + c * motion.dy
+        self.theta += motion.turn
+
+
+def _towards(now: float, wanted: float, change: float) -> float:
+    """``wanted``, or as near to it as ``change`` allows."""
+    if abs(wanted - now) <= change * (1 + 1e-9):
+        return wanted
+    return now + math.copysign(change, wanted - now)
+
+
+def _chord(way: float, turn: float) -> tuple[float, float]:
+    """Where an arc of length ``way`` [m] that turns by ``turn`` [rad] ends, in the frame of its start [m]."""
+    if abs(turn) < 1e-9:
+        return (way, way * turn / 2)
+    radius = way / turn
+    return (radius * math.sin(turn), radius * (1.0 - math.cos(turn)))

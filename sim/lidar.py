@@ -1,0 +1,117 @@
+"""The laser scanner: what its rays hit, and what it says about it."""
+
+import math
+
+import numpy as np
+
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.pose import Pose2, wrap_angle
+from closedrooms.core.random import stream
+from closedrooms.core.scan import LaserScan
+from closedrooms.sim.config import LidarConfig, NoiseConfig
+from closedrooms.sim.physics import PhysicsWorld
+
+# A ray is first cast this much further than its neighbours went last time [share, m]; see ``Lidar.cast``.
+FURTHER, MARGIN = 1.05, 0.2
+# Neighbours on each side whose last distances are looked at.
+NEIGHBOURS = 3
+
+
+class Lidar:
+    """A scanner that casts PyBullet's rays, one batch a sweep.
+
+    A sweep is taken at one instant: the robot does not move within it.
+    """
+
+    def __init__(self, config: LidarConfig, noise: NoiseConfig, physics: PhysicsWorld, seed: int) -> None:
+        self.config = config
+        self._noise = noise
+        self._physics = physics
+        self._angles = config.angle_min + config.angle_increment * np.arange(config.beams)
+        self._mount = Pose2(*config.mount)
+        self._range_noise = stream(seed, "lidar", "range")
+        self._outliers = stream(seed, "lidar", "outliers")
+        self._dropouts = stream(seed, "lidar", "dropouts")
+        self._last: FloatArray | None = None
+        self._last_heading = 0.0
+
+    def cast(self, world_T_robot: Pose2) -> tuple[FloatArray, IntArray]:
+        """True distances of the first hits.
+
+        A ray's cost grows with its length, and most end after a few metres of the twenty they may go. So each is cast
+        as far as its neighbours went in the last sweep and a little further; the few that hit nothing are cast whole.
+        The first hit of a shorter ray is the first hit of the whole one: nothing is lost.
+
+        Args:
+            world_T_robot: Where the robot stands.
+
+        Returns:
+            Distances [m], shape (beams,), infinity where nothing is within ``range_max``, and the bodies hit, shape
+            (beams,), -1 without one.
+        """
+        sensor = world_T_robot @ self._mount
+        angles = self._angles + sensor.theta
+        directions = np.column_stack((np.cos(angles), np.sin(angles)))
+        start = np.array([sensor.x, sensor.y])
+        lengths = self._expected(sensor.theta)
+        distances, bodies = self._shoot(start, directions, lengths)
+        missed = np.flatnonzero(np.isinf(distances) & (lengths < self.config.range_max))
+        if missed.size:
+            whole = np.full(missed.size, self.config.range_max)
+            distances[missed], bodies[missed] = self._shoot(start, directions[missed], whole)
+        self._last, self._last_heading = np.minimum(distances, self.config.range_max), sensor.theta
+        return distances, bodies
+
+    def _expected(self, heading: float) -> FloatArray:
+        """How far to cast each ray at first [m], shape (beams,)."""
+        longest = self.config.range_max
+        if self._last is None:
+            return np.full(self.config.beams, longest)
+        turned = round(wrap_angle(heading - self._last_heading) / self.config.angle_increment)
+        last = np.roll(self._last, -turned)
+        beams = np.arange(-NEIGHBOURS, self.config.beams + NEIGHBOURS) % self.config.beams
+        around = np.lib.stride_tricks.sliding_window_view(last[beams], 2 * NEIGHBOURS + 1).max(axis=1)
+        expected: FloatArray = np.minimum(around * FURTHER + MARGIN, longest)
+        return expected
+
+    def _shoot(self, start: FloatArray, directions: FloatArray, lengths: FloatArray) -> tuple[FloatArray, IntArray]:
+        starts = np.empty((len(directions), 3))
+        starts[:, :2], starts[:, 2] = start, self.config.height
+        ends = starts.copy()
+        ends[:, :2] += directions * lengths[:, None]
+        fractions, bodies = self._physics.cast(starts, ends)
+        return np.where(bodies >= 0, fractions * lengths, math.inf), bodies
+
+    def sweep(self, world_T_robot: Pose2, stamp: float) -> tuple[LaserScan, IntArray]:
+        """One scan with its errors.
+
+        Returns:
+            The scan, and for each beam the body that it really measured, shape (beams,): -1 where it hit nothing,
+            dropped out or gave an outlier.
+        """
+        distances, bodies = self.cast(world_T_robot)
+        ranges, measured = self._disturbed(distances)
+        config = self.config
+        scan = LaserScan(
+            ranges, config.angle_min, config.angle_increment, config.range_max, config.range_min, stamp, config.mount
+        )
+        return scan, np.where(measured, bodies, -1)
+
+    def _disturbed(self, distances: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Measured ranges [m] and which of them are measurements of what the ray hit."""
+        noise, config = self._noise, self.config
+        ranges = distances
+        if noise.range_sd > 0:
+            ranges = distances + noise.range_sd * self._range_noise.standard_normal(config.beams)
+        ranges = np.where(ranges < config.range_min, math.nan, ranges)
+        ranges = np.where(ranges >= config.range_max, math.inf, ranges)
+        measured = np.isfinite(ranges)
+        if noise.outliers > 0:
+            chance, place = self._outliers.random((2, config.beams))
+            wrong = chance < noise.outliers
+            uniform = config.range_min + place * (config.range_max - config.range_min)
+            ranges, measured = np.where(wrong, uniform, ranges), measured & ~wrong
+        if noise.dropouts > 0:
+            silent = self._dropouts.random(config.beams) < noise.dropouts
+            ranges, measured = np.where(silent, math.nan, ranges), measured & ~silent
+        return ranges, measured

@@ -1,0 +1,177 @@
+"""The simulated robot in its building: commands in, observations out."""
+
+import contextlib
+import math
+from collections.abc import Collection
+from types import TracebackType
+from typing import Self
+
+from shapely.geometry import Polygon
+
+from closedrooms.core.door import DoorSighting, Point
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.pose import Pose2
+from closedrooms.sim.building import Building, gap_from
+from closedrooms.sim.config import SimConfig
+from closedrooms.sim.contacts import SKIN
+from closedrooms.sim.drive import RAMP_SECONDS, Drive
+from closedrooms.sim.lidar import Lidar
+from closedrooms.sim.observation import Observation
+from closedrooms.sim.odometry import Odometry
+from closedrooms.sim.physics import PhysicsWorld
+from closedrooms.worlds.plan import FloorPlan
+from closedrooms.worlds.start import start_pose
+
+
+class Simulation:
+    """One robot in one building; a context manager that owns one physics client.
+
+    The building frame is called ``world``. The map frame is the robot's pose at the start.
+    """
+
+    def __init__(self, plan: FloorPlan, closed: Collection[str], config: SimConfig, seed: int) -> None:
+        """Take note of what to build; it is built on entering.
+
+        Args:
+            plan: The building.
+            closed: Ids of the doors that are closed; the others stand open.
+            config: Lidar, robot, noise, doors.
+            seed: Of every source of noise.
+        """
+        self.plan = plan
+        self.config = config
+        self._closed = frozenset(closed)
+        self._seed = seed
+        start = start_pose(plan)
+        self.world_T_map = start if config.heading is None else Pose2(start.x, start.y, config.heading)
+        self._map_T_world = self.world_T_map.inverse()
+
+    def __enter__(self) -> Self:
+        """Build the world.
+
+        Raises:
+            InvalidInputError: A door to close that the plan does not have, or a start where the robot does not fit.
+        """
+        with contextlib.ExitStack() as stack:
+            physics = stack.enter_context(PhysicsWorld())
+            self._building = Building(self.plan, self._closed, self.config, physics)
+            start, robot = self.world_T_map, self.config.robot
+            self._drive = Drive(robot, self._building.obstacles, start.x, start.y, start.theta)
+            self._check_start()
+            self._physics = physics
+            self._body = physics.add_robot(robot.radius, robot.height)
+            self._odometry = Odometry(self.config.noise, self._seed)
+            self._lidar = Lidar(self.config.lidar, self.config.noise, physics, self._seed)
+            self._time = 0.0
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.close()
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return self._time
+
+    @property
+    def collided(self) -> bool:
+        """Whether the robot touched anything in the last step."""
+        return self._drive.collided
+
+    @property
+    def velocity(self) -> tuple[float, float]:
+        """True speed [m/s] and turn rate [rad/s]."""
+        return (self._drive.v, self._drive.w)
+
+    @property
+    def world_T_robot(self) -> Pose2:  # noqa: N802
+        """The true pose in the building frame."""
+        return Pose2(self._drive.x, self._drive.y, self._drive.theta)
+
+    @property
+    def map_T_robot(self) -> Pose2:  # noqa: N802
+        """The true pose in the map frame."""
+        return self._map_T_world @ self.world_T_robot
+
+    def observe(self) -> Observation:
+        """Take one sweep, and read the odometry.
+
+        Two calls at one time see the same world with fresh noise.
+        """
+        world_T_robot = self.world_T_robot
+        scan, bodies = self._lidar.sweep(world_T_robot, self._time)
+        hit = set(bodies.tolist())
+        doors = self._building.door_of_body
+        seen = [doors[body] for body in sorted(hit & doors.keys()) if doors[body].closed]
+        robot_T_world = world_T_robot.inverse()
+        sightings = tuple(
+            DoorSighting(
+                door.plan.id,
+                (_moved(robot_T_world, door.plan.segment[0]), _moved(robot_T_world, door.plan.segment[1])),
+                self._time,
+            )
+            for door in seen
+        )
+        return Observation(scan, self._odometry.pose, sightings, self._map_T_world @ world_T_robot, self._time)
+
+    def step(self, v: float, w: float, duration: float) -> None:
+        """Let time pass under a velocity command.
+
+        The drive follows the command within its limits and touches what it meets; doors that open move on.
+
+        Args:
+            v: Speed [m/s].
+            w: Turn rate [rad/s], positive to the left.
+            duration: Time [s].
+
+        Raises:
+            InvalidInputError: A command that is not a number, or a duration that is not positive.
+        """
+        if math.isnan(v) or math.isnan(w) or not (math.isfinite(duration) and duration > 0.0):
+            raise InvalidInputError(f"command v={v}, w={w} for {duration} s", expected="numbers, a duration above 0")
+        drive, building = self._drive, self._building
+        drive.collided = False
+        end = self._time + duration
+        while building.moving and end - self._time > 1e-9:
+            part = min(RAMP_SECONDS, end - self._time)
+            drive.advance(v, w, part, self._odometry.add)
+            building.advance(part, drive.x, drive.y, drive.config.radius)
+            self._time += part
+        if end - self._time > 1e-9:
+            drive.advance(v, w, end - self._time, self._odometry.add)
+        self._time = end
+        self._physics.place(self._body, (drive.x, drive.y, drive.config.height / 2), drive.theta)
+
+    def open_door(self, door_id: str) -> None:
+        """Let a closed door open while time passes; it waits for a robot that stands in its way.
+
+        Raises:
+            InvalidInputError: No such door.
+        """
+        self._building.open_door(door_id)
+
+    def door_states(self) -> dict[str, float]:
+        """How far each door between rooms is open: 0 closed, 1 as far as the plan allows."""
+        return {name: door.opening for name, door in self._building.doors.items()}
+
+    def door_leaves(self, door_id: str) -> list[Polygon]:
+        """Where the leaves of a door are now, building frame [m]."""
+        door = self._building.doors[door_id]
+        return [Polygon(corners) for corners in door.corners(door.opening)]
+
+    def _check_start(self) -> None:
+        start, radius = self.world_T_map, self.config.robot.radius
+        free = min(gap_from(self._building.solids, start.x, start.y), self._drive.clearance() + radius)
+        if free < radius + SKIN:
+            raise InvalidInputError(
+                f"the start ({start.x:g}, {start.y:g}) is {free:.3f} m from a wall, door or furniture",
+                expected=f"at least the robot's radius of {radius:g} m", where=self.plan.name,
+            )  # fmt: skip
+
+
+def _moved(b_T_a: Pose2, point: Point) -> Point:
+    pose = b_T_a @ Pose2(*point)
+    return (pose.x, pose.y)
