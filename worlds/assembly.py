@@ -1,5 +1,6 @@
 """From room outlines that share edges to walls and doors: what the generator and the importers have in common."""
 
+import itertools
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
@@ -56,7 +57,7 @@ def shared_edges(polygons: Sequence[Polygon]) -> list[Edge]:
     for index, polygon in enumerate(polygons):
         for ring in (polygon.exterior, *polygon.interiors):
             points = [(round(x, 4) + 0.0, round(y, 4) + 0.0) for x, y, *_ in ring.coords]
-            for a, b in zip(points, points[1:], strict=False):
+            for a, b in itertools.pairwise(points):
                 if a != b:
                     owners[min(a, b), max(a, b)].append(index)
     by_pair: defaultdict[Pair, list[Segment]] = defaultdict(list)
@@ -138,7 +139,7 @@ def free_spans(edge: Edge, edges: Sequence[Edge], taken: Iterable[Segment], marg
     blocked.sort()
     spans, at = [], -1e9
     for low, high in blocked:
-        if low > at and at > -1e8:
+        if low > at > -1e8:
             spans.append((at, low))
         at = max(at, high)
     return spans

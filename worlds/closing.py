@@ -150,7 +150,7 @@ def _reached(plan: FloorPlan, start: str, closed: Collection[str]) -> set[str]:
     """Rooms connected to ``start`` by openings and by doors that are not closed."""
     shut = set(closed)
     neighbours: defaultdict[str, list[str]] = defaultdict(list)
-    for passage in (*plan.doors, *plan.openings):
+    for passage in plan.passages:
         a, b = passage.rooms
         if a is not None and b is not None and passage.id not in shut:
             neighbours[a].append(b)

@@ -32,7 +32,7 @@ def wall_area(plan: FloorPlan) -> Polygon | MultiPolygon:
     Doors and openings to the outside of the plan (a side that is ``None``) are cut out too.
     """
     walls = solid_walls(plan.walls)
-    passages = [*plan.doors, *plan.openings]
+    passages = plan.passages
     if not passages:
         return walls
     lines = WallLines(plan)

@@ -37,7 +37,7 @@ def without_entrances(plan: FloorPlan) -> FloorPlan:
 
     A robot that maps a floor must not leave it.
     """
-    entrances = [p.id for p in (*plan.doors, *plan.openings) if None in p.rooms]
+    entrances = [p.id for p in plan.passages if None in p.rooms]
     if not entrances:
         return plan
     return replace(

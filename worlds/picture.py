@@ -101,7 +101,11 @@ def _draw_swing(axes: Any, plan: FloorPlan, door: PlanDoor) -> None:
     normal = np.array([-along[1], along[0]])
     room = next((r.polygon for r in plan.rooms if r.id == door.opens_into), None)
     probe = shapely.Point(np.array(door.midpoint) + 0.5 * normal)
-    if room is not None and not room.covers(probe) and room.covers(shapely.Point(np.array(door.midpoint) - 0.5 * normal)):
+    if (
+        room is not None
+        and not room.covers(probe)
+        and room.covers(shapely.Point(np.array(door.midpoint) - 0.5 * normal))
+    ):
         normal = -normal
     turn = np.linspace(0.0, np.pi / 2, 12)[:, None]
     arc = hinge + np.cos(turn) * along + np.sin(turn) * normal

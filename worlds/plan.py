@@ -107,3 +107,8 @@ class FloorPlan:
     start: tuple[float, float, float] | None = None
     furniture: tuple[Furniture, ...] = ()
     meta: dict[str, object] = field(default_factory=dict)
+
+    @property
+    def passages(self) -> tuple[PlanDoor | Opening, ...]:
+        """Doors and openings."""
+        return (*self.doors, *self.openings)

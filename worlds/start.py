@@ -70,9 +70,7 @@ def _main_room(plan: FloorPlan) -> PlanRoom:
     if not plan.rooms:
         raise InvalidInputError("a plan without rooms", expected="at least one room", where=plan.name)
     part = _largest_part(plan)
-    passages = Counter(
-        room for p in (*plan.doors, *plan.openings) if None not in p.rooms for room in p.rooms if room in part
-    )
+    passages = Counter(room for p in plan.passages if None not in p.rooms for room in p.rooms if room in part)
     rooms = [room for room in plan.rooms if room.id in part]
     circulation = [room for room in rooms if any(word in room.label.lower() for word in CIRCULATION)]
     busy = [room for room in circulation if passages[room.id] >= 2] or circulation
@@ -87,7 +85,7 @@ def _largest_part(plan: FloorPlan) -> set[str]:
 
     graph = nx.Graph()
     graph.add_nodes_from(room.id for room in plan.rooms)
-    graph.add_edges_from(p.rooms for p in (*plan.doors, *plan.openings) if None not in p.rooms)
+    graph.add_edges_from(p.rooms for p in plan.passages if None not in p.rooms)
     area = {room.id: room.polygon.area for room in plan.rooms}
     parts = [set(part) for part in nx.connected_components(graph)]
     return max(parts, key=lambda part: (sum(area[room] for room in sorted(part)), min(part)))

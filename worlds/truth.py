@@ -29,7 +29,7 @@ def rasterise(plan: FloorPlan, frame: GridFrame, map_T_world: Pose2) -> Occupanc
         map_T_world: Building frame to map frame.
     """
     lines = WallLines(plan)
-    gaps = [lines.gap(p.segment) for p in (*plan.doors, *plan.openings) if None not in p.rooms]
+    gaps = [lines.gap(p.segment) for p in plan.passages if None not in p.rooms]
     cells = np.full(frame.shape, UNKNOWN, dtype=np.int8)
     cells[_fill([*(room.polygon for room in plan.rooms), *gaps], frame, map_T_world)] = FREE
     cells[_fill([wall_area(plan)], frame, map_T_world)] = OCCUPIED
@@ -85,7 +85,7 @@ def true_rooms(plan: FloorPlan, closed: Collection[str], map_T_world: Pose2) -> 
     result = []
     for names, doors in hidden_rooms(plan, closed):
         areas: list[BaseGeometry] = list(room_interiors(plan, names).values())
-        inner = [p for p in (*plan.doors, *plan.openings) if p.id not in closed and set(p.rooms) <= set(names)]
+        inner = [p for p in plan.passages if p.id not in closed and set(p.rooms) <= set(names)]
         areas += [lines.gap(passage.segment) for passage in inner]
         joined = areal(shapely.union_all(areas))
         result.append(Room(_moved(joined, map_T_world), doors))

@@ -48,7 +48,7 @@ def validate(plan: FloorPlan, where: str = "") -> None:
 def _check_names(plan: FloorPlan, where: str) -> None:
     kinds = {"room": plan.rooms, "wall": plan.walls, "furniture": plan.furniture}
     names = [(kind, element.id) for kind, elements in kinds.items() for element in elements]
-    names += [("door or opening", p.id) for p in (*plan.doors, *plan.openings)]
+    names += [("door or opening", p.id) for p in plan.passages]
     seen: set[tuple[str, str]] = set()
     for kind, name in names:
         if (kind, name) in seen:
@@ -113,7 +113,7 @@ def _check_passages(plan: FloorPlan, where: str) -> None:
     rooms = {room.id: room.polygon for room in plan.rooms}
     thickest = max(wall.thickness for wall in plan.walls)
     on_wall = _on_walls(plan, [door.segment for door in plan.doors])
-    for number, passage in enumerate((*plan.doors, *plan.openings)):
+    for number, passage in enumerate(plan.passages):
         kind = "door" if isinstance(passage, PlanDoor) else "opening"
         name = f"{kind} {passage.id}"
         _check_segment(name, passage.segment, 0.3, where)
