@@ -1,0 +1,259 @@
+"""The recorder: an observer that writes what a run does into one rerun file."""
+
+import json
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+import rerun as rr
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.door import ClosedDoor, Point
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.pose import Pose2, wrap_angle
+from closedrooms.core.room import Room
+from closedrooms.core.scan import LaserScan
+from closedrooms.pipeline import colours, drawables
+from closedrooms.pipeline.blueprint import Layout
+from closedrooms.pipeline.recording_building import RecordedBuilding
+from closedrooms.pipeline.recording_prediction import draw_doors, draw_input, draw_rooms, draw_tours, draw_trace
+from closedrooms.pipeline.recording_stream import RecordingStream, Stage
+
+if TYPE_CHECKING:
+    from closedrooms.coverage.tour import CoverageTour
+    from closedrooms.predictor.prediction import Prediction
+    from closedrooms.sim.observation import Observation
+    from closedrooms.worlds.plan import FloorPlan
+
+# Out of ten scans a second two are kept, and a map every two seconds: what the eye can follow.
+SCAN_PERIOD, MAP_PERIOD = 0.5, 2.0
+# A vertex of a drawn path every so many metres.
+PATH_STEP = 0.1
+NOTHING = np.zeros((0, 2))
+
+
+class Recorder:
+    """Writes one ``.rrd``; a context manager, see :class:`closedrooms.pipeline.observer.Observer` for its calls.
+
+    Timelines: ``sim_time``, a duration [s] by the simulation's or the log's clock, and ``stage``, a sequence over
+    :class:`closedrooms.pipeline.recording_stream.Stage`.
+    """
+
+    def __init__(self, path: Path, *, name: str, layout: Layout, robot_radius: float = 0.2) -> None:
+        """Prepare a recording.
+
+        Args:
+            path: The file; missing until the block is entered, whole when it is left.
+            name: Name and identity of the recording: the same for equal runs.
+            layout: Which stages there will be, and where the maps lie.
+            robot_radius: Size of the robot that is drawn [m].
+        """
+        self._stream = RecordingStream(path, name, layout)
+        self._layout = layout
+        self._radius = robot_radius
+        self._building: RecordedBuilding | None = None
+        self._palette: dict[str, colours.Colour] = {}
+        self._stage: int = Stage.MAPPING
+        self._poses: list[tuple[float, ...]] = []
+        self._areas: list[tuple[float, float]] = []
+        self._paths: dict[str, list[Point]] = {"odometry": [], "estimate": [], "truth": []}
+        self._seen: set[str] = set()
+        self._last_scan = self._last_map = -np.inf
+
+    def __enter__(self) -> Self:
+        self._stream.__enter__()
+        self._stream.at(0.0 if self._layout.mapping else None, Stage.BUILDING)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if error is None:
+                self._send_series()
+        finally:
+            self._stream.__exit__(kind, error, trace)
+
+    def configuration(self, values: Mapping[str, object]) -> None:
+        """The configuration as it was resolved; paths (``out``) are left out, so that equal runs stay equal."""
+        kept = {key: value for key, value in values.items() if key != "out"}
+        text = json.dumps(kept, indent=2, default=str)
+        self._stream.log("configuration", _markdown(f"# Configuration\n```json\n{text}\n```"), static=True)
+        self._stream.property("configuration", {key: json.dumps(value, default=str) for key, value in kept.items()})
+
+    def building(self, plan: "FloorPlan", map_T_world: Pose2, closed: Collection[str]) -> None:
+        """Walls, floors and doors in three dimensions."""
+        self._palette = colours.room_colours(closed)
+        self._stream.at(0.0, Stage.BUILDING)
+        doors, rooms = len(plan.doors), len(plan.rooms)
+        self._say("Building", f"{plan.name}: {rooms} rooms, {doors} doors, {len(closed)} of them closed")
+        self._building = RecordedBuilding(self._stream, plan, map_T_world, closed)
+        self._draw_robot("building/robot", colours.TRUTH)
+
+    def door_states(self, states: Mapping[str, float], stamp: float) -> None:
+        """Doors that move; the first call after the tours begins the stage of driving."""
+        if self._stream.stage >= Stage.COVERAGE and self._layout.driving:
+            self._stage = Stage.DRIVING
+        if self._building is not None:
+            self._stream.at(stamp, self._stage)
+            self._building.move(states)
+
+    def observation(self, observation: "Observation", map_T_robot: Pose2) -> None:
+        """One observation of the simulation."""
+        self.scan(observation.scan, observation.odometry, map_T_robot, truth=observation.map_T_robot_true)
+
+    def scan(self, scan: LaserScan, odometry: Pose2, map_T_robot: Pose2, *, truth: Pose2 | None = None) -> None:
+        """Keep the poses, and draw every few scans."""
+        if not self._poses:
+            self._draw_robot("map/robot", colours.ESTIMATE)
+            self._stream.at(scan.stamp, self._stage)
+            self._say("Mapping", "the robot explores until nothing reachable is left unknown")
+        known = {"odometry": odometry, "estimate": map_T_robot, "truth": truth}
+        unknown = (np.nan,) * 3
+        poses = [unknown if pose is None else pose.as_tuple() for pose in known.values()]
+        self._poses.append((scan.stamp, float(self._stage), *(v for pose in poses for v in pose)))
+        for name, pose in known.items():
+            path = self._paths[name]
+            if pose is not None and (not path or np.hypot(pose.x - path[-1][0], pose.y - path[-1][1]) > PATH_STEP):
+                path.append((pose.x, pose.y))
+        if scan.stamp >= self._last_scan + SCAN_PERIOD - 1e-6:
+            self._last_scan = scan.stamp
+            self._stream.at(scan.stamp, self._stage)
+            ends = map_T_robot.transform(Pose2(*scan.robot_T_sensor).transform(scan.points_sensor()))
+            self._stream.log("map/scan", drawables.points(ends, colours.SCAN, radius=drawables.MEDIUM))
+
+    def wants_map(self, stamp: float) -> bool:
+        """Whether enough time has passed since the last map."""
+        return stamp >= self._last_map + MAP_PERIOD - 1e-6
+
+    def map(self, grid: OccupancyGrid, stamp: float, *, final: bool = False) -> None:
+        """The map and the paths so far, every few seconds."""
+        if not final and not self.wants_map(stamp):
+            return
+        self._last_map = stamp
+        self._stream.at(stamp, self._stage)
+        self._stream.log("map/grid", drawables.grid_map(grid))
+        self._areas.append((stamp, float(grid.known.sum()) * grid.frame.resolution**2))
+        for name, path in self._paths.items():
+            if path:
+                colour = {"odometry": colours.ODOMETRY, "estimate": colours.ESTIMATE, "truth": colours.TRUTH}[name]
+                self._stream.log(f"map/path/{name}", drawables.strips([np.array(path)], colour, z=drawables.Z_PATH))
+
+    def frontiers(self, points: FloatArray, goal: Point | None, path: FloatArray | None, stamp: float) -> None:
+        """Frontiers, the goal and the way there."""
+        self._stream.at(stamp, self._stage)
+        self._stream.log("map/frontiers", drawables.points(points, colours.FRONTIER, radius=drawables.MEDIUM))
+        goals = NOTHING if goal is None else np.array([goal])
+        self._stream.log("map/goal", drawables.points(goals, colours.GOAL, radius=2 * drawables.THICK))
+        ways = [] if path is None else [np.asarray(path)]
+        self._stream.log("map/plan", drawables.strips(ways, colours.GOAL, z=drawables.Z_PATH))
+
+    def doors(self, doors: Sequence[ClosedDoor], stamp: float) -> None:
+        """Closed doors in the map."""
+        self._stream.at(stamp, self._stage)
+        draw_doors(self._stream, "map/doors", doors)
+        new = {door.id for door in doors} - self._seen
+        self._seen |= new
+        if self._building is not None:
+            self._building.seen(new)
+
+    def loops(self, pairs: FloatArray, stamp: float) -> None:
+        """Loops that were closed, as bars between the two poses."""
+        self._stream.at(stamp, self._stage)
+        bars = list(np.asarray(pairs, dtype=np.float64).reshape(-1, 2, 2))
+        self._stream.log("map/loops", drawables.strips(bars, colours.LOOP, radius=drawables.THICK, z=drawables.Z_PATH))
+
+    def trajectory(self, stamps: FloatArray, poses: FloatArray) -> None:
+        """The whole trajectory after the last optimisation."""
+        if len(stamps):
+            self._stream.at(float(stamps[-1]), self._stage)
+            path = np.asarray(poses)[:, :2]
+            self._stream.log("map/path/estimate", drawables.strips([path], colours.ESTIMATE, z=drawables.Z_PATH))
+
+    def truth(self, grid: OccupancyGrid, rooms: Sequence[Room]) -> None:
+        """The true map and rooms."""
+        self._stream.at(stage=Stage.ROOMS)
+        draw_rooms(self._stream, "rooms/truth", grid, rooms, self._palette)
+
+    def prediction(self, observed: OccupancyGrid, doors: Sequence[ClosedDoor], prediction: "Prediction") -> None:
+        """A prediction from its input to the completed map."""
+        self._palette = colours.room_colours({*self._palette, *(door.id for door in doors)})
+        draw_input(self._stream, observed, doors)
+        if prediction.trace is not None:
+            draw_trace(self._stream, prediction.trace, self._palette)
+        self._stream.at(stage=Stage.ROOMS)
+        failed = "".join(f"\n- {door}: {why}" for door, why in prediction.failures.items())
+        self._say("Rooms", f"{len(prediction.rooms)} rooms predicted, {len(prediction.failures)} failed{failed}")
+        draw_rooms(self._stream, "rooms/predicted", prediction.grid, prediction.rooms, self._palette)
+
+    def tours(self, tours: Mapping[str, "CoverageTour"]) -> None:
+        """Graphs and tours."""
+        draw_tours(self._stream, tours)
+
+    def revision(self, prediction: "Prediction", tour: FloatArray, stamp: float) -> None:
+        """The prediction and the rest of the tour while the robot drives."""
+        self._stage = Stage.DRIVING
+        self._stream.at(stamp, self._stage)
+        draw_rooms(self._stream, "driving/predicted", prediction.grid, prediction.rooms, self._palette)
+        self._stream.log("driving/tour", drawables.strips([np.asarray(tour)], colours.TOURS["predicted"]))
+
+    def note(self, text: str, stamp: float | None = None) -> None:
+        """One line of the log."""
+        self._stream.at(stamp)
+        self._stream.log("log/run", rr.TextLog(text, level=rr.TextLogLevel.INFO))
+
+    def table(self, markdown: str) -> None:
+        """The table of results."""
+        self._stream.log("result", _markdown(markdown), static=True)
+
+    def _say(self, title: str, text: str) -> None:
+        self._stream.log("stage", _markdown(f"## {title}\n{text}"))
+
+    def _draw_robot(self, path: str, colour: colours.Colour) -> None:
+        self._stream.log(
+            f"{path}/body",
+            rr.Cylinders3D(
+                lengths=[0.3], radii=[self._radius], centers=[[0, 0, 0.15]], colors=[colour], fill_mode="solid"
+            ),
+            static=True,
+        )
+        self._stream.log(
+            f"{path}/heading",
+            rr.Arrows3D(origins=[[0, 0, 0.32]], vectors=[[3 * self._radius, 0, 0]], colors=[colour], radii=[0.05]),
+            static=True,
+        )
+
+    def _send_series(self) -> None:
+        """Poses, errors and areas, as whole columns."""
+        if self._areas:
+            stamps, areas = np.array(self._areas).T
+            self._series("metrics/known_area/map", stamps, areas, "known area", colours.ESTIMATE)
+        if not self._poses:
+            return
+        table = np.array(self._poses)
+        stamps, odometry, estimate, truth = table[:, 0], table[:, 2:5], table[:, 5:8], table[:, 8:11]
+        self._stream.columns("map/robot", stamps, drawables.pose_columns(estimate))
+        given = np.isfinite(truth[:, 0])
+        if not given.any():
+            return
+        stamps, truth = stamps[given], truth[given]
+        if self._building is not None:
+            self._stream.columns("building/robot", stamps, drawables.pose_columns(truth))
+        for name, poses, colour in (
+            ("odometry", odometry[given], colours.ODOMETRY),
+            ("estimate", estimate[given], colours.ESTIMATE),
+        ):
+            away = np.hypot(*(poses[:, :2] - truth[:, :2]).T)
+            turned = np.degrees(np.abs([wrap_angle(angle) for angle in poses[:, 2] - truth[:, 2]]))
+            self._series(f"metrics/position_error/{name}", stamps, away, name, colour)
+            self._series(f"metrics/heading_error/{name}", stamps, turned, name, colour)
+
+    def _series(self, path: str, stamps: FloatArray, values: FloatArray, name: str, colour: colours.Colour) -> None:
+        self._stream.log(path, rr.SeriesLines(colors=[colour], names=[name], widths=[1.5]), static=True)
+        self._stream.columns(path, stamps, rr.Scalars.columns(scalars=values))
+
+
+def _markdown(text: str) -> rr.TextDocument:
+    return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)

@@ -1,0 +1,111 @@
+"""One rerun file, its two timelines and its log."""
+
+import logging
+from enum import IntEnum
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import rerun as rr
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.pipeline.blueprint import Layout, arrange
+
+APPLICATION = "closedrooms"
+# Chunks are cut by size alone: a cut by wall-clock time would differ from one run to the next.
+CHUNK_BYTES = 1_000_000
+NEVER_SECONDS = 1e6
+
+
+class Stage(IntEnum):
+    """Steps of the timeline ``stage``; the expansion's level k is ``EXPANSION + k``."""
+
+    BUILDING = 0
+    MAPPING = 1
+    SEGMENTS = 2
+    LINES = 3
+    FACES = 4
+    INITIAL = 5
+    EXPANSION = 10
+    ROOMS = 40
+    COVERAGE = 50
+    DRIVING = 60
+
+
+class RecordingStream:
+    """A rerun file that is being written; a context manager, whole only after it ends.
+
+    Two timelines: ``sim_time``, a duration [s] by the simulation's (or the log's) clock, and ``stage``, a sequence
+    over the steps of :class:`Stage`. Everything of a run carries both; a prediction without a run only ``stage``.
+    No wall clock is recorded, so that equal runs give equal recordings.
+    """
+
+    def __init__(self, path: Path, name: str, layout: Layout) -> None:
+        self._path, self._name, self._layout = path, name, layout
+        self._stamp: float | None = None
+        self._stage: int = Stage.BUILDING
+        self._rec = rr.RecordingStream(
+            APPLICATION,
+            recording_id=f"{APPLICATION}-{name}",
+            send_properties=False,
+            batcher_config=rr.ChunkBatcherConfig(flush_tick=NEVER_SECONDS, flush_num_bytes=CHUNK_BYTES),
+        )
+        self._handler = rr.LoggingHandler("log")
+        self._log_level = logging.NOTSET
+
+    def __enter__(self) -> Self:
+        self._rec.save(self._path, default_blueprint=arrange(self._layout))
+        self._rec.set_log_time_enabled(False)
+        self._rec.send_recording_name(self._name)
+        # The logging handler writes to the recording of its thread.
+        self._previous = rr.set_thread_local_data_recording(self._rec)
+        logger = logging.getLogger(APPLICATION)
+        self._log_level = logger.level
+        logger.setLevel(min(logger.getEffectiveLevel(), logging.INFO))
+        logger.addHandler(self._handler)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        logger = logging.getLogger(APPLICATION)
+        logger.removeHandler(self._handler)
+        logger.setLevel(self._log_level)
+        rr.set_thread_local_data_recording(self._previous)
+        self._rec.flush()
+        self._rec.disconnect()
+
+    @property
+    def stamp(self) -> float | None:
+        """Last time that was set [s]; ``None`` before the first, and in a recording without a clock."""
+        return self._stamp
+
+    @property
+    def stage(self) -> int:
+        """The stage that what is logged now belongs to."""
+        return self._stage
+
+    def at(self, stamp: float | None = None, stage: int | None = None) -> None:
+        """What follows belongs to ``stamp`` [s] and ``stage``; either stays as it was where not given."""
+        if stamp is not None:
+            self._stamp = stamp
+            self._rec.set_time("sim_time", duration=stamp)
+        if stage is not None:
+            self._stage = stage
+        self._rec.set_time("stage", sequence=int(self._stage))
+
+    def log(self, path: str, *archetypes: Any, static: bool = False) -> None:
+        """Log at the current time, or for all times."""
+        self._rec.log(path, *archetypes, static=static)
+
+    def columns(self, path: str, stamps: FloatArray, columns: Any, stage: int = Stage.MAPPING) -> None:
+        """Send one value a stamp [s] at once; all belong to ``stage``."""
+        times = [
+            rr.TimeColumn("sim_time", duration=stamps),
+            rr.TimeColumn("stage", sequence=[int(stage)] * len(stamps)),
+        ]
+        self._rec.send_columns(path, times, columns)
+
+    def property(self, name: str, values: dict[str, str]) -> None:
+        """A property of the whole recording, shown by the viewer beside its name."""
+        self._rec.send_property(name, rr.AnyValues(drop_untyped_nones=True, **values))
