@@ -1,0 +1,105 @@
+"""From a map and doors to faces with one initial face a room (paper, sections 3.1 and 3.2)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.predictor.arrangement import Arrangement, arrange
+from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.initial import Entrance, find_entrance, splits_between
+from closedrooms.predictor.structure import WallLines, find_structure
+from closedrooms.predictor.unknown import unknown_faces
+from closedrooms.predictor.window import at_resolution, known_window
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Start:
+    """What every method starts from.
+
+    Attributes:
+        grid: The known window of the map, at the working resolution.
+        structure: Segments and lines.
+        arrangement: Faces, split between doors.
+        unknown: Which faces were not observed, shape (n,).
+        entrances: One a room, in the order of the doors, each with a face of its own.
+    """
+
+    grid: OccupancyGrid
+    structure: WallLines
+    arrangement: Arrangement
+    unknown: BoolArray
+    entrances: tuple[Entrance, ...]
+
+    def along(self, room: int) -> FloatArray:
+        """Unit vector of a room's door edge, shape (2,)."""
+        start, end = self.arrangement.edges[self.entrances[room].edge]
+        return np.asarray((end - start) / np.hypot(*(end - start)))
+
+    def inward(self, room: int) -> FloatArray:
+        """Unit vector from a room's door edge into its initial face, shape (2,)."""
+        along, entrance = self.along(room), self.entrances[room]
+        across = np.array([-along[1], along[0]])
+        centre = np.array(self.arrangement.faces[entrance.face].centroid.coords[0])
+        return across if (centre - self.arrangement.edges[entrance.edge][0]) @ across > 0 else -across
+
+
+def start_rooms(
+    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PredictorConfig
+) -> tuple[Start | None, dict[str, str]]:
+    """Structure, faces and initial faces of a map.
+
+    Returns:
+        The start, ``None`` where the map shows no structure at all, and why doors have no room, by door id.
+    """
+    window = known_window(grid)
+    if window is None:
+        return None, {door.id: "the map is all unknown" for door in doors}
+    working = at_resolution(window, config.lines.resolution)
+    structure = find_structure(working, config)
+    if structure is None:
+        return None, {door.id: "the map holds no wall line" for door in doors}
+    failures = _duplicates(doors, config.same_door)
+    waiting = [door for door in doors if door.id not in failures]
+    arrangement, unknown, found = _split_until_apart(working, structure, waiting, config)
+    failures |= {door: reason for door, reason in found.items() if isinstance(reason, str)}
+    entrances = [entrance for entrance in found.values() if isinstance(entrance, Entrance)]
+    taken: dict[int, Entrance] = {}
+    for entrance in sorted(entrances, key=lambda e: e.door.id):
+        other = taken.setdefault(entrance.face, entrance)
+        if other is not entrance:
+            failures[entrance.door.id] = f"behind the same piece of wall as door {other.door.id}"
+    kept = tuple(entrance for entrance in entrances if taken[entrance.face] is entrance)
+    return Start(working, structure, arrangement, unknown, kept), failures
+
+
+def _split_until_apart(
+    grid: OccupancyGrid, structure: WallLines, doors: Sequence[ClosedDoor], config: PredictorConfig
+) -> tuple[Arrangement, BoolArray, dict[str, Entrance | str]]:
+    """Split edges until no two doors share an initial face; each round adds a line, so that it ends."""
+    lines = list(structure.lines)
+    while True:
+        arrangement = arrange(lines, structure.boundary)
+        unknown = unknown_faces(arrangement, grid, min_unknown=config.min_unknown, max_free=config.max_free)
+        found = {d.id: find_entrance(arrangement, unknown, d, reach=config.door_reach) for d in doors}
+        entrances = [entrance for entrance in found.values() if isinstance(entrance, Entrance)]
+        splits = [split for split in splits_between(arrangement, entrances) if split not in lines]
+        if not splits or len(lines) > len(structure.lines) + len(doors):
+            return arrangement, unknown, found
+        lines += splits
+
+
+def _duplicates(doors: Sequence[ClosedDoor], distance: float) -> dict[str, str]:
+    """Doors at the place of another one, of which that with the smallest id stays."""
+    failures: dict[str, str] = {}
+    kept: list[ClosedDoor] = []
+    for door in sorted(doors, key=lambda d: (d.id, d.midpoint)):
+        same = [k.id for k in kept if np.hypot(*np.subtract(k.midpoint, door.midpoint)) < distance]
+        if same:
+            failures[door.id] = f"at the same place as door {same[0]}"
+        else:
+            kept.append(door)
+    return failures

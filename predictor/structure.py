@@ -1,0 +1,49 @@
+"""The structure of a map: its lines, found by Hough or by ROSE (paper, sections 3.1 and 4.2)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.grid import FREE, OCCUPIED, OccupancyGrid
+from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.directions import find_directions
+from closedrooms.predictor.lines import Line, boundary_lines, find_lines
+from closedrooms.predictor.rose import find_rose, rose_directions
+from closedrooms.predictor.segments import find_segments
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WallLines:
+    """The structure of a map (paper, section 3.1).
+
+    Attributes:
+        segments: Wall segments ``x0, y0, x1, y1`` [m], shape (n, 4).
+        clusters: Line of each segment, -1 for none, shape (n,).
+        lines: Representative lines.
+        boundary: The four boundary lines.
+    """
+
+    segments: FloatArray
+    clusters: IntArray
+    lines: tuple[Line, ...]
+    boundary: tuple[Line, ...]
+
+
+def find_structure(grid: OccupancyGrid, config: PredictorConfig) -> WallLines | None:
+    """Segments, directions and lines of a map (section 3.1, or 4.2 with ``structure="rose"``); ``None`` without any."""
+    if config.structure == "rose":
+        rose = find_rose(grid)
+        if rose is None:
+            return None
+        walls = np.where(rose.structural, OCCUPIED, np.where(grid.occupied, FREE, grid.cells))
+        segments = find_segments(OccupancyGrid(grid.frame, walls), config.lines)
+        directions = rose_directions(segments, rose, config.lines)
+    else:
+        segments = find_segments(grid, config.lines)
+        directions = find_directions(segments, config.lines)
+    if directions.angles.size == 0:
+        return None
+    lines, clusters = find_lines(segments, directions, config.lines)
+    carried = segments[clusters >= 0]
+    return WallLines(segments, clusters, lines, boundary_lines(carried, directions, config.lines))
