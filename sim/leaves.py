@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry import MultiPolygon, Point, Polygon
 
 from closedrooms.core.arrays import FloatArray
-from closedrooms.worlds.geometry import LEAF_THICKNESS, rectangles, wall_thickness_at
+from closedrooms.worlds.geometry import LEAF_THICKNESS, rectangles, wall_area, wall_thickness_at
 from closedrooms.worlds.plan import FloorPlan, PlanDoor
 
 Solids = Polygon | MultiPolygon
@@ -20,6 +20,9 @@ PLAY = 0.01
 TRIAL = 0.02
 # How far inside the wall a sliding leaf may stick out of it [m].
 PROUD = 1e-3
+# A hinged leaf that opens less bars the way: such a door hangs on its other jamb, or opens to its other side. The plans
+# of most formats do not say on which jamb a door hangs: the importers guess [rad].
+PASSABLE = math.radians(60.0)
 # A wide sliding door telescopes in at most so many panels a side.
 MAX_PANELS = 4
 
@@ -66,8 +69,8 @@ class Leaf:
 def door_leaves(plan: FloorPlan, door: PlanDoor, solids: Solids, swing: float) -> tuple[Leaf, ...]:
     """The leaves of a door with the travel that walls and furniture leave them.
 
-    A hinged leaf swings around the corner of its jamb into ``door.opens_into``, a double door has two that hang on
-    both jambs, a sliding door slides into the wall beside it.
+    A hinged leaf swings around the corner of its jamb into ``door.opens_into`` (or the other way, see ``PASSABLE``), a
+    double door has two that hang on both jambs, a sliding door slides into the wall beside it.
 
     Args:
         plan: The building.
@@ -80,9 +83,19 @@ def door_leaves(plan: FloorPlan, door: PlanDoor, solids: Solids, swing: float) -
         return _sliding_leaves(plan, door, half)
     side = _opening_side(plan, door)
     a, b = np.array(door.segment)
-    middle = (a + b) / 2
-    ends = ((a, middle), (b, middle)) if door.kind == "double" else (((a, b), (b, a))[door.hinge],)
-    return tuple(_hinged_leaf(jamb, free, half, side, solids, swing) for jamb, free in ends)
+    if door.kind == "double":
+        middle = (a + b) / 2
+        return tuple(_hinged_leaf(jamb, middle, half, side, solids, swing) for jamb in (a, b))
+    ends = ((a, b), (b, a))
+    hung = ends[door.hinge], ends[1 - door.hinge]
+    best: Leaf | None = None
+    for into in (side, -side):
+        for jamb, free in hung:
+            leaf = _hinged_leaf(jamb, free, half, into, solids, swing)
+            if leaf.travel >= min(PASSABLE, swing):
+                return (leaf,)
+            best = leaf if best is None or leaf.travel > best.travel else best
+    return () if best is None else (best,)
 
 
 def _opening_side(plan: FloorPlan, door: PlanDoor) -> FloatArray:
@@ -143,8 +156,6 @@ def _free_way(leaf: Leaf, trials: FloatArray, solids: Solids) -> float:
 
 def _sliding_leaves(plan: FloorPlan, door: PlanDoor, half: float) -> tuple[Leaf, ...]:
     """The panels of a sliding door: towards the hinge's end, the other, or parting, whatever opens it furthest."""
-    from closedrooms.worlds.geometry import wall_area
-
     near, far = np.array(door.segment) if door.hinge == 0 else np.array(door.segment[::-1])
     middle = (near + far) / 2
     walls = wall_area(plan)

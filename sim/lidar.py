@@ -52,7 +52,7 @@ class Lidar:
         sensor = world_T_robot @ self._mount
         angles = self._angles + sensor.theta
         directions = np.column_stack((np.cos(angles), np.sin(angles)))
-        start = np.array([sensor.x, sensor.y])
+        start = (sensor.x, sensor.y)
         lengths = self._expected(sensor.theta)
         distances, bodies = self._shoot(start, directions, lengths)
         missed = np.flatnonzero(np.isinf(distances) & (lengths < self.config.range_max))
@@ -74,12 +74,13 @@ class Lidar:
         expected: FloatArray = np.minimum(around * FURTHER + MARGIN, longest)
         return expected
 
-    def _shoot(self, start: FloatArray, directions: FloatArray, lengths: FloatArray) -> tuple[FloatArray, IntArray]:
-        starts = np.empty((len(directions), 3))
-        starts[:, :2], starts[:, 2] = start, self.config.height
-        ends = starts.copy()
-        ends[:, :2] += directions * lengths[:, None]
-        fractions, bodies = self._physics.cast(starts, ends)
+    def _shoot(
+        self, start: tuple[float, float], directions: FloatArray, lengths: FloatArray
+    ) -> tuple[FloatArray, IntArray]:
+        ends = np.empty((len(directions), 3))
+        ends[:, :2] = np.array(start) + directions * lengths[:, None]
+        ends[:, 2] = self.config.height
+        fractions, bodies = self._physics.cast((*start, self.config.height), ends)
         return np.where(bodies >= 0, fractions * lengths, math.inf), bodies
 
     def sweep(self, world_T_robot: Pose2, stamp: float) -> tuple[LaserScan, IntArray]:

@@ -139,28 +139,28 @@ class PhysicsWorld:
         turn = [0.0, 0.0, np.sin(heading / 2), np.cos(heading / 2)]
         self._bullet.resetBasePositionAndOrientation(body, position, turn, physicsClientId=self._client)
 
-    def cast(self, starts: FloatArray, ends: FloatArray) -> tuple[FloatArray, IntArray]:
+    def cast(self, start: tuple[float, float, float], ends: FloatArray) -> tuple[FloatArray, IntArray]:
         """The first thing that each ray hits.
 
         Args:
-            starts: Shape (n, 3), metres, world frame.
-            ends: Shape (n, 3).
+            start: Where all rays start, world frame [m].
+            ends: Where they end at the latest, shape (n, 3).
 
         Returns:
             The share of the way to the end at the hit, shape (n,), 1 without one, and the body hit, shape (n,), -1
             without one.
         """
-        n = len(starts)
+        n = len(ends)
         fractions, bodies = np.empty(n), np.empty(n, dtype=np.int64)
         for first in range(0, n, MAX_RAYS):
             part = slice(first, min(first + MAX_RAYS, n))
+            count = part.stop - part.start
             hits = self._bullet.rayTestBatch(
-                starts[part].tolist(),
+                [start] * count,
                 ends[part].tolist(),
                 collisionFilterMask=~ROBOT_GROUP,
                 physicsClientId=self._client,
             )
-            count = part.stop - part.start
             bodies[part] = np.fromiter(map(itemgetter(0), hits), dtype=np.int64, count=count)
             fractions[part] = np.fromiter(map(itemgetter(2), hits), dtype=np.float64, count=count)
         return fractions, bodies
