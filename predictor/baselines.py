@@ -64,7 +64,7 @@ def _each(
     for number, entrance in enumerate(start.entrances):
         shape = shape_of(start, number)
         if shape.is_empty:
-            failures[entrance.door.id] = "nothing unknown is in sight from the door"
+            failures[entrance.door.id] = "nothing unknown is in sight of the door within the bounds of the map"
             continue
         rooms.append(Room(shape, (entrance.door.id,)))
         cleared = passage(
@@ -93,14 +93,14 @@ def _seen(start: Start, room: int) -> Shape:
     box = np.zeros(grid.frame.shape, dtype=np.bool_)
     box[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1] = True
     open_ = grid.unknown & box
-    steps = np.arange(0.0, np.hypot(*grid.frame.shape) * resolution, resolution / 2)
-    ends = np.empty((RAYS, 2))
-    for i, ray in enumerate(rays):
-        cells = grid.frame.to_cells(eye + steps[:, None] * ray)
-        inside = grid.frame.contains(cells)
-        passes = np.zeros(steps.size, dtype=np.bool_)
-        passes[inside] = open_[cells[inside, 0], cells[inside, 1]]
-        ends[i] = eye + (steps[passes.argmin()] if not passes.all() else steps[-1]) * ray
+    reach = np.hypot(rows[-1] - rows[0] + 1, cols[-1] - cols[0] + 1) * resolution
+    steps = np.arange(0.0, reach, resolution)
+    cells = grid.frame.to_cells(eye + steps[:, None, None] * rays)  # (steps, RAYS, 2)
+    inside = grid.frame.contains(cells)
+    passes = np.zeros(inside.shape, dtype=np.bool_)
+    passes[inside] = open_[cells[inside, 0], cells[inside, 1]]
+    reached = np.where(passes.all(axis=0), steps[-1], steps[passes.argmin(axis=0)])
+    ends = eye + reached[:, None] * rays
     star = Polygon(np.vstack((eye, ends))).buffer(0)
     parts = [part for part in shapely.get_parts(star).tolist() if part.area > resolution**2]
     return max(parts, key=lambda part: part.area) if parts else Polygon()

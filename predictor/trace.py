@@ -10,6 +10,7 @@ from closedrooms.predictor.start import Start
 
 
 def level_of(k: int, growth: Growth) -> Level:
+    """The layouts as they are after step ``k``."""
     names = [entrance.door.id for entrance in growth.entrances]
     shapes = {name: union(growth, room) for room, name in enumerate(names)}
     return Level(k, shapes, dict(zip(names, growth.scores, strict=True)))
