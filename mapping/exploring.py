@@ -1,0 +1,263 @@
+"""Where to look next: frontier exploration with a memory of the goal, of what was in vain and of what blocked."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.door import Point
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.pose import Pose2
+from closedrooms.core.scan import LaserScan
+from closedrooms.mapping.costmap import Costmap, build_costmap, clearance_field
+from closedrooms.mapping.driving import Driver
+from closedrooms.mapping.following import near_points
+from closedrooms.mapping.frontiers import FrontierMap, find_frontiers, still_unknown
+from closedrooms.mapping.navigation_config import NavigationConfig
+from closedrooms.mapping.planning import Path, plan_path, reachable_cells
+
+ExplorerStatus = Literal["exploring", "complete", "stuck"]
+
+# The path is checked this far ahead of the robot [m].
+CHECK_AHEAD = 3.0
+# Two goals closer than this are the same place [m].
+SAME_PLACE = 0.5
+# Scan points this close to the footprint of a stuck robot are what holds it [m].
+TOUCHING = 0.12
+# A robot that faces its goal waits this long for the map to take in what it sees [s].
+SETTLE = 0.4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Goal:
+    """A frontier that the robot is on its way to.
+
+    Attributes:
+        place: Where the path ends, map frame [m].
+        frontier: The frontier's cells near that place, map frame, shape (n, 2) [m].
+        path: The way there.
+    """
+
+    place: Point
+    frontier: FloatArray
+    path: Path
+
+
+class Explorer:
+    """Chooses goals on the estimated map and drives to them until no reachable frontier is left.
+
+    Greedy choice of the nearest frontier, with hysteresis: a goal is kept until its frontier is known, it is reached,
+    its path is blocked, or a clearly nearer one turns up, which may happen ``max_switches`` times a goal. Every goal
+    that is reached without learning anything takes frontier cells off the list for good, so that the search ends.
+
+    Attributes:
+        status: ``exploring`` until the end.
+        frontiers: Cells of all frontiers at the last plan, map frame, shape (n, 2) [m].
+        goal: Where the robot is going, ``None`` between goals.
+        plans: Number of plans made so far; changes when ``frontiers``, ``goal`` or its path do.
+    """
+
+    def __init__(self, config: NavigationConfig) -> None:
+        self.config = config
+        self.status: ExplorerStatus = "exploring"
+        self.frontiers: FloatArray = np.empty((0, 2))
+        self.goal: Goal | None = None
+        self.plans = 0
+        self._driver = Driver(config)
+        self._given_up: list[FloatArray] = []
+        self._obstacles: list[FloatArray] = []
+        self._chosen: list[tuple[Point, int]] = []
+        self._switches = 0
+        self._checked_at = -math.inf
+        self._replanned_at = -math.inf
+        self._facing_since: float | None = None
+
+    def command(self, pose: Pose2, scan: LaserScan, grid: Callable[[], OccupancyGrid]) -> tuple[float, float]:
+        """Speed [m/s] and turn rate [rad/s] for now.
+
+        Args:
+            pose: ``map_T_robot`` as estimated.
+            scan: What the robot sees now.
+            grid: Returns the map as estimated; only called when something is decided on it.
+
+        Returns:
+            The command; (0, 0) once ``status`` is no longer ``exploring``.
+        """
+        now = scan.stamp
+        driver = self._driver
+        if self.status != "exploring":
+            return (0.0, 0.0)
+        if driver.state in {"stuck", "recovering"}:
+            return driver.command(pose, scan, now)
+        if self.goal is not None and now - self._checked_at >= self.config.check_interval - 1e-9:
+            self._check(pose, grid(), now)
+        if self.goal is None and not self._choose(pose, grid(), now):
+            return (0.0, 0.0)
+        assert self.goal is not None
+        if self._facing_since is not None:
+            return self._look(pose, grid, now)
+        command = driver.command(pose, scan, now)
+        if driver.state == "arrived":
+            self._facing_since = now
+        elif driver.state == "stuck":
+            self._remember_obstacles(pose, scan)
+            self.goal = None
+            if driver.recoveries > self.config.max_recoveries:
+                self.status = "stuck"
+        return command
+
+    def _check(self, pose: Pose2, grid: OccupancyGrid, now: float) -> None:
+        """Drop a goal that has become known; plan anew where the path is blocked or something nearer has turned up."""
+        self._checked_at = now
+        goal = self.goal
+        assert goal is not None
+        if still_unknown(grid, goal.frontier, self.config) < self.config.min_frontier - 1e-9:
+            self._forget()
+        elif self._facing_since is None and not _is_free(grid, self._driver.ahead(CHECK_AHEAD), self.config):
+            self.goal = None
+        elif self._facing_since is None and now - self._replanned_at >= self.config.replan_interval - 1e-9:
+            self._reconsider(goal, pose, grid, now)
+
+    def _reconsider(self, goal: Goal, pose: Pose2, grid: OccupancyGrid, now: float) -> None:
+        """Switch to a goal that is much nearer than the current one; refresh the path to the same one."""
+        self._replanned_at = now
+        if self._switches >= self.config.max_switches:
+            return
+        other = self._plan(pose, grid)
+        if other is None:
+            return
+        same = math.dist(other.place, goal.place) < SAME_PLACE
+        left = goal.path.cost * self._driver.remaining / max(goal.path.length, 1e-6)
+        if same or other.path.cost < self.config.switch_ratio * left:
+            self._switches += 0 if same else 1
+            self._take(other, now)
+
+    def _choose(self, pose: Pose2, grid: OccupancyGrid, now: float) -> bool:
+        """Take the nearest reachable frontier as goal; the run is complete when there is none."""
+        while True:
+            goal = self._plan(pose, grid)
+            if goal is None:
+                self.status = "complete" if self._enclosed is False else "stuck"
+                return False
+            if self._count(goal.place) <= self.config.max_attempts:
+                break
+            self._give_up(goal.frontier)
+        self._replanned_at = self._checked_at = now
+        self._take(goal, now)
+        return True
+
+    def _take(self, goal: Goal, now: float) -> None:
+        self.goal = goal
+        self._driver.follow(goal.path.points, now)
+
+    def _plan(self, pose: Pose2, grid: OccupancyGrid) -> Goal | None:
+        """The nearest frontier that can be looked at from a place that the robot can reach."""
+        self.plans += 1
+        self._enclosed = False
+        config = self.config
+        given_up = np.vstack(self._given_up) if self._given_up else None
+        found = find_frontiers(grid, config, given_up=given_up)
+        obstacles = np.vstack(self._obstacles) if self._obstacles else None
+        costmap = build_costmap(grid, config, obstacles=obstacles)
+        if found is None or costmap is None:
+            return None
+        self.frontiers = np.vstack([f.points for f in found.frontiers]) if found.frontiers else np.empty((0, 2))
+        component = reachable_cells(costmap, (pose.x, pose.y), config)
+        if component is None:
+            self._enclosed = True
+            return None
+        for labels in (found.near, found.far):
+            goals = _goal_cells(labels > 0, found, costmap) & component
+            path = plan_path(costmap, (pose.x, pose.y), goals, config)
+            if path is not None:
+                return self._goal(path, labels, found, costmap)
+        return None
+
+    def _goal(self, path: Path, labels: IntArray, found: FrontierMap, costmap: Costmap) -> Goal:
+        """The frontier that the end of a path looks at, cut to the part close by."""
+        place = (float(path.points[-1, 0]), float(path.points[-1, 1]))
+        reach = self.config.far_approach + costmap.frame.resolution
+        points = np.vstack([found.frontiers[i].points for i in _labels_in(path.goal_cell, labels, found, costmap)])
+        distance = np.hypot(*(points - np.array(place)).T)
+        close = distance <= max(reach, float(distance.min()) + costmap.frame.resolution)
+        return Goal(place, points[close], path)
+
+    def _look(self, pose: Pose2, grid: Callable[[], OccupancyGrid], now: float) -> tuple[float, float]:
+        """At the goal: face what is still unknown, and give it up when it stays so."""
+        goal, since = self.goal, self._facing_since
+        assert goal is not None
+        assert since is not None
+        nearest = goal.frontier[np.argmin(np.hypot(*(goal.frontier - np.array([pose.x, pose.y])).T))]
+        turn = self._driver.face(pose, (float(nearest[0]), float(nearest[1])))
+        half_turn = 2.0 * math.pi / self.config.max_turn_rate
+        if turn is not None and now - since < half_turn:
+            return turn
+        if now - since < SETTLE:
+            return (0.0, 0.0)
+        if still_unknown(grid(), goal.frontier, self.config) >= self.config.min_frontier - 1e-9:
+            away = np.hypot(*(goal.frontier - np.array(goal.place)).T)
+            near = away <= max(self.config.fruitless_radius, float(away.min()) + 1e-9)
+            self._give_up(goal.frontier[near])
+        self._forget()
+        return (0.0, 0.0)
+
+    def _forget(self) -> None:
+        self.goal, self._facing_since, self._switches = None, None, 0
+        self._driver.stop()
+
+    def _give_up(self, points: FloatArray) -> None:
+        self._given_up.append(points)
+
+    def _count(self, place: Point) -> int:
+        """How often this place has been chosen, this time included."""
+        for i, (other, count) in enumerate(self._chosen):
+            if math.dist(place, other) < SAME_PLACE:
+                self._chosen[i] = (other, count + 1)
+                return count + 1
+        self._chosen.append((place, 1))
+        return 1
+
+    def _remember_obstacles(self, pose: Pose2, scan: LaserScan) -> None:
+        """What the scan shows at the footprint of a stuck robot blocks later paths, on the map or not."""
+        points = near_points(scan)
+        touching = points[np.hypot(*points.T) < self.config.required_clearance + TOUCHING]
+        if len(touching):
+            self._obstacles.append(pose.transform(touching))
+
+
+def _goal_cells(mask: BoolArray, found: FrontierMap, costmap: Costmap) -> BoolArray:
+    """The cells of the planning grid that hold a cell of ``mask`` on the frontier grid."""
+    goals = np.zeros(costmap.frame.shape, dtype=np.bool_)
+    cells = costmap.frame.to_cells(found.frame.to_points(np.argwhere(mask)))
+    cells = cells[costmap.frame.contains(cells)]
+    goals[cells[:, 0], cells[:, 1]] = True
+    return goals
+
+
+def _labels_in(goal_cell: tuple[int, int], labels: IntArray, found: FrontierMap, costmap: Costmap) -> list[int]:
+    """Indices of the frontiers that can be looked at from a cell of the planning grid."""
+    cells = np.argwhere(labels > 0)
+    at = costmap.frame.to_cells(found.frame.to_points(cells))
+    inside = cells[(at[:, 0] == goal_cell[0]) & (at[:, 1] == goal_cell[1])]
+    return [int(label) - 1 for label in np.unique(labels[inside[:, 0], inside[:, 1]])]
+
+
+def _is_free(grid: OccupancyGrid, points: FloatArray, config: NavigationConfig) -> bool:
+    """Whether the robot still fits along path points, shape (n, 2) [m], on the map as known now."""
+    if len(points) < 2:
+        return True
+    margin = config.required_clearance + 2.0 * grid.frame.resolution
+    cells = grid.frame.to_cells(np.vstack((points.min(axis=0) - margin, points.max(axis=0) + margin)))
+    (r0, c0), (r1, c1) = cells
+    window = grid.on(grid.frame.cropped(int(r0), int(c0), int(r1 - r0 + 1), int(c1 - c0 + 1)))
+    blocked = window.occupied.astype(np.uint8)
+    field = clearance_field(np.ones_like(blocked), blocked, grid.frame.resolution)
+    at = window.frame.to_cells(points)
+    # Half a cell of tolerance: walls thicken a little as they are seen again.
+    needed = config.robot_radius - 0.5 * grid.frame.resolution
+    # The robot's own place is not judged: it is there.
+    away = np.hypot(*(points - points[0]).T) > config.required_clearance
+    return bool((field[at[:, 0], at[:, 1]] >= needed)[away].all())

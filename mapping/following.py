@@ -1,0 +1,152 @@
+"""Velocity commands that keep a differential-drive robot on a path and off what its scan shows."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.pose import Pose2, wrap_angle
+from closedrooms.core.scan import LaserScan
+from closedrooms.mapping.navigation_config import NavigationConfig
+
+# Gain from heading error to turn rate [1/s]: a turn in place settles in about a second.
+TURN_GAIN = 2.5
+# Smallest turn rate while turning in place [rad/s], so that the last degrees do not take for ever.
+MIN_TURN_RATE = 0.3
+# Scan points beyond this cannot matter before the next command [m].
+HORIZON = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class Steering:
+    """A velocity command.
+
+    Attributes:
+        v: Forward speed [m/s].
+        w: Turn rate, positive counter-clockwise [rad/s].
+        progress: Distance along the path of the point nearest to the robot [m].
+        remaining: Distance along the path to its end [m].
+    """
+
+    v: float
+    w: float
+    progress: float
+    remaining: float
+
+
+def steer(points: FloatArray, pose: Pose2, progress: float, config: NavigationConfig) -> Steering:
+    """Pure pursuit (Coulter, CMU-RI-TR-92-01) with turns in place where the path leaves the heading.
+
+    Args:
+        points: Corners of the path, map frame, shape (n, 2) [m].
+        pose: ``map_T_robot``.
+        progress: Distance along the path at the last call [m]; the robot never loses what it has done.
+        config: Speeds, look-ahead.
+
+    Returns:
+        The command and the new progress.
+    """
+    lengths = np.hypot(*np.diff(points, axis=0).T)
+    along = np.concatenate(([0.0], np.cumsum(lengths)))
+    total = float(along[-1])
+    progress = _project(points, along, (pose.x, pose.y), progress, 2.0 * config.lookahead)
+    remaining = total - progress
+    target = _at(points, along, min(progress + config.lookahead, total))
+    dx, dy = target[0] - pose.x, target[1] - pose.y
+    distance = math.hypot(dx, dy)
+    error = wrap_angle(math.atan2(dy, dx) - pose.theta) if distance > 1e-6 else 0.0
+    if abs(error) > config.turn_in_place:
+        return Steering(0.0, turn_rate(error, config), progress, remaining)
+    curvature = 2.0 * math.sin(error) / max(distance, 0.5 * config.lookahead)
+    v = min(
+        config.max_speed * max(0.25, math.cos(error) ** 2),
+        config.max_turn_rate / max(abs(curvature), 1e-6),
+        math.sqrt(2.0 * config.acceleration * max(remaining, 0.02)),
+    )
+    return Steering(v, v * curvature, progress, remaining)
+
+
+def turn_rate(error: float, config: NavigationConfig) -> float:
+    """Turn rate [rad/s] that brings a heading error [rad] to zero without overshoot."""
+    rate = min(max(TURN_GAIN * abs(error), MIN_TURN_RATE), config.max_turn_rate)
+    return math.copysign(rate, error)
+
+
+def near_points(scan: LaserScan) -> FloatArray:
+    """What the scan shows close to the robot, robot frame, shape (n, 2) [m]; lone beams are outliers and left out."""
+    ranges = np.where(scan.hits, scan.ranges, np.inf)
+    # A real obstacle that close covers several beams: a beam counts as far as the nearer of its neighbours at least.
+    supported = np.maximum(ranges, np.minimum(np.roll(ranges, 1), np.roll(ranges, -1)))
+    near = supported < HORIZON
+    angles = scan.angle_min + scan.angle_increment * np.flatnonzero(near)
+    points = np.column_stack((supported[near] * np.cos(angles), supported[near] * np.sin(angles)))
+    return Pose2(*scan.robot_T_sensor).transform(points)
+
+
+def free_distance(points_robot: FloatArray, v: float, w: float, config: NavigationConfig) -> float:
+    """How far the robot can drive along the arc of a command before it touches a scan point [m].
+
+    Args:
+        points_robot: Obstacles in the robot frame, shape (n, 2) [m].
+        v: Forward speed, negative backwards [m/s].
+        w: Turn rate [rad/s].
+        config: Footprint.
+
+    Returns:
+        Distance along the arc, at most ``HORIZON`` less the footprint.
+    """
+    reach = HORIZON - config.required_clearance
+    if len(points_robot) == 0:
+        return reach
+    steps = np.arange(0.05, reach, 0.05)
+    signed = math.copysign(1.0, v) * steps
+    curvature = w / v if abs(v) > 1e-6 else 0.0
+    if abs(curvature) < 1e-6:
+        path = np.column_stack((signed, np.zeros_like(signed)))
+    else:
+        path = np.column_stack((np.sin(curvature * signed), 1.0 - np.cos(curvature * signed))) / curvature
+    gaps = np.hypot(*(path[:, None, :] - points_robot[None, :, :]).transpose(2, 0, 1)).min(axis=1)
+    now = float(np.hypot(*points_robot.T).min())
+    # Where the robot already is inside the margin it may still drive as long as it does not get closer.
+    limit = min(config.robot_radius + 0.5 * config.clearance_margin, now - 0.005)
+    hit = np.flatnonzero(gaps < limit)
+    return float(steps[hit[0]] - 0.05) if len(hit) else reach
+
+
+def limit_speed(command: Steering, points_robot: FloatArray, config: NavigationConfig) -> Steering:
+    """The same arc, slow enough to stop before what the scan shows; turning in place is always possible."""
+    if command.v <= 0.0:
+        return command
+    distance = free_distance(points_robot, command.v, command.w, config)
+    v = min(command.v, math.sqrt(2.0 * config.acceleration * distance) if distance > 0.0 else 0.0)
+    return Steering(v, command.w * v / command.v, command.progress, command.remaining)
+
+
+def _project(
+    points: FloatArray, along: FloatArray, place: tuple[float, float], progress: float, window: float
+) -> float:
+    """Distance along the path of the place's nearest point, searched from ``progress`` to ``progress + window``."""
+    best, best_distance = progress, math.inf
+    for i in range(len(points) - 1):
+        if along[i + 1] < progress or along[i] > progress + window:
+            continue
+        span = points[i + 1] - points[i]
+        length = float(along[i + 1] - along[i])
+        if length < 1e-9:
+            continue
+        t = ((place[0] - points[i, 0]) * span[0] + (place[1] - points[i, 1]) * span[1]) / length**2
+        s = min(max(float(along[i]) + min(max(t, 0.0), 1.0) * length, progress), progress + window)
+        x, y = _at(points, along, s)
+        distance = math.hypot(place[0] - x, place[1] - y)
+        if distance < best_distance - 1e-9:
+            best, best_distance = s, distance
+    return best
+
+
+def _at(points: FloatArray, along: FloatArray, distance: float) -> tuple[float, float]:
+    """The point at a distance along the path."""
+    return (
+        float(np.interp(distance, along, points[:, 0])),
+        float(np.interp(distance, along, points[:, 1])),
+    )

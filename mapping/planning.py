@@ -1,0 +1,149 @@
+"""Paths that keep clear of obstacles, over the planning grid."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.door import Point
+from closedrooms.mapping.costmap import Costmap, Field, traversable
+from closedrooms.mapping.navigation_config import NavigationConfig
+
+# How far the robot's own estimate may lie inside an obstacle's margin before no path can start [m].
+START_RADIUS = 0.8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Path:
+    """A way through free space.
+
+    Attributes:
+        points: Corners in the map frame, shape (n, 2), n >= 1 [m].
+        cost: Length weighted by closeness to obstacles [m].
+        goal_cell: Coarse cell ``(row, col)`` where it ends.
+    """
+
+    points: FloatArray
+    cost: float
+    goal_cell: tuple[int, int]
+
+    @property
+    def length(self) -> float:
+        """Length along the path [m]."""
+        return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
+
+
+def reachable_cells(costmap: Costmap, start: Point, config: NavigationConfig) -> BoolArray | None:
+    """Coarse cells that the robot can reach from ``start`` (map frame), ``None`` when it is enclosed."""
+    import cv2
+
+    fits = traversable(costmap, config)
+    cell = start_cell(costmap, fits, start)
+    if cell is None:
+        return None
+    _, labels = cv2.connectedComponents(fits.astype(np.uint8), connectivity=8, ltype=cv2.CV_32S)
+    component: BoolArray = np.asarray(labels == labels[cell], dtype=np.bool_)
+    return component
+
+
+def start_cell(costmap: Costmap, fits: BoolArray, start: Point) -> tuple[int, int] | None:
+    """The coarse cell nearest to ``start`` where the robot fits, ``None`` when there is none close by."""
+    reach = math.ceil(START_RADIUS / costmap.frame.resolution)
+    row, col = (int(v) for v in costmap.frame.to_cells(np.array(start)))
+    r0, c0 = max(row - reach, 0), max(col - reach, 0)
+    cells = np.argwhere(fits[r0 : max(row + reach + 1, 0), c0 : max(col + reach + 1, 0)]) + np.array([r0, c0])
+    if len(cells) == 0:
+        return None
+    distance = np.hypot(*(costmap.anchors(cells) - np.array(start)).T)
+    best = int(np.argmin(distance))
+    if distance[best] > START_RADIUS:
+        return None
+    return (int(cells[best, 0]), int(cells[best, 1]))
+
+
+def plan_path(costmap: Costmap, start: Point, goals: BoolArray, config: NavigationConfig) -> Path | None:
+    """The cheapest path from ``start`` to the nearest of several goals (Dijkstra, ended at the first goal).
+
+    A metre costs 1 in the open and up to ``1 + clearance_weight`` beside an obstacle.
+
+    Args:
+        costmap: Planning grid.
+        start: Where the robot is, map frame [m].
+        goals: Coarse cells that count as goals, shape ``costmap.frame.shape``.
+        config: Clearance and its weight.
+
+    Returns:
+        The path, or ``None`` when no goal can be reached.
+    """
+    from skimage.graph import MCP_Geometric
+
+    fits = traversable(costmap, config)
+    first = start_cell(costmap, fits, start)
+    goals = goals & fits
+    if first is None or not goals.any():
+        return None
+    if goals[first]:
+        cells: IntArray = np.array([first])
+        cost = 0.0
+    else:
+        ends = np.argwhere(goals)
+        search = MCP_Geometric(cell_costs(costmap.clearance, fits, config))
+        costs, _ = search.find_costs([first], ends.tolist(), find_all_ends=False)
+        reached = costs[ends[:, 0], ends[:, 1]]
+        best = int(np.argmin(reached))
+        if not np.isfinite(reached[best]):
+            return None
+        cells = np.array(search.traceback(ends[best]), dtype=np.int64)
+        cost = float(reached[best]) * costmap.frame.resolution
+    points = straighten(np.vstack((np.array(start), costmap.anchors(cells))), costmap, config)
+    return Path(points, cost, (int(cells[-1, 0]), int(cells[-1, 1])))
+
+
+def cell_costs(clearance: Field, fits: BoolArray, config: NavigationConfig) -> FloatArray:
+    """Cost of a metre in each coarse cell; infinite where the robot does not fit."""
+    closeness = np.clip(1.0 - clearance / config.preferred_clearance, 0.0, 1.0)
+    costs = np.where(fits, 1.0 + config.clearance_weight * closeness**2, np.inf)
+    return costs.astype(np.float64)
+
+
+def straighten(points: FloatArray, costmap: Costmap, config: NavigationConfig) -> FloatArray:
+    """Fewer corners: a straight piece replaces a part of the path where it keeps as much clearance.
+
+    Args:
+        points: Path from cell to cell, shape (n, 2) [m].
+        costmap: Distance field.
+        config: ``preferred_clearance`` is enough for any straight piece.
+
+    Returns:
+        Corners of the straightened path, shape (k, 2) [m], same ends.
+    """
+    clearance = costmap.clearance_at(points)
+    kept = [0]
+    while kept[-1] < len(points) - 1:
+        start = kept[-1]
+        reach, step = 1, 2
+        while start + step < len(points) and _is_clear(points, clearance, start, start + step, costmap, config):
+            reach, step = step, step * 2
+        low, high = reach, min(step, len(points) - 1 - start)
+        while low < high:
+            middle = (low + high + 1) // 2
+            if _is_clear(points, clearance, start, start + middle, costmap, config):
+                low = middle
+            else:
+                high = middle - 1
+        kept.append(start + low)
+    return points[kept]
+
+
+def _is_clear(
+    points: FloatArray, clearance: Field, start: int, end: int, costmap: Costmap, config: NavigationConfig
+) -> bool:
+    """Whether the straight line between two path points is as clear as the part of the path it would replace."""
+    if end == start + 1:
+        return True
+    needed = min(float(clearance[start + 1 : end + 1].min()), config.preferred_clearance)
+    span = points[end] - points[start]
+    samples = max(2, math.ceil(float(np.hypot(*span)) / costmap.fine_frame.resolution))
+    line = points[start] + np.linspace(0.0, 1.0, samples + 1)[1:, None] * span
+    return bool(costmap.clearance_at(line).min() >= needed - 1e-6)
