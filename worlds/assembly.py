@@ -11,7 +11,7 @@ import shapely
 from shapely.geometry import LineString, Polygon
 
 from closedrooms.core.door import Point, Segment
-from closedrooms.worlds.geometry import distance_along
+from closedrooms.worlds.geometry import areal, distance_along
 from closedrooms.worlds.plan import Wall
 
 Pair = tuple[int, int | None]
@@ -153,3 +153,33 @@ def coverage(polygons: Sequence[Polygon], *, gap: float = 0.0, snap: float = -1.
         parts = [part for part in shapely.get_parts(area) if isinstance(part, Polygon)]
         result.append(max(parts, key=lambda part: part.area, default=Polygon()))
     return result
+
+
+def without_gaps(polygons: Sequence[Polygon], width: float, *, fixed: int = 0) -> tuple[list[Polygon], list[Polygon]]:
+    """Rooms grown into the gaps and notches between them that are narrower than ``width`` metres.
+
+    Args:
+        polygons: Side by side.
+        width: Metres.
+        fixed: So many rooms at the front keep their shape.
+
+    Returns:
+        The rooms, each gap joined to the one with the longest border of those around it, and the gaps themselves.
+    """
+    union = shapely.union_all(polygons)
+    closed = union.buffer(width / 2, join_style="mitre").buffer(-width / 2, join_style="mitre")
+    gaps = [part for part in shapely.get_parts(areal(closed.difference(union))) if _is_narrow(part, width)]
+    rooms = list(polygons)
+    filled = []
+    for gap in gaps:
+        shared = [room.boundary.intersection(gap.boundary).length for room in rooms]
+        best = max(range(fixed, len(rooms)), key=lambda i: shared[i])
+        grown = areal(rooms[best].union(gap))
+        if sum(length > 0.05 for length in shared) >= 2 and isinstance(grown, Polygon):
+            rooms[best] = grown
+            filled.append(gap)
+    return rooms, filled
+
+
+def _is_narrow(part: Polygon, width: float) -> bool:
+    return part.area > 1e-3 and shapely.maximum_inscribed_circle(part, tolerance=0.02).length < width / 2 + 0.05

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import shapely
@@ -11,7 +12,7 @@ from shapely.geometry import Polygon
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.random import stream
-from closedrooms.worlds.assembly import Edge, coverage, free_spans, shared_edges, walls_along
+from closedrooms.worlds.assembly import Edge, coverage, free_spans, shared_edges, walls_along, without_gaps
 from closedrooms.worlds.passages import hung
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom
 from closedrooms.worlds.programme import BAYS, END_ROOMS, LENGTHS, Bay, fill, measures
@@ -29,6 +30,12 @@ SHAPE_WEIGHTS = {"bar": 2.0, "L": 2.0, "U": 1.5, "T": 2.0, "ring": 1.5, "slant":
 KEPT_SHARE = 0.45
 # The circle that fits a room: narrower ones are left out [m].
 NARROWEST = 0.8
+# Slits and notches between rooms up to this width are given to a neighbour [m].
+SLIT = 2.0
+# Bays at least this wide may be deeper or shallower than their neighbours [m].
+OWN_DEPTH = 5.4
+# A suite is split into rooms of at least half this depth [m].
+SUITE_DEPTH = 5.2
 DOOR_MARGIN = 0.3
 CORRIDOR = 0
 
@@ -137,18 +144,19 @@ def _draw_rooms(rng: np.random.Generator, kind: str, skeleton: Skeleton) -> _Ske
 
 def _draw_run(rng: np.random.Generator, kind: str, run: Run, sketch: _Sketch, counts: dict[str, int]) -> None:
     bays = fill(rng, kind, run.length - run.corner, counts)
-    at, section = 0.0, 1.0
+    at, section, stepped = 0.0, 1.0, 0
     last: int | None = None
+    previous = run.depth
     for number, (bay, width) in enumerate(bays):
-        # A run keeps its depth for a few rooms, then may step back or forward.
-        if rng.random() < 0.2:
-            section = float(rng.choice([0.85, 1.0, 1.0, 1.15]))
-        depth = run.depth * section
-        if rng.random() < 0.5:
-            depth = run.depth * float(rng.uniform(bay.shallow, bay.deep))
-        depth = round(min(depth, run.deepest) * 10) / 10
         corner = run.corner if number == len(bays) - 1 else 0.0
-        rooms = _draw_bay(rng, kind, run, bay, at, at + width + corner, depth if not corner else run.depth, sketch)
+        if corner and not bay.corner:
+            bay = next(option for option in BAYS[kind] if option.corner)
+        # A run keeps its depth for a few rooms, then may step back or forward.
+        if number - stepped >= 3 and rng.random() < 0.3:
+            section, stepped = float(rng.choice([0.85, 1.0, 1.18])), number
+        depth = run.depth if corner else _depth(rng, run, bay, width, section, previous)
+        previous = depth
+        rooms = _draw_bay(rng, run, bay, at, at + width + corner, depth, sketch)
         at += width
         if rooms and last is not None and bay.layout == "room" and bay.label != "stairs" and rng.random() < 0.1:
             sketch.passages.append(_Passage((last, rooms[0]), _door_width(rng), float(rng.uniform(0.2, 0.8)), True))
@@ -156,20 +164,29 @@ def _draw_run(rng: np.random.Generator, kind: str, run: Run, sketch: _Sketch, co
         last = rooms[0] if connects else None
 
 
+def _depth(rng: np.random.Generator, run: Run, bay: Bay, width: float, section: float, previous: float) -> float:
+    """Depth of a bay [m]: that of its section, a wide one also its own; small steps in the outline are left out."""
+    if run.deepest <= run.depth:
+        return run.depth
+    own = bay.shallow if bay.shallow < 1.0 else bay.deep
+    depth = run.depth * section * (own if width >= OWN_DEPTH and rng.random() < 0.6 else 1.0)
+    depth = round(min(depth, run.deepest) * 10) / 10
+    return previous if abs(depth - previous) < 0.6 else depth
+
+
 def _draw_bay(
-    rng: np.random.Generator, kind: str, run: Run, bay: Bay, s0: float, s1: float, depth: float, sketch: _Sketch
+    rng: np.random.Generator, run: Run, bay: Bay, s0: float, s1: float, depth: float, sketch: _Sketch
 ) -> list[int]:
     """Rooms of one bay; the indices of those that were kept."""
     where = _door_place(rng, bay)
     width = _door_width(rng)
-    del kind
     if bay.layout == "pair":
         middle = (s0 + s1) / 2
         rooms = [_add(sketch, bay.label, run.box(a, b, 0.0, depth)) for a, b in ((s0, middle), (middle, s1))]
         for room, place in zip(rooms, (0.85, 0.15), strict=True):
             _connect(sketch, room, CORRIDOR, width, place)
         return [room for room in rooms if room is not None]
-    if bay.layout == "suite" and depth >= 5.5:
+    if bay.layout == "suite" and depth >= SUITE_DEPTH:
         middle = round(depth * float(rng.uniform(0.42, 0.5)) * 10) / 10
         front = _add(sketch, bay.label, run.box(s0, s1, 0.0, middle))
         back = _add(sketch, "office", run.box(s0, s1, middle, depth))
@@ -224,7 +241,6 @@ def _add(sketch: _Sketch, label: str, box: Polygon) -> int | None:
     left = shapely.difference(box, occupied) if not occupied.is_empty else box
     parts = [part for part in shapely.get_parts(left) if isinstance(part, Polygon)]
     room = max(parts, key=lambda part: part.area, default=Polygon())
-    # Opened by a little, so that no needle runs along a neighbour; then on a grid of 1 cm.
     if room.area < KEPT_SHARE * box.area or shapely.maximum_inscribed_circle(room).length < NARROWEST:
         return None
     sketch.labels.append(label)
@@ -251,7 +267,8 @@ def _door_place(rng: np.random.Generator, bay: Bay) -> float:
 
 def _turned(sketch: _Sketch, angle: float) -> _Sketch:
     """The sketch with shared edges, turned, its lower left corner at the origin, on a grid of 0.1 mm."""
-    polygons = coverage(sketch.polygons, snap=0.01)
+    polygons, _ = without_gaps(sketch.polygons, SLIT, fixed=1)
+    polygons = coverage(polygons, gap=SLIT, snap=0.01)
     c, s = math.cos(angle), math.sin(angle)
     turned = shapely.transform(np.array(polygons, dtype=object), lambda p: p @ np.array([[c, s], [-s, c]]))
     low = shapely.get_coordinates(turned).min(axis=0)
@@ -286,7 +303,9 @@ def _build(rng: np.random.Generator, sketch: _Sketch) -> FloorPlan:
     for passage, segment in placed:
         sides = (rooms[passage.rooms[0]].id, rooms[passage.rooms[1]].id)
         if passage.is_door:
-            doors.append(PlanDoor(f"d{len(doors):02d}", segment, sides, hinge=1 if rng.random() < 0.5 else 0))
+            # Hung on the side of the nearer corner, so that the leaf opens towards the side wall.
+            hinge: Literal[0, 1] = 0 if passage.where < 0.5 else 1
+            doors.append(PlanDoor(f"d{len(doors):02d}", segment, sides, hinge=hinge))
         else:
             openings.append(Opening(f"o{len(openings):02d}", segment, sides))
     return FloorPlan("", rooms, tuple(walls_along(edges, thickness)), hung(doors, openings, rooms), tuple(openings))

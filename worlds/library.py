@@ -9,7 +9,7 @@ from closedrooms.worlds.passages import without_entrances
 from closedrooms.worlds.plan import FloorPlan
 
 # An office of about 40 x 30 m.
-DEFAULT_WORLD = "office-05"
+DEFAULT_WORLD = "office-07"
 PLANS = Path(__file__).parent / "plans"
 # Enough of a file to tell its format.
 HEAD_BYTES = 65_536

@@ -11,7 +11,7 @@ from shapely.geometry import Polygon
 
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.worlds.assembly import Edge, coverage, free_spans, shared_edges, walls_along
+from closedrooms.worlds.assembly import Edge, coverage, free_spans, shared_edges, walls_along, without_gaps
 from closedrooms.worlds.geometry import areal, distance_along
 from closedrooms.worlds.passages import hung, is_circulation
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom
@@ -159,16 +159,12 @@ def _from_segments(space: Any, metres: float) -> Polygon | None:
 
 def _clean(outlines: list[Polygon], repairs: list[str]) -> list[Polygon]:
     """Outlines that share their edges: overlaps cut, narrow gaps closed, jogs of the drawing straightened."""
-    union = shapely.union_all(outlines)
-    overlap = sum(outline.area for outline in outlines) - union.area
-    closed = union.buffer(GAP / 2, join_style="mitre").buffer(-GAP / 2, join_style="mitre")
-    gaps = [part for part in shapely.get_parts(areal(closed.difference(union))) if _is_narrow(part)]
-    polygons = coverage([*outlines, *gaps], snap=JOG / 2)
-    merged = _give_gaps(polygons[: len(outlines)], polygons[len(outlines) :])
-    merged = coverage(merged, gap=GAP, snap=JOG / 2)
+    overlap = sum(outline.area for outline in outlines) - shapely.union_all(outlines).area
+    polygons, gaps = without_gaps(coverage(outlines, snap=JOG / 2), GAP)
+    polygons = coverage(polygons, gap=GAP, snap=JOG / 2)
     simple = [
         part if isinstance(part, Polygon) else max(part.geoms, key=lambda p: p.area)
-        for part in shapely.coverage_simplify(merged, JOG)
+        for part in shapely.coverage_simplify(polygons, JOG)
     ]
     result = [polygon if polygon.is_valid and polygon.area > 0.2 else Polygon() for polygon in simple]
     if overlap > 0.01:
@@ -179,25 +175,6 @@ def _clean(outlines: list[Polygon], repairs: list[str]) -> list[Polygon]:
     repairs.extend(f"space {i}: left out, nothing of it is left beside its neighbours"
                    for i, polygon in enumerate(result) if polygon.is_empty)  # fmt: skip
     return result
-
-
-def _is_narrow(part: Polygon) -> bool:
-    return part.area > 1e-3 and shapely.maximum_inscribed_circle(part, tolerance=0.02).length < GAP / 2 + 0.05
-
-
-def _give_gaps(rooms: list[Polygon], gaps: list[Polygon]) -> list[Polygon]:
-    """Each gap joined to the room with the longest shared border."""
-    rooms = list(rooms)
-    for gap in gaps:
-        if gap.is_empty:
-            continue
-        shared = [room.boundary.intersection(gap.boundary).length for room in rooms]
-        best = max(range(len(rooms)), key=lambda i: shared[i])
-        if sum(length > 0.05 for length in shared) >= 2:
-            joined = areal(rooms[best].union(gap))
-            if isinstance(joined, Polygon):
-                rooms[best] = joined
-    return rooms
 
 
 def _portals(spaces: list[Any], labels: list[str], metres: float, repairs: list[str]) -> list[_Portal]:

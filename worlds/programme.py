@@ -21,6 +21,7 @@ class Bay:
         deep: Largest part of the usual depth.
         at_most: How many a building has.
         at_least: How many a building has, if there is room.
+        corner: May fill the outer corner of a bend.
     """
 
     label: str
@@ -31,31 +32,32 @@ class Bay:
     deep: float = 1.0
     at_most: int = 99
     at_least: int = 0
+    corner: bool = False
 
 
 OFFICE = (
     Bay("office", (2.7, 4.0), 46),
-    Bay("shared office", (4.4, 6.4), 20),
-    Bay("meeting room", (4.4, 7.2), 9, deep=1.2),
-    Bay("office suite", (3.4, 5.0), 6, "suite", shallow=1.15, deep=1.35, at_most=3),
+    Bay("shared office", (4.4, 6.4), 20, corner=True),
+    Bay("meeting room", (4.4, 7.2), 9, deep=1.2, corner=True),
+    Bay("office suite", (3.4, 5.0), 6, "suite", at_most=3),
     Bay("office", (5.0, 7.0), 4, "two doors", at_most=2),
     Bay("toilet", (4.4, 5.6), 3, "pair", at_most=2, at_least=1),
-    Bay("store", (1.8, 2.8), 7, shallow=0.6, at_most=4),
+    Bay("store", (1.8, 2.8), 7, at_most=4),
     Bay("kitchen", (2.8, 4.2), 3, "open", at_most=1),
     Bay("stairs", (2.8, 3.4), 2, at_most=2, at_least=1),
-    Bay("open-plan office", (8.0, 13.0), 5, "open", deep=1.3, at_most=2),
+    Bay("open-plan office", (8.0, 13.0), 5, "open", deep=1.3, at_most=2, corner=True),
     Bay("lobby", (4.5, 7.0), 3, "open", at_most=1),
     Bay("server room", (2.6, 3.6), 3, at_most=1),
 )
 SCHOOL = (
-    Bay("classroom", (6.8, 9.2), 44),
+    Bay("classroom", (6.8, 9.2), 44, corner=True),
     Bay("classroom", (7.4, 9.6), 8, "two doors", at_most=4),
     Bay("classroom", (7.6, 9.8), 7, "store", at_most=3),
-    Bay("laboratory", (8.0, 11.0), 7, deep=1.2, at_most=3),
+    Bay("laboratory", (8.0, 11.0), 7, deep=1.2, at_most=3, corner=True),
     Bay("staff room", (5.0, 7.5), 5, at_most=1),
-    Bay("office", (3.0, 4.4), 12, shallow=0.75, at_most=5),
+    Bay("office", (3.0, 4.4), 12, at_most=5),
     Bay("toilet", (5.4, 7.0), 4, "pair", shallow=0.75, at_most=2, at_least=1),
-    Bay("store", (2.0, 3.2), 8, shallow=0.6, at_most=4),
+    Bay("store", (2.0, 3.2), 8, at_most=4),
     Bay("stairs", (3.2, 4.2), 2, at_most=2, at_least=1),
     Bay("library", (9.0, 14.0), 3, "open", deep=1.3, at_most=1),
     Bay("entrance hall", (6.0, 10.0), 4, "open", at_most=1),
