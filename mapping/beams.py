@@ -1,5 +1,7 @@
 """What one scan says: where surfaces are, which way was free, and which beams are not to be believed."""
 
+import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,51 +42,49 @@ def clean(scan: LaserScan, *, max_range: float) -> Beams:
     """
     reach = min(max_range, scan.range_max)
     ranges = np.where(scan.ranges >= scan.range_max, np.inf, scan.ranges)
-    ranges = np.where(ranges < scan.range_min, np.nan, ranges)
-    full_circle = abs(abs(scan.angle_increment) * ranges.size - 2.0 * np.pi) < 1.5 * abs(scan.angle_increment)
-    before, after = _neighbours(ranges, wrap=full_circle)
+    ranges[ranges < scan.range_min] = np.nan
+    wrap = abs(abs(scan.angle_increment) * ranges.size - 2.0 * math.pi) < 1.5 * abs(scan.angle_increment)
+    before, after = _neighbours(ranges, wrap=wrap)
     lower, upper = np.fmin(before, after), np.fmax(before, after)
     lone_long = ranges > upper + OUTLIER_GAP
-    lone_short = ranges < lower - OUTLIER_GAP
+    lone = lone_long | (ranges < lower - OUTLIER_GAP)
     crossed = np.where(lone_long, upper, ranges)
-    crossed = np.where(np.isnan(crossed) & ~np.isnan(before) & ~np.isnan(after), lower, crossed)
-    crossed = np.minimum(np.nan_to_num(crossed, nan=0.0, posinf=reach), reach)
-    surface: BoolArray = np.isfinite(ranges) & ~lone_long & ~lone_short & (ranges < reach)
+    gap = np.isnan(ranges) & ~np.isnan(before) & ~np.isnan(after)
+    crossed = np.minimum(np.where(gap, lower, crossed), reach)
+    crossed[np.isnan(crossed)] = 0.0
+    surface: BoolArray = ~lone & (ranges < reach)
 
     sensor = Pose2(*scan.robot_T_sensor)
-    angles = scan.angles
-    directions = np.column_stack((np.cos(angles), np.sin(angles)))
-    points = sensor.transform(directions[surface] * ranges[surface, None])
-    outline = sensor.transform(_outline(angles, directions, crossed, scan.angle_increment, wrap=full_circle))
-    return Beams(points, outline, np.array([sensor.x, sensor.y]))
+    directions, halves = _directions(scan.angle_min, scan.angle_increment, ranges.size)
+    # Each beam's end, and half-way to the next beam the shorter of the two.
+    outline = np.empty((2 * crossed.size, 2))
+    outline[0::2] = directions * crossed[:, None]
+    outline[1::2] = halves * np.minimum(crossed, np.concatenate((crossed[1:], crossed[:1])))[:, None]
+    if not wrap:
+        outline = np.vstack((np.zeros((1, 2)), outline[:-1]))
+    points = directions[surface] * ranges[surface, None]
+    return Beams(sensor.transform(points), sensor.transform(outline), np.array([sensor.x, sensor.y]))
+
+
+@functools.lru_cache(maxsize=8)
+def _directions(angle_min: float, increment: float, beams: int) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors of the beams and of the directions half-way to the next ones, shape (beams, 2) each."""
+    angles = angle_min + increment * np.arange(beams)
+    half = angles + increment / 2.0
+    return np.column_stack((np.cos(angles), np.sin(angles))), np.column_stack((np.cos(half), np.sin(half)))
 
 
 def _neighbours(ranges: FloatArray, *, wrap: bool) -> tuple[FloatArray, FloatArray]:
-    before, after = np.roll(ranges, 1), np.roll(ranges, -1)
-    if not wrap and ranges.size:
-        before[0], after[-1] = np.nan, np.nan
-    return before, after
-
-
-def _outline(
-    angles: FloatArray, directions: FloatArray, crossed: FloatArray, increment: float, *, wrap: bool
-) -> FloatArray:
-    """Vertices in the sensor frame: each beam's end, and half-way to the next beam the shorter of the two."""
-    between = np.minimum(crossed, np.roll(crossed, -1))
-    half = angles + increment / 2.0
-    vertices = np.empty((2 * crossed.size, 2))
-    vertices[0::2] = directions * crossed[:, None]
-    vertices[1::2] = np.column_stack((np.cos(half), np.sin(half))) * between[:, None]
-    return vertices if wrap else np.vstack((np.zeros((1, 2)), vertices[:-1]))
+    first, last = (ranges[-1:], ranges[:1]) if wrap else (np.full(1, np.nan), np.full(1, np.nan))
+    return np.concatenate((first, ranges[:-1])), np.concatenate((ranges[1:], last))
 
 
 def thin(points: FloatArray, spacing: float, most: int) -> FloatArray:
     """Points of a scan, shape (n, 2), in beam order, at about ``spacing`` [m] along it and at most ``most`` of them."""
     if len(points) < 3:
         return points
-    steps = np.hypot(*np.diff(points, axis=0).T)
+    steps = np.hypot(np.diff(points[:, 0]), np.diff(points[:, 1]))
     way = np.concatenate(([0.0], np.cumsum(np.minimum(steps, spacing))))
-    spacing = max(spacing, way[-1] / most)
-    ticks = np.floor(way / spacing)
+    ticks = np.floor(way / max(spacing, way[-1] / most))
     keep = np.concatenate(([True], ticks[1:] > ticks[:-1]))
     return points[keep]

@@ -43,12 +43,6 @@ class MatcherConfig:
     doubt: float = 0.8
     """Share of the usual score below which a refinement is doubted and a search is made."""
 
-    search_distance: float = 0.30
-    """Motion since the last match above which a search precedes the refinement [m]."""
-
-    search_angle: float = 0.35
-    """Turn since the last match above which a search precedes the refinement [rad]."""
-
     window_sigmas: float = 3.0
     """Half width of the search window in standard deviations of the odometry."""
 
@@ -82,6 +76,57 @@ class LoopConfig:
     horizon: float = 20.0
     """Way along the pose graph [m] within which keyframes are taken as consistent with the present: only they are
     matched against, what lies beyond is a candidate for a loop."""
+
+    interval: float = 1.0
+    """Way between two attempts to close a loop [m]."""
+
+    window: float = 0.30
+    """Half width of the search window without any drift [m]."""
+
+    drift: float = 0.025
+    """Drift for which the search window grows, per metre along the pose graph [m/m]."""
+
+    max_window: float = 4.0
+    """Largest half width of the search window [m]."""
+
+    window_angle: float = 0.06
+    """Half width of the search window without any drift [rad]."""
+
+    drift_angle: float = 0.003
+    """Growth of the angular window per metre along the pose graph [rad/m]."""
+
+    overlap: float = 3.0
+    """Distance beyond the drift up to which two keyframes see the same surfaces well enough [m]."""
+
+    max_distance: float = 7.0
+    """Largest distance of two keyframes that are tried [m]."""
+
+    surroundings: float = 8.0
+    """Distance around the older keyframe from which surfaces are taken [m]."""
+
+    recent_way: float = 3.0
+    """Way before the present keyframe that is matched with it [m]."""
+
+    max_points: int = 500
+    """Most points that are matched."""
+
+    min_score: float = 0.60
+    """Mean likelihood [0..1] of the recent way on the older surfaces that a loop must reach."""
+
+    kernel: float = 4.0
+    """Mahalanobis error at which a loop has half its weight."""
+
+    min_weight: float = 0.15
+    """Weight [0..1] after optimisation below which a loop contradicts the rest and is taken back."""
+
+    link_distance: float = 2.5
+    """Distance up to which the present keyframe is also tied to an older one that it was matched against [m]."""
+
+    link_interval: float = 1.0
+    """Way between two such ties [m]."""
+
+    point_information: float = 2.0
+    """Information of a match per unit of the field's curvature; gives about 1.5 cm in a room."""
 
 
 @dataclass(frozen=True, kw_only=True)

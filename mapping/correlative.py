@@ -21,11 +21,16 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Best pose of a window, its mean likelihood [0..1], and the best one elsewhere (``runner_up``)."""
+    """Best pose of a window and its mean likelihood [0..1]."""
 
     pose: Pose2
     score: float
-    runner_up: float = 0.0
+
+
+MAX_POINTS = 160
+"""Points of a scan that a search looks at; the refinement that follows takes all."""
+TIE = 1e-9
+"""Mean likelihood by which a later candidate must be better: rounding decides nothing."""
 
 
 def search(
@@ -36,7 +41,6 @@ def search(
     *,
     coarse_cells: int = 4,
     prior_sigmas: tuple[float, float] | None = None,
-    apart: float = 1.0,
 ) -> Found:
     """Find the pose in the window with the highest mean likelihood, exactly on the lattice of candidate poses.
 
@@ -50,78 +54,85 @@ def search(
         window: Half widths.
         coarse_cells: Width of a block in cells.
         prior_sigmas: Standard deviations ``(distance [m], angle [rad])`` of the guess; lowers the score far from it.
-        apart: Distance [m] from the best pose beyond which the runner-up is taken.
 
     Returns:
         The best pose; its score without the prior.
     """
     lattice = field.lattice
-    farthest = max(float(np.hypot(points[:, 0], points[:, 1]).max(initial=0.0)), 1.0)
-    # A turn by this moves the farthest point by one cell (Olson, section III.B), but walls blur over several.
-    angle_step = min(max(2.0 * lattice.resolution / farthest, 0.004), 0.04)
+    points = points[:: -(-len(points) // MAX_POINTS)]
+    reach = max(float(np.percentile(np.hypot(points[:, 0], points[:, 1]), 80)), 1.0) if len(points) else 1.0
+    # A turn by this moves a far point by two cells (Olson, section III.B, takes one; walls blur over several).
+    angle_step = min(max(2.0 * lattice.resolution / reach, 0.004), 0.04)
     n_angles = math.ceil(window.angle / angle_step)
-    angles: FloatArray = guess.theta + np.arange(-n_angles, n_angles + 1, dtype=np.float64) * angle_step
-    c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
-    cols = np.floor((c * points[:, 0] - s * points[:, 1] + guess.x) / lattice.resolution).astype(np.int64)
-    rows = np.floor((s * points[:, 0] + c * points[:, 1] + guess.y) / lattice.resolution).astype(np.int64)
-    cols -= lattice.col0
-    rows -= lattice.row0
-
+    turns: FloatArray = np.arange(-n_angles, n_angles + 1, dtype=np.float64) * angle_step
     half = max(1, math.ceil(window.distance / lattice.resolution))
-    blocks = np.arange(-half, half + 1, coarse_cells)
-    shifts = np.array([(dy, dx) for dy in blocks for dx in blocks], dtype=np.int64)
-    maxima = _block_maxima(field.values, coarse_cells)
-    bounds = _scores(maxima, rows, cols, shifts)  # (angles, blocks)
-    penalty = _penalties(angles - guess.theta, shifts, coarse_cells, lattice.resolution, prior_sigmas)
-    bounds = bounds - penalty
+    values, rows, cols = _surroundings(field, points, guess, turns, half + coarse_cells)
 
-    inner = np.array([(dy, dx) for dy in range(coarse_cells) for dx in range(coarse_cells)], dtype=np.int64)
+    blocks = np.arange(-half, half + 1, coarse_cells)
+    shifts = np.stack(np.meshgrid(blocks, blocks, indexing="ij"), axis=-1).reshape(-1, 2)
+    bounds = _scores(_block_maxima(values, coarse_cells), rows, cols, shifts)  # (angles, blocks)
+    bounds -= _penalties(turns, shifts, coarse_cells, lattice.resolution, prior_sigmas)
+    inner = np.stack(np.meshgrid(np.arange(coarse_cells), np.arange(coarse_cells), indexing="ij"), axis=-1)
+
     best, best_pose, best_score = -math.inf, guess, 0.0
-    order = np.argsort(-bounds, axis=None, kind="stable")
-    for flat in order:
+    for flat in np.argsort(-bounds, axis=None, kind="stable"):
         i, j = divmod(int(flat), len(shifts))
         if bounds[i, j] <= best:
             break
-        fine = shifts[j] + inner
-        scores = _scores(field.values, rows[i : i + 1], cols[i : i + 1], fine)[0]
-        penalised = scores - _penalties(angles[i : i + 1] - guess.theta, fine, 1, lattice.resolution, prior_sigmas)[0]
+        fine = shifts[j] + inner.reshape(-1, 2)
+        scores = _scores(values, rows[i : i + 1], cols[i : i + 1], fine)[0]
+        penalised = scores - _penalties(turns[i : i + 1], fine, 1, lattice.resolution, prior_sigmas)[0]
         k = int(np.argmax(penalised))
-        if penalised[k] > best:
+        if penalised[k] > best + TIE:
             best, best_score = float(penalised[k]), float(scores[k])
             dy, dx = fine[k] * lattice.resolution
-            best_pose = Pose2(guess.x + float(dx), guess.y + float(dy), float(angles[i]))
-    return Found(best_pose, best_score, _runner_up(bounds, shifts, best_pose, guess, lattice.resolution, apart))
+            best_pose = Pose2(guess.x + float(dx), guess.y + float(dy), guess.theta + float(turns[i]))
+    return Found(best_pose, best_score)
 
 
-def _runner_up(
-    bounds: FloatArray, shifts: IntArray, best: Pose2, guess: Pose2, resolution: float, apart: float
-) -> float:
-    offset = shifts[:, ::-1] * resolution + np.array([guess.x - best.x, guess.y - best.y])
-    elsewhere = np.hypot(offset[:, 0], offset[:, 1]) > apart
-    return float(bounds[:, elsewhere].max()) if elsewhere.any() else 0.0
+def _surroundings(
+    field: LikelihoodField, points: FloatArray, guess: Pose2, turns: FloatArray, margin: int
+) -> tuple[Float32Array, IntArray, IntArray]:
+    """The part of the field that the window can reach, padded with zeros, and the points' cells in it for each turn.
+
+    Returns:
+        The values, and rows and columns, shape (turns, n) each.
+    """
+    lattice = field.lattice
+    angles = guess.theta + turns
+    c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    cols = np.floor((c * points[:, 0] - s * points[:, 1] + guess.x) / lattice.resolution).astype(np.int64)
+    rows = np.floor((s * points[:, 0] + c * points[:, 1] + guess.y) / lattice.resolution).astype(np.int64)
+    row0, col0 = int(rows.min()) - margin, int(cols.min()) - margin
+    values = np.zeros((int(rows.max()) + margin + 1 - row0, int(cols.max()) + margin + 1 - col0), dtype=np.float32)
+    r0, c0 = max(row0, lattice.row0), max(col0, lattice.col0)
+    r1 = min(row0 + values.shape[0], lattice.row0 + lattice.rows)
+    c1 = min(col0 + values.shape[1], lattice.col0 + lattice.cols)
+    if r1 > r0 and c1 > c0:
+        known = field.values[r0 - lattice.row0 : r1 - lattice.row0, c0 - lattice.col0 : c1 - lattice.col0]
+        values[r0 - row0 : r1 - row0, c0 - col0 : c1 - col0] = known
+    return values, rows - row0, cols - col0
 
 
 def _block_maxima(values: Float32Array, cells: int) -> Float32Array:
     """Largest value in the block of ``cells`` x ``cells`` that starts at each cell."""
+    # With the anchor at (0, 0), the neighbourhood of a cell starts at the cell itself.
     kernel = np.ones((cells, cells), dtype=np.uint8)
-    # The anchor is where the output lands: cell (0, 0) of the block.
-    return cv2.dilate(values, kernel, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0.0)  # type: ignore[return-value]
+    maxima: Float32Array = np.asarray(
+        cv2.dilate(values, kernel, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0.0), dtype=np.float32
+    )
+    return maxima
 
 
 def _scores(values: Float32Array, rows: IntArray, cols: IntArray, shifts: IntArray) -> FloatArray:
-    """Mean value at the points for each angle and shift, shape (angles, shifts); zero outside the field."""
-    height, width = values.shape
+    """Mean value at the points for each angle and shift, shape (angles, shifts)."""
+    width = values.shape[1]
     flat_values = values.reshape(-1)
-    reach = int(np.abs(shifts).max(initial=0))
-    # Points whose every shift stays inside need no check.
-    inside = (rows >= reach) & (rows < height - reach) & (cols >= reach) & (cols < width - reach)
-    flat = np.where(inside, rows * width + cols, 0)
-    offsets = shifts[:, 0] * width + shifts[:, 1]
+    flat = rows * width + cols
+    offsets = (shifts[:, 0] * width + shifts[:, 1])[:, None]
     scores: FloatArray = np.empty((rows.shape[0], len(shifts)), dtype=np.float64)
     for i in range(rows.shape[0]):
-        use = flat[i][inside[i]]
-        scores[i] = flat_values[use + offsets[:, None]].sum(axis=1) if use.size else 0.0
-    scores /= max(1, rows.shape[1])
+        scores[i] = flat_values[flat[i] + offsets].mean(axis=1)
     return scores
 
 

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import DoorSighting, Segment
 from closedrooms.core.pose import Pose2
@@ -32,6 +34,13 @@ class Keyframe:
     way: float
     drawn: Pose2 | None = None
     sightings: dict[str, tuple[Segment, float]] = field(default_factory=dict)
+
+    @property
+    def view(self) -> FloatArray:
+        """Middle of what it sees, map frame, ``(x, y)`` [m]: two scans with near middles see the same surfaces."""
+        if len(self.points) == 0:
+            return np.array([self.pose.x, self.pose.y])
+        return self.pose.transform(np.median(self.points, axis=0))
 
     def remember(self, sighting: DoorSighting, keyframe_T_robot: Pose2) -> None:
         """Keep a sighting relative to this keyframe, if it is the nearest of its door so far."""

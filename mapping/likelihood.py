@@ -4,7 +4,7 @@ import functools
 
 import numpy as np
 
-from closedrooms.core.arrays import FloatArray
+from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.mapping.config import MatcherConfig
 from closedrooms.mapping.lattice import Lattice
 
@@ -42,17 +42,17 @@ class LikelihoodField:
         if padding is not None:
             self.values = np.pad(self.values, padding)
         rows, cols = self.lattice.cells(points)
-        flat = np.unique(rows * self.lattice.cols + cols)
+        flat = rows * self.lattice.cols + cols
         values = self.values.reshape(-1)
-        flat = flat[values[flat] < self._config.new_surface]
+        flat = np.unique(flat[values[flat] < self._config.new_surface])
         if flat.size:
             shifts = offsets[:, 0] * self.lattice.cols + offsets[:, 1]
             targets = (flat[:, None] + shifts).ravel()
-            np.maximum.at(values, targets, np.broadcast_to(weights, (flat.size, weights.size)).ravel())
+            np.maximum.at(values, targets, np.tile(weights, flat.size))
 
 
 @functools.cache
-def _kernel(sigma: float, resolution: float) -> tuple[np.ndarray, Float32Array, int]:  # type: ignore[type-arg]
+def _kernel(sigma: float, resolution: float) -> tuple[IntArray, Float32Array, int]:
     reach = max(1, round(REACH_SIGMAS * sigma / resolution))
     axis = np.arange(-reach, reach + 1)
     rows, cols = np.meshgrid(axis, axis, indexing="ij")

@@ -15,8 +15,11 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.doors import fuse_doors
 from closedrooms.mapping.evidence import EvidenceGrid
 from closedrooms.mapping.keyframe import Keyframe
-from closedrooms.mapping.likelihood import LikelihoodField
+from closedrooms.mapping.localmap import HYSTERESIS, LocalMap
+from closedrooms.mapping.loops import Loop, find_loop
 from closedrooms.mapping.matcher import Motion, match_scan
+from closedrooms.mapping.posegraph import Edge, PoseGraph, optimise
+from closedrooms.mapping.refinement import refine
 
 STILL = (0.005, 0.003)
 """Motion ([m], [rad]) below which a scan is not matched again."""
@@ -34,7 +37,12 @@ class Mapper:
 
     def __init__(self, config: MapperConfig | None = None) -> None:
         self._config = config or MapperConfig()
-        self._field = LikelihoodField(self._config.resolution, self._config.matcher)
+        self._local = LocalMap(self._config)
+        self._graph = PoseGraph()
+        self._loops: list[Loop] = []
+        self._hessian: FloatArray = np.zeros((3, 3))
+        self._tied_at = self._tried_at = 0.0
+        self._outdated = False
         self._evidence = EvidenceGrid(self._config)
         self._keyframes: list[Keyframe] = []
         self._pose = Pose2()
@@ -94,7 +102,7 @@ class Mapper:
         if self._motion.way < STILL[0] and self._motion.turn < STILL[1]:
             return
         match = match_scan(
-            self._field,
+            self._local.field,
             points,
             self._pose,
             self._motion,
@@ -104,6 +112,7 @@ class Mapper:
         if match is None:
             return
         self._pose = match.pose
+        self._hessian = match.hessian
         self._motion = Motion()
         self._usual_score += SCORE_MEMORY * (match.score - self._usual_score)
 
@@ -118,8 +127,83 @@ class Mapper:
 
     def _insert(self, keyframe: Keyframe) -> None:
         self._keyframes.append(keyframe)
-        self._field.add(keyframe.pose.transform(keyframe.beams.points))
+        if keyframe.index > 0:
+            self._tie_to_previous(keyframe)
+        ways = self._ways(keyframe)
+        self._tie_to_older(keyframe, ways)
+        if self._config.loops.enabled and self._close_loop(keyframe, ways):
+            ways = self._ways(keyframe)
+        self._local.update(self._keyframes, ways)
         self._draw(keyframe)
+
+    def _ways(self, keyframe: Keyframe) -> dict[int, float]:
+        return self._graph.within(keyframe.index, HYSTERESIS * self._config.loops.horizon)
+
+    def _tie_to_previous(self, keyframe: Keyframe) -> None:
+        previous = self._keyframes[keyframe.index - 1]
+        way = keyframe.way - previous.way
+        turn = abs(wrap_angle(keyframe.pose.theta - previous.pose.theta))
+        distance, angle = Motion(way, turn).sigmas(self._config.matcher)
+        odometry = np.diag([distance**-2, distance**-2, angle**-2])
+        information = odometry + self._information(self._hessian, keyframe.pose)
+        a_T_b = previous.pose.inverse() @ keyframe.pose
+        self._graph.add(Edge(previous.index, keyframe.index, a_T_b, information, max(way, 0.01)))
+        self._hessian = np.zeros((3, 3))
+
+    def _tie_to_older(self, keyframe: Keyframe, ways: dict[int, float]) -> None:
+        """The match was against older keyframes too: say so in the graph, or a loop would tear them apart."""
+        loops = self._config.loops
+        if keyframe.way - self._tied_at < loops.link_interval:
+            return
+        older = [
+            (k.pose.distance(keyframe.pose), k)
+            for k in (self._keyframes[i] for i, way in ways.items() if way <= loops.horizon)
+            if keyframe.way - k.way > loops.horizon / 2
+        ]
+        near = min(older, key=lambda o: (o[0], o[1].index), default=None)
+        if near is None or near[0] > loops.link_distance:
+            return
+        match = refine(self._local.field, keyframe.points, keyframe.pose, iterations=1)
+        information = self._information(match.hessian, keyframe.pose)
+        a_T_b = near[1].pose.inverse() @ keyframe.pose
+        self._graph.add(Edge(near[1].index, keyframe.index, a_T_b, information, max(near[0], 0.01), loop=True))
+        self._tied_at = keyframe.way
+
+    def _information(self, hessian: FloatArray, pose: Pose2) -> FloatArray:
+        """Curvature in the map frame as information in the keyframe's own frame."""
+        c, s = math.cos(pose.theta), math.sin(pose.theta)
+        rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return np.asarray(self._config.loops.point_information * (rotation.T @ hessian @ rotation))
+
+    def _close_loop(self, keyframe: Keyframe, ways: dict[int, float]) -> bool:
+        loops = self._config.loops
+        if keyframe.way - self._tried_at < loops.interval:
+            return False
+        self._tried_at = keyframe.way
+        consistent = {i for i, way in ways.items() if way <= loops.horizon}
+        loop = find_loop(self._keyframes, self._graph, consistent, self._config)
+        if loop is None:
+            return False
+        information = self._information(loop.hessian, keyframe.pose)
+        self._graph.add(Edge(loop.source, loop.target, loop.a_T_b, information, loops.interval, loop=True))
+        solution = optimise(self._poses(), self._graph.edges, kernel=loops.kernel)
+        if 1.0 / (1.0 + solution.errors[-1] / loops.kernel**2) < loops.min_weight:
+            self._graph.drop_last()
+            return False
+        self._loops.append(loop)
+        self._apply(solution.poses)
+        return True
+
+    def _poses(self) -> FloatArray:
+        return np.array([k.pose.as_tuple() for k in self._keyframes])
+
+    def _apply(self, poses: FloatArray) -> None:
+        """Move the keyframes; what hangs on them (way, doors, map) follows."""
+        for keyframe, (x, y, theta) in zip(self._keyframes, poses, strict=True):
+            keyframe.pose = Pose2(x, y, theta)
+        self._pose = self._keyframes[-1].pose
+        self._local.clear()
+        self._outdated = True
 
     def _draw(self, keyframe: Keyframe) -> None:
         if keyframe.drawn is not None:
@@ -133,7 +217,11 @@ class Mapper:
         keyframe.drawn = keyframe.pose
 
     def grid(self) -> OccupancyGrid:
-        """The map so far."""
+        """The map so far, from the keyframes' present poses."""
+        if self._outdated:
+            for keyframe in self._keyframes:
+                self._draw(keyframe)
+            self._outdated = False
         return self._evidence.grid()
 
     def doors(self) -> list[ClosedDoor]:
@@ -148,7 +236,10 @@ class Mapper:
     @property
     def loops(self) -> FloatArray:
         """Positions of the two ends of each loop that was closed, shape (n, 2, 2), map frame [m]."""
-        return np.empty((0, 2, 2))
+        ends = [(self._keyframes[loop.source].pose, self._keyframes[loop.target].pose) for loop in self._loops]
+        return np.array([((a.x, a.y), (b.x, b.y)) for a, b in ends], dtype=np.float64).reshape(-1, 2, 2)
 
     def finish(self) -> None:
-        """Complete the map: nothing is left to correct."""
+        """Optimise once more over everything."""
+        if len(self._graph.edges) > 0 and self._loops:
+            self._apply(optimise(self._poses(), self._graph.edges, kernel=self._config.loops.kernel).poses)

@@ -67,8 +67,8 @@ def match_scan(
 ) -> Match | None:
     """Refine the pose that odometry predicts, so that the scan lies on the surfaces of the field.
 
-    Small motions are refined at once (:func:`refine`); after a large motion, or when the fit is worse than usual, the
-    window that the odometry leaves open is searched first (:func:`search`).
+    The prediction is refined at once (:func:`refine`); when the fit is worse than usual, the window that the odometry
+    leaves open is searched (:func:`search`).
 
     Args:
         field: Surfaces known so far.
@@ -90,9 +90,8 @@ def match_scan(
         return refine(field, points, start, prior=guess, prior_information=information, iterations=config.iterations)
 
     doubted = max(config.min_score, config.doubt * usual_score)
-    far = motion.way > config.search_distance or motion.turn > config.search_angle
     direct = refined(guess)
-    if not far and direct.score >= doubted:
+    if direct.score >= doubted:
         return Match(direct.pose, direct.score, direct.hessian, searched=False)
     window = Window(
         min(max(config.window_sigmas * sigma_distance, 3 * field.lattice.resolution), config.max_window),

@@ -1,0 +1,101 @@
+"""Recognise places: match the recent way to older keyframes over a wide window."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.pose import Pose2
+from closedrooms.mapping.config import MapperConfig
+from closedrooms.mapping.correlative import Window, search
+from closedrooms.mapping.keyframe import Keyframe
+from closedrooms.mapping.likelihood import LikelihoodField
+from closedrooms.mapping.posegraph import PoseGraph
+from closedrooms.mapping.refinement import refine
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Loop:
+    """A recognised place.
+
+    Attributes:
+        source: Index of the older keyframe.
+        target: Index of the present keyframe.
+        a_T_b: The present keyframe in the frame of the older one.
+        score: Mean likelihood of the recent way on the older surfaces [0..1].
+        hessian: Curvature at the match in the map frame, shape (3, 3).
+    """
+
+    source: int
+    target: int
+    a_T_b: Pose2
+    score: float
+    hessian: FloatArray
+
+
+def find_loop(
+    keyframes: Sequence[Keyframe], graph: PoseGraph, consistent: set[int], config: MapperConfig
+) -> Loop | None:
+    """Match the latest keyframe, with the way that led to it, to the nearest older place beyond the horizon.
+
+    Args:
+        keyframes: All of them; the latest asks.
+        graph: Says how far the drift may have come.
+        consistent: Keyframes within the horizon of the latest, which are no loop.
+        config: Windows and thresholds.
+
+    Returns:
+        The loop, or ``None`` when no place is near or none fits.
+    """
+    loops = config.loops
+    latest = keyframes[-1]
+    candidates = [
+        k for k in keyframes if k.index not in consistent and k.pose.distance(latest.pose) < loops.max_distance
+    ]
+    if not candidates:
+        return None
+    ways = graph.within(latest.index, float("inf"))
+
+    def doubt(keyframe: Keyframe) -> float:
+        return min(loops.window + loops.drift * ways.get(keyframe.index, 1e9), loops.max_window)
+
+    candidates = [k for k in candidates if k.pose.distance(latest.pose) < loops.overlap + doubt(k)]
+    if not candidates:
+        return None
+    view = latest.view
+    older = min(candidates, key=lambda k: (float(np.hypot(*(k.view - view))) + k.pose.distance(latest.pose), k.index))
+    field = LikelihoodField(config.resolution, config.matcher)
+    for index in sorted(graph.within(older.index, loops.horizon)):
+        other = keyframes[index]
+        if index not in consistent and other.pose.distance(older.pose) < loops.surroundings:
+            field.add(other.pose.transform(other.beams.points))
+    points = recent_points(keyframes, loops.recent_way, config)
+    window = Window(doubt(older), min(loops.window_angle + loops.drift_angle * ways[older.index], 0.5))
+    found = search(field, points, latest.pose, window, coarse_cells=8, prior_sigmas=(window.distance, window.angle))
+    if found.score < loops.min_score - 0.15:
+        return None
+    match = refine(field, points, found.pose, iterations=12)
+    if match.score < loops.min_score or match.pose.distance(found.pose) > 0.3:
+        return None
+    return Loop(older.index, latest.index, older.pose.inverse() @ match.pose, match.score, match.hessian)
+
+
+def recent_points(keyframes: Sequence[Keyframe], way: float, config: MapperConfig) -> FloatArray:
+    """What was seen on the last ``way`` [m], in the frame of the latest keyframe, one point a cell of 0.1 m or more.
+
+    One scan alone fits in many places; the surroundings of several metres do not.
+    """
+    latest = keyframes[-1]
+    robot_T_map = latest.pose.inverse()
+    clouds = []
+    for keyframe in reversed(keyframes):
+        if latest.way - keyframe.way > way:
+            break
+        clouds.append((robot_T_map @ keyframe.pose).transform(keyframe.points))
+    points = np.vstack(clouds)
+    cells = np.floor(points / config.matcher.point_spacing).astype(np.int64)
+    _, first = np.unique(cells, axis=0, return_index=True)
+    points = points[np.sort(first)]
+    stride = -(-len(points) // config.loops.max_points)
+    return points[::stride]
