@@ -147,7 +147,8 @@ def free_spans(edge: Edge, edges: Sequence[Edge], taken: Iterable[Segment], marg
 
 def coverage(polygons: Sequence[Polygon], *, gap: float = 0.0, snap: float = -1.0) -> list[Polygon]:
     """Room outlines made to share their edges exactly: overlaps cut, gaps up to ``gap`` metres filled."""
-    cleaned = shapely.coverage_clean(np.array(polygons, dtype=object), gap_width=gap, snapping_distance=snap)
+    clean = shapely.coverage_clean  # type: ignore[attr-defined]  # since shapely 2.2; not in the stubs yet
+    cleaned = clean(np.array(polygons, dtype=object), gap_width=gap, snapping_distance=snap)
     result = []
     for area in cleaned:
         parts = [part for part in shapely.get_parts(area) if isinstance(part, Polygon)]

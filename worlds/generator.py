@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
@@ -15,7 +16,7 @@ from closedrooms.core.random import stream
 from closedrooms.worlds.assembly import Edge, coverage, free_spans, shared_edges, walls_along, without_gaps
 from closedrooms.worlds.passages import hung
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom
-from closedrooms.worlds.programme import BAYS, END_ROOMS, LENGTHS, Bay, fill, measures
+from closedrooms.worlds.programme import BAYS, END_ROOMS, Bay, fill, measures
 from closedrooms.worlds.skeleton import SHAPES, Run, Skeleton
 from closedrooms.worlds.start import start_pose
 from closedrooms.worlds.validate import validate
@@ -147,10 +148,9 @@ def _draw_run(rng: np.random.Generator, kind: str, run: Run, sketch: _Sketch, co
     at, section, stepped = 0.0, 1.0, 0
     last: int | None = None
     previous = run.depth
-    for number, (bay, width) in enumerate(bays):
+    for number, (drawn, width) in enumerate(bays):
         corner = run.corner if number == len(bays) - 1 else 0.0
-        if corner and not bay.corner:
-            bay = next(option for option in BAYS[kind] if option.corner)
+        bay = drawn if drawn.corner or not corner else next(option for option in BAYS[kind] if option.corner)
         # A run keeps its depth for a few rooms, then may step back or forward.
         if number - stepped >= 3 and rng.random() < 0.3:
             section, stepped = float(rng.choice([0.85, 1.0, 1.18])), number
@@ -198,7 +198,7 @@ def _draw_bay(
     if bay.layout == "store":
         low = s0 if rng.random() < 0.5 else s1 - 2.4
         store = run.box(low, low + 2.4, depth - 1.8, depth)
-        box = shapely.difference(box, store)
+        box = _largest(shapely.difference(box, store))
     room = _add(sketch, bay.label, box)
     if room is None:
         return []
@@ -239,13 +239,17 @@ def _add(sketch: _Sketch, label: str, box: Polygon) -> int | None:
     """Draw a room where nothing is yet; ``None`` when too little of it is left."""
     occupied = shapely.union_all([p for p in sketch.polygons if p.intersects(box)])
     left = shapely.difference(box, occupied) if not occupied.is_empty else box
-    parts = [part for part in shapely.get_parts(left) if isinstance(part, Polygon)]
-    room = max(parts, key=lambda part: part.area, default=Polygon())
+    room = _largest(left)
     if room.area < KEPT_SHARE * box.area or shapely.maximum_inscribed_circle(room).length < NARROWEST:
         return None
     sketch.labels.append(label)
     sketch.polygons.append(room)
     return len(sketch.polygons) - 1
+
+
+def _largest(area: BaseGeometry) -> Polygon:
+    parts = [part for part in shapely.get_parts(area) if isinstance(part, Polygon)]
+    return max(parts, key=lambda part: part.area, default=Polygon())
 
 
 def _connect(sketch: _Sketch, room: int | None, other: int | None, width: float, where: float) -> None:

@@ -46,7 +46,7 @@ def solid_walls(walls: Sequence[Wall]) -> Polygon | MultiPolygon:
         return MultiPolygon()
     segments = np.array([wall.segment for wall in walls], dtype=np.float64)
     halves = np.array([wall.thickness / 2 for wall in walls], dtype=np.float64)
-    bodies = shapely.polygons(rectangles(segments, halves))
+    bodies = list(np.asarray(shapely.polygons(rectangles(segments, halves))))
     return areal(shapely.union_all([*bodies, *_corners(segments, halves)]))
 
 
@@ -86,7 +86,7 @@ def _mitre(node: FloatArray, a1: float, h1: float, a2: float, h2: float) -> Poly
     corners = [node, node + n1, node + tip, node + n2]
     if np.hypot(*tip) > MITRE_LIMIT * max(h1, h2):
         del corners[2]
-    return shapely.convex_hull(shapely.multipoints(corners))
+    return Polygon(corners)
 
 
 class WallLines:
@@ -95,7 +95,7 @@ class WallLines:
     def __init__(self, plan: FloorPlan) -> None:
         self._thickness = np.array([wall.thickness for wall in plan.walls])
         self._segments = np.array([wall.segment for wall in plan.walls], dtype=np.float64).reshape(-1, 2, 2)
-        self._tree = STRtree(shapely.linestrings(self._segments)) if len(plan.walls) else None
+        self._tree = STRtree(np.asarray(shapely.linestrings(self._segments))) if len(plan.walls) else None
 
     def thickness(self, segment: Segment) -> float | None:
         """Thickness [m] of the wall along ``segment``, the thickest where several lie there; ``None`` without one."""
@@ -147,8 +147,8 @@ def room_interior(plan: FloorPlan, room_id: str) -> Polygon:
 def room_interiors(plan: FloorPlan, room_ids: Sequence[str]) -> dict[str, Polygon]:
     """The free floors of several rooms, by id; see :func:`room_interior`."""
     rooms = {room.id: room for room in plan.rooms}
-    lines = shapely.linestrings(np.array([wall.segment for wall in plan.walls], dtype=np.float64).reshape(-1, 2, 2))
-    tree = STRtree(lines)
+    segments = np.array([wall.segment for wall in plan.walls], dtype=np.float64).reshape(-1, 2, 2)
+    tree = STRtree(np.asarray(shapely.linestrings(segments)))
     reach = max((wall.thickness for wall in plan.walls), default=0.0)
     interiors = {}
     for room_id in room_ids:
@@ -167,8 +167,8 @@ def _interior(room: PlanRoom, walls: Sequence[Wall]) -> Polygon:
 
 def areal(geometry: BaseGeometry) -> Polygon | MultiPolygon:
     """The polygons of any geometry, without points, lines and slivers below 1e-6 square metres."""
-    parts = shapely.get_parts(geometry)
-    parts = [p for g in parts for p in shapely.get_parts(g) if isinstance(p, Polygon) and p.area > 1e-6]
+    found = [p for g in shapely.get_parts(geometry) for p in shapely.get_parts(g)]
+    parts = [p for p in found if isinstance(p, Polygon) and p.area > 1e-6]
     return parts[0] if len(parts) == 1 else MultiPolygon(parts)
 
 

@@ -153,7 +153,10 @@ def _from_segments(space: Any, metres: float) -> Polygon | None:
         points = [_point(point, metres) for point in children(segment, "point")]
         if len(points) == 2 and None not in points and points[0] != points[1]:
             lines.append(shapely.LineString(points))  # type: ignore[arg-type]
-    faces = shapely.get_parts(shapely.polygonize(lines)) if lines else []
+    if not lines:
+        return None
+    found = shapely.get_parts(shapely.polygonize(lines))
+    faces = [face for face in found if isinstance(face, Polygon)]
     return max(faces, key=lambda face: face.area, default=None)
 
 
@@ -290,9 +293,10 @@ def _place(
 def _unreached(rooms: tuple[PlanRoom, ...], doors: list[PlanDoor], openings: list[Opening]) -> list[str]:
     import networkx as nx
 
-    graph = nx.Graph()
+    graph: nx.Graph[str] = nx.Graph()
     graph.add_nodes_from(room.id for room in rooms)
-    graph.add_edges_from(passage.rooms for passage in (*doors, *openings))
+    sides = [door.rooms for door in doors] + [opening.rooms for opening in openings]
+    graph.add_edges_from((a, b) for a, b in sides if a is not None and b is not None)
     parts = sorted(nx.connected_components(graph), key=lambda part: (-len(part), min(part)))
     apart = [room for part in parts[1:] for room in sorted(part)]
     return [f"{len(apart)} rooms are not connected to the rest: {', '.join(apart)}"] if apart else []

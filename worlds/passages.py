@@ -18,7 +18,8 @@ def hung(doors: Sequence[PlanDoor], openings: Sequence[Opening], rooms: Sequence
 
     That is the room with fewer passages; between equals the one that is no circulation, then the smaller one.
     """
-    passages = Counter(room for p in (*doors, *openings) for room in p.rooms if room is not None)
+    sides = [p.rooms for p in doors] + [p.rooms for p in openings]
+    passages = Counter(room for pair in sides for room in pair if room is not None)
     by_id = {room.id: room for room in rooms}
 
     def closes(room: str) -> tuple[bool, int, bool, float, str]:
@@ -27,8 +28,8 @@ def hung(doors: Sequence[PlanDoor], openings: Sequence[Opening], rooms: Sequence
 
     result = []
     for door in doors:
-        sides = [room for room in door.rooms if room is not None]
-        result.append(replace(door, opens_into=min(sides, key=closes)))
+        inside = [room for room in door.rooms if room is not None]
+        result.append(replace(door, opens_into=min(inside, key=closes)))
     return tuple(result)
 
 

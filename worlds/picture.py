@@ -7,6 +7,7 @@ from typing import Any
 
 import shapely
 from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry.polygon import orient
 
 from closedrooms.core.files import write_bytes
 from closedrooms.worlds.geometry import door_leaf, wall_area
@@ -76,8 +77,8 @@ def _fill(axes: Any, area: Polygon | MultiPolygon, colour: str, *, edgecolor: st
 
     for polygon in area.geoms if isinstance(area, MultiPolygon) else [area]:
         if not polygon.is_empty:
-            rings = [Outline(shapely.get_coordinates(ring), closed=True) for ring in
-                     (shapely.orient_polygons(polygon).exterior, *shapely.orient_polygons(polygon).interiors)]  # fmt: skip
+            turned = orient(polygon)
+            rings = [Outline(ring.coords, closed=True) for ring in (turned.exterior, *turned.interiors)]
             axes.add_patch(PathPatch(Outline.make_compound_path(*rings), facecolor=colour, edgecolor=edgecolor, lw=0.5))
 
 

@@ -66,7 +66,8 @@ SCHOOL = (
 BAYS = {"office": OFFICE, "school": SCHOOL}
 END_ROOMS = {
     "office": (("conference room", (6.0, 9.0), (6.0, 8.5)), ("stairs", (2.6, 3.2), (4.0, 5.5))),
-    "school": (("gym", (11.0, 15.0), (13.0, 18.0)), ("stairs", (3.2, 4.0), (5.0, 6.0)), ("hall", (9.0, 12.0), (9.0, 13.0))),
+    "school": (("gym", (11.0, 15.0), (13.0, 18.0)), ("stairs", (3.2, 4.0), (5.0, 6.0)),
+               ("hall", (9.0, 12.0), (9.0, 13.0))),
 }  # fmt: skip
 # Lengths of the main corridor by size [m].
 LENGTHS = {

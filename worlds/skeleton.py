@@ -1,5 +1,6 @@
 """Corridors of a generated building, and the runs along them where rooms go (generator version 1)."""
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -135,7 +136,7 @@ def ring(rng: np.random.Generator, m: Measures) -> Skeleton:
         if not court and i in (0, 2):
             origin = _shift(start, angle, w / 2, w / 2)
             runs.append(Run(origin, angle, 1, inner_x, core_depth, 0.0, core_depth))
-    return Skeleton(shapely.difference(outer, inner), tuple(runs), (), w)
+    return Skeleton(Polygon(outer.exterior, [inner.exterior]), tuple(runs), (), w)
 
 
 SHAPES: dict[str, Callable[[np.random.Generator, Measures], Skeleton]] = {
@@ -165,8 +166,8 @@ def _shift(point: Point, angle: float, along: float, left: float) -> Point:
 def _along(points: list[Point], m: Measures, sides: list[tuple[float, float]]) -> Skeleton:
     """A corridor along a polyline, with runs on both sides of each leg."""
     w = m.width
-    angles = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in zip(points, points[1:], strict=False)]
-    turns = [0.0, *(math.remainder(b - a, 2 * math.pi) for a, b in zip(angles, angles[1:], strict=False)), 0.0]
+    angles = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in itertools.pairwise(points)]
+    turns = [0.0, *(math.remainder(b - a, 2 * math.pi) for a, b in itertools.pairwise(angles)), 0.0]
     runs = []
     for i, angle in enumerate(angles):
         length = math.dist(points[i], points[i + 1])
@@ -192,12 +193,13 @@ def _branched(rng: np.random.Generator, m: Measures, angle: float) -> Skeleton:
     w = m.width
     at = _step(m.legs[0] * rng.uniform(0.35, 0.65))
     end = (at + m.legs[1] * math.cos(angle), m.legs[1] * math.sin(angle))
-    corridor = shapely.union_all(
+    joined = shapely.union_all(
         [
             LineString([(0.0, 0.0), (m.legs[0], 0.0)]).buffer(w / 2, cap_style="flat"),
             LineString([(at, 0.0), end]).buffer(w / 2, cap_style="flat"),
         ]
     )
+    corridor = Polygon(shapely.get_coordinates(shapely.get_exterior_ring(joined)))
     left, right = m.depths
     lower = 0.0 if rng.random() < 0.25 else right
     # The branch crosses the main corridor's upper face between these places.

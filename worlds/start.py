@@ -83,9 +83,9 @@ def _largest_part(plan: FloorPlan) -> set[str]:
     """The connected part of the building with the largest area, every door open."""
     import networkx as nx
 
-    graph = nx.Graph()
+    graph: nx.Graph[str] = nx.Graph()
     graph.add_nodes_from(room.id for room in plan.rooms)
-    graph.add_edges_from(p.rooms for p in plan.passages if None not in p.rooms)
+    graph.add_edges_from((a, b) for a, b in (p.rooms for p in plan.passages) if a is not None and b is not None)
     area = {room.id: room.polygon.area for room in plan.rooms}
     parts = [set(part) for part in nx.connected_components(graph)]
     return max(parts, key=lambda part: (sum(area[room] for room in sorted(part)), min(part)))

@@ -110,8 +110,8 @@ def reachable(
     shut = [door.segment for door in plan.doors if door.id in closed]
     if shut:
         half = max(LEAF_THICKNESS / 2, 0.51 * frame.resolution)
-        bands = shapely.polygons(rectangles(np.array(shut, dtype=np.float64), np.full(len(shut), half)))
-        free &= ~_fill(list(bands), frame, map_T_world)
+        bands = map(Polygon, rectangles(np.array(shut, dtype=np.float64), np.full(len(shut), half)))
+        free &= ~_fill(bands, frame, map_T_world)
     start = frame.to_cells(map_T_world.transform(np.array(start_world_xy)))
     if not frame.contains(start) or not free[start[0], start[1]]:
         return np.zeros(frame.shape, dtype=np.bool_)

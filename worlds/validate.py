@@ -46,9 +46,12 @@ def validate(plan: FloorPlan, where: str = "") -> None:
 
 
 def _check_names(plan: FloorPlan, where: str) -> None:
-    kinds = {"room": plan.rooms, "wall": plan.walls, "furniture": plan.furniture}
-    names = [(kind, element.id) for kind, elements in kinds.items() for element in elements]
-    names += [("door or opening", p.id) for p in plan.passages]
+    names = [
+        *(("room", room.id) for room in plan.rooms),
+        *(("wall", wall.id) for wall in plan.walls),
+        *(("door or opening", passage.id) for passage in plan.passages),
+        *(("piece of furniture", thing.id) for thing in plan.furniture),
+    ]
     seen: set[tuple[str, str]] = set()
     for kind, name in names:
         if (kind, name) in seen:
@@ -146,7 +149,7 @@ def _check_sides(name: str, passage: PlanDoor | Opening, rooms: dict[str, Polygo
 
 def _on_walls(plan: FloorPlan, segments: Sequence[Segment]) -> list[bool]:
     """Whether each segment lies on the walls' centre lines along its whole length."""
-    lines = shapely.linestrings(np.array([wall.segment for wall in plan.walls], dtype=np.float64))
+    lines = np.asarray(shapely.linestrings(np.array([wall.segment for wall in plan.walls], dtype=np.float64)))
     tree = STRtree(lines)
     result = []
     for segment in segments:
