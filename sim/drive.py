@@ -15,6 +15,8 @@ ARC_TURN = 0.5
 # Beside obstacles an arc is cut into chords of this length [m] and turn [rad]: they leave it by less than 0.3 mm.
 CHORD_LENGTH = 0.02
 CHORD_TURN = 0.1
+# A robot that gets less than this share of its way is stopped; what gets more slides along, its wheels slipping.
+STALLED = 0.1
 
 
 class Motion(NamedTuple):
@@ -74,7 +76,7 @@ class Drive:
             v0, w0 = self.v, self.w
             self.v = _towards(v0, v, limits.max_acceleration * time)
             self.w = _towards(w0, w, limits.max_turn_acceleration * time)
-            motion = self._arc((v0 + self.v) / 2 * time, (w0 + self.w) / 2 * time, time)
+            motion = self._arc((v0 + self.v) / 2 * time, (w0 + self.w) / 2 * time)
             sink(motion)
             left -= time
 
@@ -95,15 +97,15 @@ class Drive:
             time = ARC_TURN / turning
         return time
 
-    def _arc(self, way: float, turn: float, time: float) -> Motion:
+    def _arc(self, way: float, turn: float) -> Motion:
         edges = self._obstacles.near(self.x, self.y) if way else ()
         if not edges or distance(self.x, self.y, edges) > self.config.radius + SKIN + abs(way):
             motion = Motion(*_chord(way, turn), turn)
             self._apply(motion)
             return motion
-        return self._arc_beside(way, turn, time, edges)
+        return self._arc_beside(way, turn, edges)
 
-    def _arc_beside(self, way: float, turn: float, time: float, edges: Sequence[Edge]) -> Motion:
+    def _arc_beside(self, way: float, turn: float, edges: Sequence[Edge]) -> Motion:
         """An arc that may meet something, chord by chord."""
         x0, y0, theta0 = self.x, self.y, self.theta
         chords = max(math.ceil(abs(way) / CHORD_LENGTH), math.ceil(abs(turn) / CHORD_TURN), 1)
@@ -120,9 +122,8 @@ class Drive:
         motion = Motion(c * dx + s * dy, c * dy - s * dx, turn)
         if touched:
             self.collided = True
-            # What stops the body stalls the wheels: the next piece speeds up from what was really driven.
-            driven = (dx * math.cos(theta0 + turn / 2) + dy * math.sin(theta0 + turn / 2)) / time
-            self.v = math.copysign(min(abs(driven), abs(self.v)), self.v) if driven * self.v > 0 else 0.0
+            if math.hypot(dx, dy) < STALLED * abs(way):
+                self.v = 0.0
         return motion
 
     def _apply(self, motion: Motion) -> None:

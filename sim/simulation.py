@@ -8,6 +8,7 @@ from typing import Self
 
 from shapely.geometry import Polygon
 
+from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import DoorSighting, Point
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
@@ -41,6 +42,7 @@ class Simulation:
         self.plan = plan
         self.config = config
         self._closed = frozenset(closed)
+        self._stack = contextlib.ExitStack()
         self._seed = seed
         start = start_pose(plan)
         self.world_T_map = start if config.heading is None else Pose2(start.x, start.y, config.heading)
@@ -116,6 +118,10 @@ class Simulation:
             for door in seen
         )
         return Observation(scan, self._odometry.pose, sightings, self._map_T_world @ world_T_robot, self._time)
+
+    def true_ranges(self, world_T_robot: Pose2) -> FloatArray:
+        """What the lidar would measure without noise from anywhere, shape (beams,) [m], infinity without a return."""
+        return self._lidar.cast(world_T_robot)[0]
 
     def step(self, v: float, w: float, duration: float) -> None:
         """Let time pass under a velocity command.

@@ -1,0 +1,211 @@
+"""The whole simulation: repeatable, tidy, and clear about what it does not take."""
+
+import dataclasses
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.pose import Pose2
+from closedrooms.sim.config import (
+    LIDAR_PRESETS,
+    NOISE_LEVELS,
+    LidarConfig,
+    NoiseConfig,
+    RobotConfig,
+    SimConfig,
+    lidar_preset,
+    noise_level,
+)
+from closedrooms.sim.observation import Observation
+from closedrooms.sim.simulation import Simulation
+from closedrooms.worlds.plan import FloorPlan
+
+
+def drive_around(plan: FloorPlan, config: SimConfig, seed: int, steps: int = 30) -> list[Observation]:
+    with Simulation(plan, ["hinged", "sliding"], config, seed) as sim:
+        seen = []
+        for i in range(steps):
+            seen.append(sim.observe())
+            sim.step(0.5, 0.5 * math.sin(i / 5), 0.1)
+            if i == 10:
+                sim.open_door("hinged")
+        return seen
+
+
+def as_bytes(seen: list[Observation]) -> bytes:
+    return b"".join(
+        np.concatenate((o.scan.ranges, o.odometry.as_tuple(), o.map_T_robot_true.as_tuple(), [o.stamp])).tobytes()
+        + repr(o.sightings).encode()
+        for o in seen
+    )
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_does_not(plan: FloorPlan) -> None:
+    config = SimConfig(noise=noise_level("high"))
+    assert as_bytes(drive_around(plan, config, 4)) == as_bytes(drive_around(plan, config, 4))
+    assert as_bytes(drive_around(plan, config, 4)) != as_bytes(drive_around(plan, config, 5))
+
+
+def test_noise_of_one_source_leaves_the_others_alone(plan: FloorPlan) -> None:
+    base = noise_level("high")
+    first = drive_around(plan, SimConfig(noise=base), 4, 5)
+    odometry = drive_around(plan, SimConfig(noise=dataclasses.replace(base, way=0.5)), 4, 5)
+    assert first[-1].odometry != odometry[-1].odometry
+    np.testing.assert_array_equal(first[-1].scan.ranges, odometry[-1].scan.ranges)
+    dropouts = drive_around(plan, SimConfig(noise=dataclasses.replace(base, dropouts=0.5)), 4, 5)
+    both = np.isfinite(first[-1].scan.ranges) & np.isfinite(dropouts[-1].scan.ranges)
+    assert 100 < both.sum() < 600
+    np.testing.assert_array_equal(first[-1].scan.ranges[both], dropouts[-1].scan.ranges[both])
+    assert first[-1].odometry == dropouts[-1].odometry
+
+
+def test_noise_does_not_change_where_the_robot_is(plan: FloorPlan) -> None:
+    quiet = drive_around(plan, SimConfig(noise=noise_level("none")), 0)
+    loud = drive_around(plan, SimConfig(noise=noise_level("high")), 0)
+    assert [o.map_T_robot_true for o in quiet] == [o.map_T_robot_true for o in loud]
+
+
+def test_the_range_noise_is_as_large_as_set(plan: FloorPlan) -> None:
+    config = SimConfig(noise=NoiseConfig(range_sd=0.05, dropouts=0.02, outliers=0.01))
+    with Simulation(plan, [], config, 0) as sim:
+        true = sim.true_ranges(sim.world_T_robot)
+        ranges = np.array([sim.observe().scan.ranges for _ in range(60)])
+    error = (ranges - true).ravel()
+    dropped = np.isnan(error)
+    assert dropped.mean() == pytest.approx(0.02, abs=0.003)
+    wild = np.abs(error[~dropped]) > 0.3
+    assert 0.007 < wild.mean() < 0.012
+    assert error[~dropped][~wild].std() == pytest.approx(0.05, rel=0.03)
+    assert abs(error[~dropped][~wild].mean()) < 0.002
+    outliers = ranges.ravel()[~dropped][wild]
+    assert outliers.min() >= config.lidar.range_min
+    assert outliers.max() < config.lidar.range_max
+    assert np.mean(outliers) == pytest.approx(10.0, rel=0.1)
+
+
+def test_what_is_too_near_gives_no_measurement(plan: FloorPlan) -> None:
+    config = SimConfig(lidar=LidarConfig(range_min=3.0), noise=noise_level("none"))
+    with Simulation(plan, ["hinged"], config, 0) as sim:
+        seen = sim.observe()
+        true = sim.true_ranges(sim.world_T_robot)
+    np.testing.assert_array_equal(np.isnan(seen.scan.ranges), true < 3.0)
+    assert seen.sightings == ()
+
+
+def test_without_noise_the_odometry_is_the_pose_in_the_map_even_when_it_slides(plan: FloorPlan) -> None:
+    with Simulation(plan, ["hinged"], SimConfig(noise=noise_level("none")), 0) as sim:
+        touched = False
+        for _ in range(150):
+            sim.step(0.8, 0.1, 0.1)
+            touched |= sim.collided
+        seen = sim.observe()
+    assert touched
+    assert seen.odometry.distance(seen.map_T_robot_true) < 1e-9
+    assert seen.odometry.theta == pytest.approx(seen.map_T_robot_true.theta, abs=1e-9)
+
+
+def test_the_map_frame_is_the_start_pose_with_the_heading_that_was_set(plan: FloorPlan) -> None:
+    for heading, expected in ((None, 0.3), (1.0, 1.0)):
+        with Simulation(plan, [], SimConfig(heading=heading), 0) as sim:
+            assert sim.world_T_map == Pose2(2.0, 2.0, expected)
+            assert sim.observe().map_T_robot_true.distance(Pose2()) < 1e-12
+            sim.step(0.5, 0.0, 1.0)
+            again = sim.world_T_map @ sim.map_T_robot
+            assert again.distance(sim.world_T_robot) < 1e-12
+
+
+def test_time_passes_as_told(plan: FloorPlan) -> None:
+    with Simulation(plan, [], SimConfig(), 0) as sim:
+        assert sim.time == 0.0
+        sim.step(0.0, 0.0, 0.25)
+        sim.step(1.0, 0.0, 0.5)
+        assert sim.time == pytest.approx(0.75)
+        assert sim.observe().stamp == sim.time
+        assert sim.observe().scan.stamp == sim.time
+
+
+def clients() -> int:
+    import pybullet
+
+    return sum(pybullet.isConnected(physicsClientId=i) for i in range(64))
+
+
+def test_every_client_is_disconnected_whatever_happens(plan: FloorPlan) -> None:
+    with Simulation(plan, [], SimConfig(), 0):
+        before = clients() - 1
+    for _ in range(5):
+        with Simulation(plan, [], SimConfig(), 0) as sim:
+            sim.observe()
+        with pytest.raises(InvalidInputError), Simulation(plan, ["nowhere"], SimConfig(), 0):
+            pass
+        with pytest.raises(RuntimeError, match="stop"), Simulation(plan, [], SimConfig(), 0):
+            raise RuntimeError("stop")
+    assert clients() == before
+
+
+def test_a_start_where_the_robot_does_not_fit_is_refused(plan: FloorPlan) -> None:
+    inside, beside = (6.0, 4.0, 0.0), (6.0, 3.8, 0.0)
+    for start in (inside, beside):
+        with (
+            pytest.raises(InvalidInputError, match="start"),
+            Simulation(dataclasses.replace(plan, start=start), ["double"], SimConfig(), 0),
+        ):
+            pass
+
+
+def test_a_command_that_is_no_number_is_refused(plan: FloorPlan) -> None:
+    with Simulation(plan, [], SimConfig(), 0) as sim:
+        for v, w, duration in ((math.nan, 0.0, 0.1), (0.0, math.nan, 0.1), (0.0, 0.0, 0.0), (0.0, 0.0, math.inf)):
+            with pytest.raises(InvalidInputError):
+                sim.step(v, w, duration)
+
+
+def test_settings_that_make_no_sense_are_refused() -> None:
+    for make in (
+        lambda: LidarConfig(beams=0),
+        lambda: LidarConfig(field_of_view=7.0),
+        lambda: LidarConfig(range_min=5.0, range_max=4.0),
+        lambda: LidarConfig(rate=0.0),
+        lambda: RobotConfig(radius=-0.1),
+        lambda: RobotConfig(max_speed=math.inf),
+        lambda: NoiseConfig(dropouts=1.5),
+        lambda: NoiseConfig(way=math.nan),
+        lambda: SimConfig(heading=math.nan),
+        lambda: SimConfig(lidar=LidarConfig(mount=(0.5, 0.0, 0.0))),
+        lambda: noise_level("loud"),
+        lambda: lidar_preset("laser"),
+    ):
+        with pytest.raises(InvalidInputError):
+            make()
+
+
+@pytest.mark.parametrize("name", list(LIDAR_PRESETS))
+def test_every_lidar_preset_scans(plan: FloorPlan, name: str) -> None:
+    lidar = lidar_preset(name)
+    with Simulation(plan, [], SimConfig(lidar=lidar), 0) as sim:
+        scan = sim.observe().scan
+    assert scan.ranges.shape == (lidar.beams,)
+    span = scan.angle_increment * (lidar.beams - (lidar.field_of_view < 6.28))
+    assert span == pytest.approx(lidar.field_of_view)
+    assert scan.angles[0] == pytest.approx(-lidar.field_of_view / 2)
+
+
+def test_the_configuration_imports_nothing_heavy() -> None:
+    code = "import sys, closedrooms.sim.config; print(*sorted({m.split('.')[0] for m in sys.modules}))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"numpy", "shapely", "pybullet", "trimesh"} & set(loaded)
+
+
+def test_pybullet_keeps_quiet_when_it_is_imported() -> None:
+    code = "from closedrooms.sim.physics import PhysicsWorld\nwith PhysicsWorld(): pass"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout + done.stderr == ""
+
+
+def test_the_levels_can_be_named() -> None:
+    assert all(noise_level(name) is level for name, level in NOISE_LEVELS.items())
+    assert SimConfig().noise == NOISE_LEVELS["medium"]
