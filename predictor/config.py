@@ -51,7 +51,7 @@ class StructureConfig:
     collinear_distance: float = 0.35
     """Segments of one direction closer than this belong to one wall [m]."""
 
-    merge_distance: float = 0.50
+    merge_distance: float = 0.60
     """Walls of one direction whose lines are closer than this share a line [m]."""
 
     border_margin: float = 1.0
