@@ -6,10 +6,14 @@ Heavy libraries are imported by the command that needs them, so that ``--help`` 
 
 import os
 import sys
+from argparse import ArgumentError, ArgumentParser
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from closedrooms.core.errors import ClosedroomsError
+
+if TYPE_CHECKING:
+    from closedrooms.pipeline.config import RunConfig
 
 DONE, BAD_INPUT, WRONG_USAGE, PARTLY_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -79,17 +83,39 @@ def _complain(text: str) -> None:
     sys.stderr.write(f"closedrooms: {' '.join(text.split())}\n")
 
 
-def _parse(config: type[Config], name: str, words: Sequence[str], summary: str) -> Config:
+def _parse(
+    config: type[Config], name: str, words: Sequence[str], summary: str, *, default: Config | None = None
+) -> Config:
     """Options of one command; wrong usage ends the program with status 2, ``--help`` with 0 (both by tyro)."""
     import tyro
 
-    return tyro.cli(config, prog=f"closedrooms {name}", description=summary, args=list(words))
+    return tyro.cli(config, prog=f"closedrooms {name}", description=summary, args=list(words), default=default)
+
+
+def _named_presets(words: Sequence[str]) -> "RunConfig":
+    """Defaults of ``run`` with the numbers that ``--noise`` and ``--lidar`` name, so that each can be set by itself."""
+    from dataclasses import replace
+
+    from closedrooms.pipeline.config import RunConfig
+    from closedrooms.sim.config import LIDAR_PRESETS, NOISE_LEVELS
+
+    parser = ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
+    parser.add_argument("--noise", default="medium")
+    parser.add_argument("--lidar", default="default")
+    try:
+        named, _ = parser.parse_known_args(list(words))
+    except ArgumentError:
+        return RunConfig()
+    noise, lidar = NOISE_LEVELS.get(named.noise), LIDAR_PRESETS.get(named.lidar)
+    if noise is None or lidar is None:
+        return RunConfig()
+    return RunConfig(sim=replace(RunConfig().sim, noise=noise, lidar=lidar))
 
 
 def _run(words: Sequence[str]) -> int:
     from closedrooms.pipeline.config import RunConfig
 
-    config = _parse(RunConfig, "run", words, COMMANDS["run"][0])
+    config = _parse(RunConfig, "run", words, COMMANDS["run"][0], default=_named_presets(words))
     from closedrooms.pipeline.run import run
     from closedrooms.pipeline.terminal import Terminal
 

@@ -11,16 +11,17 @@ from closedrooms.coverage.config import CoverageConfig
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.navigation_config import NavigationConfig
 from closedrooms.predictor.config import Phi, PredictorConfig, PresetName, Structure
-from closedrooms.sim.config import SimConfig
+from closedrooms.sim.config import LidarConfig, NoiseConfig, SimConfig, lidar_preset, noise_level
 
 NoiseName = Literal["none", "low", "medium", "high"]
+LidarName = Literal["default", "hokuyo-utm-30lx", "hokuyo-urg-04lx", "sick-lms111", "rplidar-a2", "robotis-lds-01"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunConfig:
     """Options of ``closedrooms run``."""
 
-    world: tyro.conf.Positional[str] = "office-01"
+    world: tyro.conf.Positional[str] = "office-07"
     """Name of a bundled world (see ``closedrooms worlds list``) or a file that the importers read."""
 
     close: int | None = None
@@ -34,6 +35,9 @@ class RunConfig:
 
     noise: NoiseName = "medium"
     """Noise of lidar and odometry; each of its numbers can be set by itself under ``--sim.noise``."""
+
+    lidar: LidarName = "default"
+    """Laser scanner: 720 beams all round, 20 m, 10 Hz, or a real sensor; its numbers are under ``--sim.lidar``."""
 
     seed: int = 0
     """The one seed of the run: which rooms are closed, and every source of noise."""
@@ -117,6 +121,14 @@ class PredictConfig:
         default_factory=PredictorConfig
     )
     """All settings, for use as a library; the three above are laid over it."""
+
+
+def sim_config(config: RunConfig) -> SimConfig:
+    """Settings of the simulation: noise level and lidar by name, where their numbers were not set one by one."""
+    sim = config.sim
+    noise = noise_level(config.noise) if sim.noise == NoiseConfig() else sim.noise
+    lidar = lidar_preset(config.lidar) if sim.lidar == LidarConfig() else sim.lidar
+    return replace(sim, noise=noise, lidar=lidar)
 
 
 def predictor_config(config: RunConfig | PredictConfig) -> PredictorConfig:

@@ -23,7 +23,7 @@ from closedrooms.coverage.features import tour_features
 from closedrooms.coverage.tour import CoverageTour
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import ate
-from closedrooms.pipeline.config import RunConfig, predictor_config
+from closedrooms.pipeline.config import RunConfig, predictor_config, sim_config
 from closedrooms.pipeline.explore import ExplorationResult, explore
 from closedrooms.pipeline.manifest import resolved, versions
 from closedrooms.pipeline.metrics import area_mapped, mean, room_iou, rooms_seen
@@ -33,7 +33,6 @@ from closedrooms.pipeline.terminal import Progress, Silent
 from closedrooms.pipeline.witness import Witness
 from closedrooms.predictor.predict import predict
 from closedrooms.predictor.prediction import Prediction
-from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.closing import check_closed, closable_rooms, draw_closed
 from closedrooms.worlds.library import load_world
@@ -76,6 +75,7 @@ class RunResult:
         seen: Closed doors that the robot saw.
         failures: Why a seen door could not be predicted, by door id.
         durations: Seconds by stage.
+        exploration: ``exploration`` of ``run.json``: status, simulated seconds, scans, way.
     """
 
     folder: Path
@@ -85,6 +85,7 @@ class RunResult:
     seen: tuple[str, ...]
     failures: dict[str, str] = field(default_factory=dict)
     durations: dict[str, float] = field(default_factory=dict)
+    exploration: dict[str, Any] = field(default_factory=dict)
 
     def table(self) -> list[tuple[str, str]]:
         """Rows for people; the first is the head."""
@@ -108,6 +109,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
         OutputError: The run directory cannot be written, or holds something that is not ours.
     """
     progress, watch = progress or Silent(), Stopwatch()
+    config = replace(config, sim=sim_config(config))
     with watch.stage("world"):
         progress.stage("world")
         plan = load_world(config.world, level=config.level)
@@ -124,7 +126,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
     with (
         output_folder(folder, manifest) as staging,
         recording(config, plan, staging / "run.rrd") as observer,
-        Simulation(plan, closed, sim_config(config), config.seed) as sim,
+        Simulation(plan, closed, config.sim, config.seed) as sim,
     ):
         map_T_world = sim.world_T_map.inverse()
         observer.configuration(manifest["configuration"])
@@ -168,6 +170,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
             tuple(door.id for door in survey.doors),
             prediction.failures,
             manifest["durations"],
+            manifest["exploration"],
         )
         observer.table(_markdown(result))
     return result
@@ -186,11 +189,6 @@ def choose_closed(plan: FloorPlan, config: RunConfig) -> tuple[str, ...]:
     if count is None:
         count = min(DEFAULT_CLOSED, len(closable_rooms(plan, several_doors=config.several_doors)))
     return draw_closed(plan, count, stream(config.seed, "closed doors"), several_doors=config.several_doors)
-
-
-def sim_config(config: RunConfig) -> SimConfig:
-    """Settings of the simulation at the noise level of the run."""
-    return replace(config.sim, noise=noise_level(config.noise))
 
 
 @contextlib.contextmanager
@@ -214,7 +212,7 @@ def _survey(
 ) -> Survey:
     """Explore and map."""
     progress.stage("explore")
-    exploration = explore(witness, mapper, config.navigation, observer)
+    exploration = explore(witness, mapper, config.navigation, observer, period=1.0 / config.sim.lidar.rate)
     for name, seconds in exploration.wall_seconds.items():
         watch.add(name, seconds)
     with watch.stage("finish map"):
