@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import rerun as rr
 import rerun.blueprint as rrb
 
 from closedrooms.pipeline import colours
@@ -19,7 +20,8 @@ class Layout:
     """Which stages a recording has.
 
     Attributes:
-        bounds: ``x_min, y_min, x_max, y_max`` [m] in the map frame that a map seen from above shows.
+        bounds: ``x_min, y_min, x_max, y_max`` [m] in the map frame that a map seen from above shows; a recorder
+            replaces them by those of the building or of the map as soon as it knows them.
         building: There is a simulated building (tab ``Building``).
         mapping: There is a robot that maps (tab ``Mapping``).
         prediction: There is a prediction (tabs ``Structure``, ``Expansion``, ``Rooms``).
@@ -28,7 +30,7 @@ class Layout:
         active: Name of the tab in front, by default the last stage but the tables.
     """
 
-    bounds: Bounds
+    bounds: Bounds = (-20.0, -20.0, 20.0, 20.0)
     building: bool = True
     mapping: bool = True
     prediction: bool = True
@@ -77,11 +79,11 @@ def _building(layout: Layout) -> rrb.Container:
         contents=["+ /building/**", "+ /map/grid", "+ /map/scan", "+ /map/path/truth", "+ /rooms/predicted/**"],
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,
-            position=(cx - 0.1 * reach, cy - 0.72 * reach, 0.62 * reach),
-            look_target=(cx, cy - 0.04 * reach, 0.0),
+            position=(cx, cy - 0.55 * reach, 0.72 * reach),
+            look_target=(cx, cy - 0.02 * reach, 0.0),
             eye_up=(0.0, 0.0, 1.0),
         ),
-        background=rrb.BackgroundKind.GradientBright,
+        background=BACKGROUND,
         line_grid=False,
     )
     side = rrb.Vertical(
@@ -96,11 +98,11 @@ def _building(layout: Layout) -> rrb.Container:
 def _mapping(layout: Layout) -> rrb.Container:
     view = _from_above(layout, "Map", ["+ /map/**"], aspect=1.3)
     side = rrb.Vertical(
-        rrb.TimeSeriesView(origin="/metrics/position_error", name="Position error [m]", plot_legend=_legend()),
-        rrb.TimeSeriesView(origin="/metrics/heading_error", name="Heading error [deg]", plot_legend=_legend()),
-        rrb.TimeSeriesView(origin="/metrics/known_area", name="Known area [m²]", plot_legend=_legend()),
-        _log(),
-        row_shares=[3, 3, 3, 2],
+        _series("position_error", "Position error [m]"),
+        _series("heading_error", "Heading error [deg]"),
+        _series("known_area", "Known area [m²]"),
+        rrb.Tabs(rrb.TextDocumentView(origin="/legend", name="Colours"), _log(), active_tab=0),
+        row_shares=[3, 3, 3, 3],
     )
     return rrb.Horizontal(view, side, column_shares=[2, 1], name="Mapping")
 
@@ -129,30 +131,34 @@ def _expansion(layout: Layout) -> rrb.Container:
     )
     side = rrb.Vertical(
         rrb.TextDocumentView(origin="/stage", name="Stage"),
-        rrb.TimeSeriesView(origin="/metrics/score", name="Score of each room by level (timeline: stage)"),
-        row_shares=[1, 2],
+        rrb.TimeSeriesView(origin="/metrics/score", name="Score of each room by level (on the timeline stage)"),
+        rrb.TextDocumentView(origin="/prediction/scores", name="Scores"),
+        row_shares=[2, 3, 3],
     )
     return rrb.Horizontal(view, side, column_shares=[2, 1], name="Expansion")
 
 
 def _rooms(layout: Layout) -> rrb.Container:
-    return rrb.Horizontal(
-        _from_above(layout, "Predicted map", ["+ /rooms/predicted/**"], aspect=0.8),
-        _from_above(layout, "Truth", ["+ /rooms/truth/**"], aspect=0.8),
-        name="Rooms",
-    )
+    """Prediction and truth, one above the other where the building is wide."""
+    wide = _is_wide(layout)
+    aspect = 3.0 if wide else 0.8
+    views = [_from_above(layout, "Predicted map", ["+ /rooms/predicted/**"], aspect=aspect)]
+    if layout.building:
+        views.append(_from_above(layout, "Truth", ["+ /rooms/truth/**"], aspect=aspect))
+    stack = rrb.Vertical if wide else rrb.Horizontal
+    return stack(*views, name="Rooms")
 
 
 def _coverage(layout: Layout) -> rrb.Container:
-    views = [
-        _from_above(layout, title, [f"+ /coverage/{name}/**", f"+ {grid}"], aspect=0.55)
+    views: list[rrb.View] = [
+        _from_above(layout, title, [f"+ /coverage/{name}/**", f"+ {grid}"])
         for name, title, grid in (
-            ("closed", "Tour on the closed map M", "/prediction/input"),
+            ("closed", "Tour on the map M with its closed doors", "/prediction/input"),
             ("predicted", "Tour on the predicted map", "/rooms/predicted/grid"),
             ("truth", "Tour on the true map", "/rooms/truth/grid"),
         )
     ]
-    return rrb.Horizontal(*views, name="Coverage")
+    return rrb.Grid(*views, rrb.TextDocumentView(origin="/result", name="Result"), grid_columns=2, name="Coverage")
 
 
 def _driving(layout: Layout) -> rrb.Container:
@@ -164,7 +170,7 @@ def _driving(layout: Layout) -> rrb.Container:
     )
     side = rrb.Vertical(
         rrb.StateTimelineView(origin="/door_states", name="Closed doors"),
-        rrb.TimeSeriesView(origin="/metrics/known_area", name="Known area [m²]", plot_legend=_legend()),
+        _series("known_area", "Known area [m²]"),
         _log(),
     )
     return rrb.Horizontal(view, side, column_shares=[2, 1], name="Driving")
@@ -182,8 +188,20 @@ def _log() -> rrb.View:
     return rrb.TextLogView(origin="/log", name="Log")
 
 
-def _legend() -> rrb.PlotLegend:
-    return rrb.PlotLegend(rrb.Corner2D.LeftTop)
+def _series(name: str, title: str) -> rrb.View:
+    """Curves over the whole run, whatever the cursor."""
+    always = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
+    return rrb.TimeSeriesView(
+        origin=f"/metrics/{name}",
+        name=title,
+        axis_x=rrb.TimeAxis(view_range=always),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
+    )
+
+
+def _is_wide(layout: Layout) -> bool:
+    x0, y0, x1, y1 = layout.bounds
+    return x1 - x0 > 1.5 * (y1 - y0)
 
 
 def _from_above(layout: Layout, name: str, contents: Sequence[str], aspect: float = 1.5) -> rrb.View:

@@ -29,9 +29,11 @@ GOAL: Colour = (230, 159, 0)
 SCAN: Colour = (220, 50, 47)
 DOOR_CLOSED: Colour = (200, 40, 40)
 DOOR_OPEN: Colour = (150, 110, 70)
+FURNITURE: Colour = (176, 160, 134)
 WALL: Colour = (188, 184, 176)
 FLOOR: Colour = (238, 236, 230)
 INK: Colour = (60, 60, 70)
+PAPER: Colour = (255, 255, 255)
 LOOP: Colour = (150, 60, 190)
 TOURS: dict[str, Colour] = {
     "closed": (117, 90, 170),

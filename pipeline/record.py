@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -16,13 +17,13 @@ from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.room import Room
 from closedrooms.core.scan import LaserScan
 from closedrooms.pipeline import colours, drawables
-from closedrooms.pipeline.blueprint import Layout
-from closedrooms.pipeline.recording_building import RecordedBuilding
+from closedrooms.pipeline.blueprint import Bounds, Layout
 from closedrooms.pipeline.recording_prediction import draw_doors, draw_input, draw_rooms, draw_tours, draw_trace
 from closedrooms.pipeline.recording_stream import RecordingStream, Stage
 
 if TYPE_CHECKING:
     from closedrooms.coverage.tour import CoverageTour
+    from closedrooms.pipeline.recording_building import RecordedBuilding
     from closedrooms.predictor.prediction import Prediction
     from closedrooms.sim.observation import Observation
     from closedrooms.worlds.plan import FloorPlan
@@ -32,6 +33,16 @@ SCAN_PERIOD, MAP_PERIOD = 0.5, 2.0
 # A vertex of a drawn path every so many metres.
 PATH_STEP = 0.1
 NOTHING = np.zeros((0, 2))
+LEGEND = """| colour | what |
+| --- | --- |
+| blue | estimated robot and path |
+| green | true robot and path |
+| orange | odometry |
+| red | scan, closed doors |
+| pink | frontiers |
+| yellow | goal and the way there |
+| violet | loops that were closed |
+"""
 
 
 class Recorder:
@@ -50,8 +61,9 @@ class Recorder:
             layout: Which stages there will be, and where the maps lie.
             robot_radius: Size of the robot that is drawn [m].
         """
-        self._stream = RecordingStream(path, name, layout)
+        self._stream = RecordingStream(path, name)
         self._layout = layout
+        self._arranged = False
         self._radius = robot_radius
         self._building: RecordedBuilding | None = None
         self._palette: dict[str, colours.Colour] = {}
@@ -60,10 +72,12 @@ class Recorder:
         self._areas: list[tuple[float, float]] = []
         self._paths: dict[str, list[Point]] = {"odometry": [], "estimate": [], "truth": []}
         self._seen: set[str] = set()
+        self._map_bounds: Bounds | None = None
         self._last_scan = self._last_map = -np.inf
 
     def __enter__(self) -> Self:
         self._stream.__enter__()
+        self._stream.log("legend", _markdown(LEGEND), static=True)
         self._stream.at(0.0 if self._layout.mapping else None, Stage.BUILDING)
         return self
 
@@ -73,6 +87,7 @@ class Recorder:
         try:
             if error is None:
                 self._send_series()
+                self._arrange()
         finally:
             self._stream.__exit__(kind, error, trace)
 
@@ -85,10 +100,14 @@ class Recorder:
 
     def building(self, plan: "FloorPlan", map_T_world: Pose2, closed: Collection[str]) -> None:
         """Walls, floors and doors in three dimensions."""
+        from closedrooms.pipeline.recording_building import RecordedBuilding
+        from closedrooms.worlds.truth import truth_bounds
+
         self._palette = colours.room_colours(closed)
         self._stream.at(0.0, Stage.BUILDING)
         doors, rooms = len(plan.doors), len(plan.rooms)
         self._say("Building", f"{plan.name}: {rooms} rooms, {doors} doors, {len(closed)} of them closed")
+        self._arrange(truth_bounds(plan, map_T_world))
         self._building = RecordedBuilding(self._stream, plan, map_T_world, closed)
         self._draw_robot("building/robot", colours.TRUTH)
 
@@ -133,8 +152,11 @@ class Recorder:
         if not final and not self.wants_map(stamp):
             return
         self._last_map = stamp
+        self._map_bounds = _known_bounds(grid)
         self._stream.at(stamp, self._stage)
         self._stream.log("map/grid", drawables.grid_map(grid))
+        if final:
+            self.frontiers(NOTHING, None, None, stamp)
         self._areas.append((stamp, float(grid.known.sum()) * grid.frame.resolution**2))
         for name, path in self._paths.items():
             if path:
@@ -180,6 +202,7 @@ class Recorder:
     def prediction(self, observed: OccupancyGrid, doors: Sequence[ClosedDoor], prediction: "Prediction") -> None:
         """A prediction from its input to the completed map."""
         self._palette = colours.room_colours({*self._palette, *(door.id for door in doors)})
+        self._arrange(_known_bounds(prediction.grid))
         draw_input(self._stream, observed, doors)
         if prediction.trace is not None:
             draw_trace(self._stream, prediction.trace, self._palette)
@@ -207,6 +230,12 @@ class Recorder:
     def table(self, markdown: str) -> None:
         """The table of results."""
         self._stream.log("result", _markdown(markdown), static=True)
+
+    def _arrange(self, bounds: Bounds | None = None) -> None:
+        """Lay the views out around what is known by now; the first call counts."""
+        if not self._arranged:
+            self._arranged = True
+            self._stream.arrange(replace(self._layout, bounds=bounds or self._map_bounds or self._layout.bounds))
 
     def _say(self, title: str, text: str) -> None:
         self._stream.log("stage", _markdown(f"## {title}\n{text}"))
@@ -253,6 +282,11 @@ class Recorder:
     def _series(self, path: str, stamps: FloatArray, values: FloatArray, name: str, colour: colours.Colour) -> None:
         self._stream.log(path, rr.SeriesLines(colors=[colour], names=[name], widths=[1.5]), static=True)
         self._stream.columns(path, stamps, rr.Scalars.columns(scalars=values))
+
+
+def _known_bounds(grid: OccupancyGrid) -> Bounds | None:
+    window = grid.known_bounds()
+    return None if window is None else grid.frame.cropped(*window).bounds
 
 
 def _markdown(text: str) -> rr.TextDocument:

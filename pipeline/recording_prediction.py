@@ -48,14 +48,16 @@ def draw_trace(stream: RecordingStream, trace: "PredictionTrace", palette: Mappi
     for door, face in sorted(trace.initial.items()):
         stream.log(f"prediction/initial/{door}", drawables.fill([trace.faces[face]], palette[door], alpha=170))
     for level in trace.levels:
-        stream.at(stage=Stage.EXPANSION + level.k)
+        stream.at(stage=min(Stage.EXPANSION + level.k, Stage.ROOMS - 1))
         best = ", ".join(f"{door} {score:.1f}" for door, score in sorted(level.scores.items()))
         _say(stream, f"Expansion, level {level.k}", f"score by door: {best or 'none'} (section 3.4)")
         for door, shape in sorted(level.layouts.items()):
             _draw_room(stream, f"prediction/layouts/{door}", shape, palette[door])
             if door in level.scores:
                 stream.log(f"metrics/score/{door}", rr.Scalars(level.scores[door]))
-    for door in sorted({door for level in trace.levels for door in level.scores}):
+    doors = sorted({door for level in trace.levels for door in level.scores})
+    _draw_scores(stream, trace, doors)
+    for door in doors:
         stream.log(
             f"metrics/score/{door}",
             rr.SeriesLines(colors=[palette[door]], names=[door], widths=[2.0]),
@@ -75,7 +77,7 @@ def draw_rooms(
     places = np.array([shapely.get_coordinates(r.polygon.representative_point())[0] for r in rooms]).reshape(-1, 2)
     stream.log(
         f"{root}/labels",
-        drawables.points(places, colours.INK, radius=drawables.THIN, labels=[_label(r) for r in rooms]),
+        drawables.points(places, colours.PAPER, radius=drawables.THIN, labels=[_label(r) for r in rooms]),
     )
 
 
@@ -94,7 +96,7 @@ def draw_tours(stream: RecordingStream, tours: Mapping[str, "CoverageTour"]) -> 
         stream.log(
             f"coverage/{name}/doors",
             drawables.points(
-                np.array(list(inside.values())), colours.DOOR_CLOSED, radius=drawables.THICK, labels=list(inside)
+                np.array(list(inside.values())), colours.PAPER, radius=drawables.THIN, labels=list(inside)
             ),
         )
         stream.log(
@@ -144,6 +146,16 @@ def _draw_faces(stream: RecordingStream, trace: "PredictionTrace") -> None:
             f"prediction/faces/{name}",
             drawables.fill([face for face, take in zip(trace.faces, chosen, strict=True) if take], colour, alpha=90),
         )
+
+
+def _draw_scores(stream: RecordingStream, trace: "PredictionTrace", doors: Sequence[str]) -> None:
+    """A row a level, a column a door."""
+    rows = [
+        [str(level.k), *(f"{level.scores[door]:.2f}" if door in level.scores else "" for door in doors)]
+        for level in trace.levels
+    ]
+    lines = ["| " + " | ".join(row) + " |" for row in [["level", *doors], ["---:"] * (len(doors) + 1), *rows]]
+    stream.log("prediction/scores", rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN), static=True)
 
 
 def _draw_room(stream: RecordingStream, root: str, shape: BaseGeometry, colour: Colour) -> None:

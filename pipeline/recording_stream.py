@@ -9,6 +9,7 @@ from typing import Any, Self
 import rerun as rr
 
 from closedrooms.core.arrays import FloatArray
+from closedrooms.core.errors import OutputError
 from closedrooms.pipeline.blueprint import Layout, arrange
 
 APPLICATION = "closedrooms"
@@ -18,7 +19,7 @@ NEVER_SECONDS = 1e6
 
 
 class Stage(IntEnum):
-    """Steps of the timeline ``stage``; the expansion's level k is ``EXPANSION + k``."""
+    """Steps of the timeline ``stage``; the expansion's level k is ``EXPANSION + k``, at most the step before ``ROOMS``."""
 
     BUILDING = 0
     MAPPING = 1
@@ -26,10 +27,10 @@ class Stage(IntEnum):
     LINES = 3
     FACES = 4
     INITIAL = 5
-    EXPANSION = 10
-    ROOMS = 40
-    COVERAGE = 50
-    DRIVING = 60
+    EXPANSION = 6
+    ROOMS = 30
+    COVERAGE = 31
+    DRIVING = 32
 
 
 class RecordingStream:
@@ -40,8 +41,8 @@ class RecordingStream:
     No wall clock is recorded, so that equal runs give equal recordings.
     """
 
-    def __init__(self, path: Path, name: str, layout: Layout) -> None:
-        self._path, self._name, self._layout = path, name, layout
+    def __init__(self, path: Path, name: str) -> None:
+        self._path, self._name = path, name
         self._stamp: float | None = None
         self._stage: int = Stage.BUILDING
         self._rec = rr.RecordingStream(
@@ -54,7 +55,7 @@ class RecordingStream:
         self._log_level = logging.NOTSET
 
     def __enter__(self) -> Self:
-        self._rec.save(self._path, default_blueprint=arrange(self._layout))
+        self._rec.save(self._path)
         self._rec.set_log_time_enabled(False)
         self._rec.send_recording_name(self._name)
         # The logging handler writes to the recording of its thread.
@@ -72,8 +73,16 @@ class RecordingStream:
         logger.removeHandler(self._handler)
         logger.setLevel(self._log_level)
         rr.set_thread_local_data_recording(self._previous)
-        self._rec.flush()
-        self._rec.disconnect()
+        try:
+            self._rec.flush()
+        except RuntimeError as failure:
+            raise OutputError(f"cannot write the recording ({failure}): {self._path}") from failure
+        finally:
+            self._rec.disconnect()
+
+    def arrange(self, layout: Layout) -> None:
+        """Say how the recording opens; once, as soon as it is known where the maps lie."""
+        self._rec.send_blueprint(arrange(layout))
 
     @property
     def stamp(self) -> float | None:
