@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, Polygon
+from shapely.geometry import Polygon
 
+from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import Point, Segment
-from closedrooms.worlds.geometry import areal, distance_along
+from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import Wall
 
 Pair = tuple[int, int | None]
@@ -123,19 +124,17 @@ def free_spans(edge: Edge, edges: Sequence[Edge], taken: Iterable[Segment], marg
         taken: Doors and openings already placed.
         margin: Metres kept clear of corners, crossing walls and other passages.
     """
-    line = LineString(edge.segment)
     blocked = [(-1e9, margin), (edge.length - margin, 1e9)]
-    for other in edges:
-        if other is edge:
-            continue
-        for point in other.segment:
-            if line.distance(shapely.Point(point)) < 0.05 and not _collinear(edge.segment, other.segment):
-                at = distance_along(edge.segment, point)
-                blocked.append((at - margin, at + margin))
+    meeting = np.array([other.segment for other in edges], dtype=np.float64)
+    along, aside = _coordinates(edge, meeting)
+    touches = (aside < 0.05) & (along > -0.05) & (along < edge.length + 0.05)
+    # An edge in line with this one is not in the way, one that only touches it is.
+    crossing = touches.any(axis=1) & (aside.max(axis=1) > STRAIGHT)
+    blocked += [(at - margin, at + margin) for at in along[crossing][touches[crossing]].tolist()]
     for segment in taken:
-        if all(line.distance(shapely.Point(p)) < 0.3 for p in segment):
-            ends = sorted(distance_along(edge.segment, p) for p in segment)
-            blocked.append((ends[0] - margin, ends[1] + margin))
+        ends, off = _coordinates(edge, np.array(segment, dtype=np.float64))
+        if off.max() < 0.3:
+            blocked.append((float(ends.min()) - margin, float(ends.max()) + margin))
     blocked.sort()
     spans, at = [], -1e9
     for low, high in blocked:
@@ -143,6 +142,15 @@ def free_spans(edge: Edge, edges: Sequence[Edge], taken: Iterable[Segment], marg
             spans.append((at, low))
         at = max(at, high)
     return spans
+
+
+def _coordinates(edge: Edge, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """How far along an edge and how far from its line points, shape (..., 2), lie [m]."""
+    start = np.array(edge.segment[0])
+    direction = (np.array(edge.segment[1]) - start) / edge.length
+    offset = points - start
+    aside = np.abs(offset[..., 1] * direction[0] - offset[..., 0] * direction[1])
+    return offset @ direction, aside
 
 
 def coverage(polygons: Sequence[Polygon], *, gap: float = 0.0, snap: float = -1.0) -> list[Polygon]:

@@ -22,7 +22,7 @@ BARE_GAP = 0.1
 LEAF_THICKNESS = 0.05
 # Ends of walls closer than this are one corner [m].
 CORNER = 1e-3
-# Corners sharper than this many half thicknesses are cut off instead of drawn to a point.
+# Corners that would reach out further than this many half thicknesses are cut off.
 MITRE_LIMIT = 4.0
 
 
@@ -60,7 +60,7 @@ def rectangles(segments: FloatArray, halves: FloatArray) -> FloatArray:
     return np.stack((a - side, b - side, b + side, a + side), axis=1)
 
 
-def _corners(segments: FloatArray, halves: FloatArray) -> list[Polygon]:
+def _corners(segments: FloatArray, halves: FloatArray) -> list[BaseGeometry]:
     """The pieces that fill the outer side of corners where two walls end at one point."""
     ends: defaultdict[tuple[int, int], list[tuple[float, float, FloatArray]]] = defaultdict(list)
     for (a, b), half in zip(segments, halves, strict=True):
@@ -77,16 +77,18 @@ def _corners(segments: FloatArray, halves: FloatArray) -> list[Polygon]:
     return pieces
 
 
-def _mitre(node: FloatArray, a1: float, h1: float, a2: float, h2: float) -> Polygon:
+def _mitre(node: FloatArray, a1: float, h1: float, a2: float, h2: float) -> BaseGeometry:
     """The piece between the left face of a wall leaving at ``a1`` and the right face of one leaving at ``a2``."""
     u1, u2 = np.array([math.cos(a1), math.sin(a1)]), np.array([math.cos(a2), math.sin(a2)])
     n1, n2 = h1 * np.array([-u1[1], u1[0]]), h2 * np.array([u2[1], -u2[0]])
     s = (n2 - n1) @ np.array([u2[1], -u2[0]]) / (u1[0] * u2[1] - u1[1] * u2[0])
     tip = n1 + s * u1
     corners = [node, node + n1, node + tip, node + n2]
-    if np.hypot(*tip) > MITRE_LIMIT * max(h1, h2):
+    # Two walls of one thickness meet this far out; far beyond it lie only corners of unequal, nearly straight walls.
+    usual = max(h1, h2) / max(math.cos(((a2 - a1) % (2 * math.pi) - math.pi) / 2), 1.0 / MITRE_LIMIT)
+    if np.hypot(*tip) > 1.3 * usual:
         del corners[2]
-    return Polygon(corners)
+    return Polygon(corners).convex_hull
 
 
 class WallLines:

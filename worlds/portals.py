@@ -1,0 +1,140 @@
+"""Plans from rooms without thickness and portals that are points: walls, doors and openings are made for them."""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import shapely
+
+from closedrooms.core.door import Point, Segment
+from closedrooms.worlds.assembly import Edge, free_spans, shared_edges, walls_along
+from closedrooms.worlds.geometry import distance_along
+from closedrooms.worlds.passages import hung, is_circulation
+from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom
+
+# Usual outer and inner walls, where a file gives walls no thickness [m].
+OUTER_WALL, INNER_WALL = 0.3, 0.15
+# An interior door, where a file gives doors no width [m].
+DOOR_WIDTH = 0.9
+# Passages without a door: as wide as the shared wall, at most this between circulation rooms and between others [m].
+WIDE_OPENING, OPENING = 5.0, 1.5
+# Clear wall between a door and a corner, and the narrowest door made [m]: as it should be, and where nothing else fits.
+FITS = ((0.12, 0.7), (0.08, 0.6))
+# A door that has to stand further from its portal than this is reported [m].
+MOVED = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Portal:
+    """A passage between two rooms, as a file gives it.
+
+    Attributes:
+        point: Where, building frame [m].
+        rooms: Indices of the rooms, the smaller first.
+        has_door: Whether there is a door in it.
+        width: Metres; ``None`` where the file does not say.
+    """
+
+    point: Point
+    rooms: tuple[int, int]
+    has_door: bool
+    width: float | None = None
+
+
+def plan_of_portals(rooms: tuple[PlanRoom, ...], portals: Sequence[Portal], repairs: list[str]) -> FloorPlan:
+    """A plan whose walls run along the rooms' outlines, with the portals' doors and openings in them.
+
+    Args:
+        rooms: Their outlines share edges.
+        portals: In the order in which the doors are numbered.
+        repairs: What had to be moved, narrowed or left out is added here.
+    """
+    edges = shared_edges([room.polygon for room in rooms])
+    doors, openings = _passages(portals, rooms, edges, repairs)
+    walls = tuple(walls_along(edges, lambda edge: OUTER_WALL if edge.rooms[1] is None else INNER_WALL))
+    repairs += _unreached(rooms, doors, openings)
+    return FloorPlan("", rooms, walls, hung(doors, openings, rooms), tuple(openings))
+
+
+def _passages(
+    portals: Sequence[Portal], rooms: tuple[PlanRoom, ...], edges: list[Edge], repairs: list[str]
+) -> tuple[list[PlanDoor], list[Opening]]:
+    """Doors and openings on the walls nearest to their portals."""
+    doors: list[PlanDoor] = []
+    openings: list[Opening] = []
+    taken: list[Segment] = []
+    problems: Counter[str] = Counter()
+    for portal in portals:
+        segment = _place(portal, rooms, edges, taken, problems)
+        if segment is None:
+            continue
+        taken.append(segment)
+        sides = (rooms[portal.rooms[0]].id, rooms[portal.rooms[1]].id)
+        if portal.has_door:
+            doors.append(PlanDoor(f"d{len(doors):02d}", segment, sides))
+        else:
+            openings.append(Opening(f"o{len(openings):02d}", segment, sides))
+    repairs.extend(f"{count} portals {what}" for what, count in sorted(problems.items()))
+    return doors, openings
+
+
+def _widest(portal: Portal, rooms: tuple[PlanRoom, ...]) -> float:
+    """How wide the passage is made where its wall is long enough [m]."""
+    if portal.width is not None:
+        return portal.width
+    if portal.has_door:
+        return DOOR_WIDTH
+    return WIDE_OPENING if all(is_circulation(rooms[room].label) for room in portal.rooms) else OPENING
+
+
+def _place(
+    portal: Portal, rooms: tuple[PlanRoom, ...], edges: list[Edge], taken: list[Segment], problems: Counter[str]
+) -> Segment | None:
+    """The passage's segment: as near to the portal as the wall between its two rooms allows."""
+    widest = _widest(portal, rooms)
+    found = (_nearest(portal, widest, edges, taken, margin, narrowest) for margin, narrowest in FITS)
+    best = next((place for place in found if place is not None), None)
+    if best is None:
+        problems["left out: their rooms share no wall long enough"] += 1
+        return None
+    cost, ((x0, y0), (x1, y1)) = best
+    if math.dist((x0, y0), (x1, y1)) < min(widest, DOOR_WIDTH) - 0.01:
+        problems["made narrower to fit their wall"] += 1
+    elif cost > MOVED:
+        problems[f"moved by more than {MOVED:g} m to the wall between their rooms"] += 1
+    return ((round(x0, 4), round(y0, 4)), (round(x1, 4), round(y1, 4)))
+
+
+def _nearest(
+    portal: Portal, widest: float, edges: list[Edge], taken: list[Segment], margin: float, narrowest: float
+) -> tuple[float, Segment] | None:
+    """The free piece of wall nearest to a portal, and how far away it is [m]; ``None`` where nothing fits."""
+    point = shapely.Point(portal.point)
+    best: tuple[float, Segment] | None = None
+    for edge in edges:
+        if edge.rooms != portal.rooms:
+            continue
+        near = min(max(distance_along(edge.segment, portal.point), 0.0), edge.length)
+        for low, high in free_spans(edge, edges, taken, margin):
+            width = min(widest, high - low)
+            if width < min(narrowest, widest):
+                continue
+            centre = min(max(near, low + width / 2), high - width / 2)
+            # A place where it has its full width is preferred to a nearer one by up to 2 m.
+            cost = point.distance(shapely.Point(edge.point(centre))) + 2.0 * (width < min(widest, DOOR_WIDTH) - 1e-6)
+            if best is None or cost < best[0] - 1e-9:
+                best = (cost, edge.part(centre, width))
+    return best
+
+
+def _unreached(rooms: tuple[PlanRoom, ...], doors: list[PlanDoor], openings: list[Opening]) -> list[str]:
+    import networkx as nx
+
+    graph: nx.Graph[str] = nx.Graph()
+    graph.add_nodes_from(room.id for room in rooms)
+    sides = [door.rooms for door in doors] + [opening.rooms for opening in openings]
+    graph.add_edges_from((a, b) for a, b in sides if a is not None and b is not None)
+    parts = sorted(nx.connected_components(graph), key=lambda part: (-len(part), min(part)))
+    apart = [room for part in parts[1:] for room in sorted(part)]
+    return [f"{len(apart)} rooms are not connected to the rest: {', '.join(apart)}"] if apart else []
