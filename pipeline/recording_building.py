@@ -58,9 +58,10 @@ class RecordedBuilding:
         """Draw the doors that have moved: 0 is closed, 1 is open."""
         for door in self._closed:
             if door in states and abs(states[door] - self._states[door]) > 1e-6:
+                opens = self._states[door] <= 0.5 < states[door]
                 self._states[door] = states[door]
                 self._draw_door(door)
-                if states[door] > 0.5:
+                if opens:
                     self._stream.log(f"door_states/{door}", rr.StateChange(state="open"))
 
     def _draw_shell(self, plan: FloorPlan, walls: Area, furniture: Area) -> None:

@@ -1,6 +1,8 @@
 """One rerun file, its two timelines and its log."""
 
+import contextlib
 import logging
+from collections.abc import Iterator
 from enum import IntEnum
 from pathlib import Path
 from types import TracebackType
@@ -19,7 +21,7 @@ NEVER_SECONDS = 1e6
 
 
 class Stage(IntEnum):
-    """Steps of the timeline ``stage``; the expansion's level k is ``EXPANSION + k``, at most the step before ``ROOMS``."""
+    """Steps of the timeline ``stage``; level k of the expansion is ``EXPANSION + k``, but before ``ROOMS``."""
 
     BUILDING = 0
     MAPPING = 1
@@ -55,7 +57,8 @@ class RecordingStream:
         self._log_level = logging.NOTSET
 
     def __enter__(self) -> Self:
-        self._rec.save(self._path)
+        with self._clear_errors():
+            self._rec.save(self._path)
         self._rec.set_log_time_enabled(False)
         self._rec.send_recording_name(self._name)
         # The logging handler writes to the recording of its thread.
@@ -74,11 +77,17 @@ class RecordingStream:
         logger.setLevel(self._log_level)
         rr.set_thread_local_data_recording(self._previous)
         try:
-            self._rec.flush()
-        except RuntimeError as failure:
-            raise OutputError(f"cannot write the recording ({failure}): {self._path}") from failure
+            with self._clear_errors():
+                self._rec.flush()
         finally:
             self._rec.disconnect()
+
+    @contextlib.contextmanager
+    def _clear_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except RuntimeError as failure:
+            raise OutputError(f"cannot write the recording ({failure}): {self._path}") from failure
 
     def arrange(self, layout: Layout) -> None:
         """Say how the recording opens; once, as soon as it is known where the maps lie."""
