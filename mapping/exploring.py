@@ -7,17 +7,17 @@ from typing import Literal
 
 import numpy as np
 
-from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import Point
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.costmap import Costmap, build_costmap, clearance_field
+from closedrooms.mapping.costmap import Costmap, NavigationMap, clearance_field
 from closedrooms.mapping.driving import Driver
 from closedrooms.mapping.following import near_points
-from closedrooms.mapping.frontiers import FrontierMap, find_frontiers, still_unknown
+from closedrooms.mapping.frontiers import Frontiers, find_frontiers, seen_from, still_unknown
 from closedrooms.mapping.navigation_config import NavigationConfig
-from closedrooms.mapping.planning import Path, plan_path, reachable_cells
+from closedrooms.mapping.planning import Path, Search, reachable_cells
 
 ExplorerStatus = Literal["exploring", "complete", "stuck"]
 
@@ -67,8 +67,9 @@ class Explorer:
         self.goal: Goal | None = None
         self.plans = 0
         self._driver = Driver(config)
+        self._map = NavigationMap(config)
         self._given_up: list[FloatArray] = []
-        self._obstacles: list[FloatArray] = []
+        self._enclosed = False
         self._chosen: list[tuple[Point, int]] = []
         self._switches = 0
         self._checked_at = -math.inf
@@ -156,34 +157,64 @@ class Explorer:
     def _plan(self, pose: Pose2, grid: OccupancyGrid) -> Goal | None:
         """The nearest frontier that can be looked at from a place that the robot can reach."""
         self.plans += 1
-        self._enclosed = False
         config = self.config
+        self._map.update(grid)
         given_up = np.vstack(self._given_up) if self._given_up else None
-        found = find_frontiers(grid, config, given_up=given_up)
-        obstacles = np.vstack(self._obstacles) if self._obstacles else None
-        costmap = build_costmap(grid, config, obstacles=obstacles)
-        if found is None or costmap is None:
+        found = find_frontiers(self._map, config, given_up=given_up)
+        self.frontiers = found.points
+        costmap, here = self._map.costmap, (pose.x, pose.y)
+        component = reachable_cells(costmap, here, config)
+        self._enclosed = component is None
+        if component is None or len(found.points) == 0:
             return None
-        self.frontiers = np.vstack([f.points for f in found.frontiers]) if found.frontiers else np.empty((0, 2))
-        component = reachable_cells(costmap, (pose.x, pose.y), config)
-        if component is None:
-            self._enclosed = True
-            return None
-        for labels in (found.near, found.far):
-            goals = _goal_cells(labels > 0, found, costmap) & component
-            path = plan_path(costmap, (pose.x, pose.y), goals, config)
-            if path is not None:
-                return self._goal(path, labels, found, costmap)
+        for distance in (config.approach, config.far_approach):
+            goal = self._nearest(found, costmap, component, here, distance)
+            if goal is not None:
+                return goal
         return None
 
-    def _goal(self, path: Path, labels: IntArray, found: FrontierMap, costmap: Costmap) -> Goal:
-        """The frontier that the end of a path looks at, cut to the part close by."""
+    def _nearest(
+        self, found: Frontiers, costmap: Costmap, component: BoolArray, here: Point, distance: float
+    ) -> Goal | None:
+        """The frontier whose way costs least, small patches of unknown only where they are worth the way."""
+        config = self.config
+        is_large = found.unknown_area[found.labels] >= config.large_area
+        large = _goal_cells(found.within(distance, is_large), found, costmap) & component
+        small = _goal_cells(found.within(distance, ~is_large), found, costmap) & component
+        search = Search.begin(costmap, here, config)
+        if search is None or not (large.any() or small.any()):
+            return None
+        search.run(large)
+        nearest, cost = search.nearest(large)
+        refused = np.zeros(len(found.unknown_area), dtype=np.bool_)
+        while True:
+            cell, small_cost = search.nearest(small)
+            if cell is None or small_cost >= cost:
+                break
+            small[cell[0], cell[1]] = False
+            goal = self._goal(search.path(cell), found)
+            if goal is None:
+                continue
+            area = float(found.unknown_area[self._labels(goal, found)].max())
+            if small_cost <= config.worth * area:
+                return goal
+            # Every cell from which this patch is seen costs at least as much.
+            refused[self._labels(goal, found)] = True
+            small &= _goal_cells(found.within(distance, ~is_large & ~refused[found.labels]), found, costmap)
+        return None if nearest is None else self._goal(search.path(nearest), found)
+
+    def _goal(self, path: Path, found: Frontiers) -> Goal | None:
+        """The part of the frontiers that the end of a path looks at."""
         place = (float(path.points[-1, 0]), float(path.points[-1, 1]))
-        reach = self.config.far_approach + costmap.frame.resolution
-        points = np.vstack([found.frontiers[i].points for i in _labels_in(path.goal_cell, labels, found, costmap)])
-        distance = np.hypot(*(points - np.array(place)).T)
-        close = distance <= max(reach, float(distance.min()) + costmap.frame.resolution)
-        return Goal(place, points[close], path)
+        points = seen_from(self._map, place, found.points, self.config.far_approach + 0.2)
+        return Goal(place, points, path) if len(points) else None
+
+    def _labels(self, goal: Goal, found: Frontiers) -> BoolArray:
+        """Which frontiers a goal looks at, by label."""
+        mine = (found.points[:, None, :] == goal.frontier[None, :, :]).all(axis=2).any(axis=1)
+        chosen = np.zeros(len(found.unknown_area), dtype=np.bool_)
+        chosen[found.labels[mine]] = True
+        return chosen
 
     def _look(self, pose: Pose2, grid: Callable[[], OccupancyGrid], now: float) -> tuple[float, float]:
         """At the goal: face what is still unknown, and give it up when it stays so."""
@@ -225,24 +256,16 @@ class Explorer:
         points = near_points(scan)
         touching = points[np.hypot(*points.T) < self.config.required_clearance + TOUCHING]
         if len(touching):
-            self._obstacles.append(pose.transform(touching))
+            self._map.add_obstacles(pose.transform(touching))
 
 
-def _goal_cells(mask: BoolArray, found: FrontierMap, costmap: Costmap) -> BoolArray:
+def _goal_cells(mask: BoolArray, found: Frontiers, costmap: Costmap) -> BoolArray:
     """The cells of the planning grid that hold a cell of ``mask`` on the frontier grid."""
     goals = np.zeros(costmap.frame.shape, dtype=np.bool_)
     cells = costmap.frame.to_cells(found.frame.to_points(np.argwhere(mask)))
     cells = cells[costmap.frame.contains(cells)]
     goals[cells[:, 0], cells[:, 1]] = True
     return goals
-
-
-def _labels_in(goal_cell: tuple[int, int], labels: IntArray, found: FrontierMap, costmap: Costmap) -> list[int]:
-    """Indices of the frontiers that can be looked at from a cell of the planning grid."""
-    cells = np.argwhere(labels > 0)
-    at = costmap.frame.to_cells(found.frame.to_points(cells))
-    inside = cells[(at[:, 0] == goal_cell[0]) & (at[:, 1] == goal_cell[1])]
-    return [int(label) - 1 for label in np.unique(labels[inside[:, 0], inside[:, 1]])]
 
 
 def _is_free(grid: OccupancyGrid, points: FloatArray, config: NavigationConfig) -> bool:

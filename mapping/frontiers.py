@@ -1,131 +1,118 @@
 """Frontiers: where known free space meets the unknown (Yamauchi, CIRA 1997)."""
 
-import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
-from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import GridFrame, OccupancyGrid
-from closedrooms.mapping.costmap import Image, cell_masks, pooled
+from closedrooms.mapping.costmap import Image, NavigationMap
 from closedrooms.mapping.navigation_config import NavigationConfig
 
 CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+SQUARE = np.ones((3, 3), dtype=np.uint8)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Frontier:
-    """A connected piece of the border between free and unknown cells.
-
-    Attributes:
-        points: Its cells' centres, map frame, shape (n, 2) [m].
-        length: Cells times cell size [m].
-        centroid: Mean of the points, map frame [m].
-    """
-
-    points: FloatArray
-    length: float
-    centroid: tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FrontierMap:
-    """All frontiers of a map and the free cells from which each can be looked at.
+class Frontiers:
+    """All borders between free and unknown space that are worth a visit.
 
     Attributes:
         frame: Of the frontier cells.
-        frontiers: By index.
-        near: Index + 1 of the frontier that lies within ``approach`` of a cell through free space, 0 elsewhere.
-        far: The same within ``far_approach``.
+        points: Their centres, map frame, ordered by row and column, shape (n, 2) [m].
+        labels: Number of the connected piece that each belongs to, 0 and up, shape (n,).
+        unknown_area: Area of the largest unknown patch that each piece borders [m2], by label.
+        free: Free cells of ``frame`` (0 or 1).
     """
 
     frame: GridFrame
-    frontiers: tuple[Frontier, ...]
-    near: IntArray
-    far: IntArray
+    points: FloatArray
+    labels: npt.NDArray[np.int64]
+    unknown_area: FloatArray
+    free: Image
+
+    def within(self, distance: float, chosen: BoolArray) -> BoolArray:
+        """Free cells that lie within a way of ``distance`` [m] from a chosen point; ``chosen`` has shape (n,)."""
+        cells = self.frame.to_cells(self.points[chosen])
+        grown = np.zeros(self.frame.shape, dtype=np.uint8)
+        grown[cells[:, 0], cells[:, 1]] = 1
+        for _ in range(round(distance / self.frame.resolution)):
+            grown = np.asarray(cv2.dilate(grown, CROSS), dtype=np.uint8) & self.free | grown
+        return grown.view(np.bool_)
 
 
 def find_frontiers(
-    grid: OccupancyGrid,
-    config: NavigationConfig,
-    *,
-    given_up: FloatArray | None = None,
-) -> FrontierMap | None:
+    navigation: NavigationMap, config: NavigationConfig, *, given_up: FloatArray | None = None
+) -> Frontiers:
     """Borders between free and unknown space that are worth a visit.
 
     Args:
-        grid: Map as known so far.
-        config: Cell size, smallest frontier and smallest unknown patch.
+        navigation: The map, as of its last update.
+        config: Smallest frontier and smallest unknown patch.
         given_up: Frontier cells that were visited in vain or cannot be reached, map frame, shape (n, 2) [m].
 
     Returns:
-        The frontiers, ordered by place (row, then column), or ``None`` when nothing is known yet.
+        The frontiers; their arrays are empty when there is none.
     """
-    window = grid.known_bounds()
-    if window is None:
-        return None
-    factor = max(1, round(config.frontier_resolution / grid.frame.resolution))
-    # One cell of unknown all around, so that the edge of the grid counts as a frontier.
-    row, col = window[0] - factor, window[1] - factor
-    rows, cols = (math.ceil(n / factor) + 2 for n in window[2:])
-    cells = grid.cells[window[0] : window[0] + window[2], window[1] : window[1] + window[3]]
-    shape = ((rows - 1) * factor, (cols - 1) * factor)
-    free, blocked = (np.pad(pooled(mask, factor), ((1, 0), (1, 0))) for mask in cell_masks(cells, shape))
-    resolution = grid.frame.resolution * factor
-    base = grid.frame.cropped(row, col, 1, 1)
-    frame = GridFrame(resolution, base.origin_x, base.origin_y, rows, cols)
-    free &= 1 - blocked
-    border = _border(free, blocked, config.min_unknown_area / resolution**2)
+    frame, free = navigation.frontier_frame, navigation.free
+    area = _unknown_area(free, navigation.blocked, frame.resolution)
+    border = ((area >= config.min_unknown_area) & (free > 0)).astype(np.uint8)
     if given_up is not None and len(given_up):
         at = frame.to_cells(given_up)
         at = at[frame.contains(at)]
         vain = np.zeros_like(border)
         vain[at[:, 0], at[:, 1]] = 1
-        border[cv2.dilate(vain, np.ones((3, 3), np.uint8)) > 0] = 0
-    frontiers, labels = _clusters(border, frame, config.min_frontier)
-    near = _spread(labels, free, round(config.approach / resolution))
-    far = _spread(near, free, round((config.far_approach - config.approach) / resolution))
-    return FrontierMap(frame, frontiers, near.astype(np.int64), far.astype(np.int64))
+        border[cv2.dilate(vain, SQUARE) > 0] = 0
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(border, connectivity=8, ltype=cv2.CV_32S)
+    long_enough = stats[:, cv2.CC_STAT_AREA] * frame.resolution >= config.min_frontier - 1e-9
+    long_enough[0] = False
+    number = np.full(count, -1, dtype=np.int64)
+    number[long_enough] = np.arange(int(long_enough.sum()))
+    rows, cols = np.nonzero(border)
+    owner = number[labels[rows, cols]]
+    rows, cols, owner = rows[owner >= 0], cols[owner >= 0], owner[owner >= 0]
+    largest = np.zeros(int(long_enough.sum()))
+    np.maximum.at(largest, owner, area[rows, cols])
+    points = frame.to_points(np.stack((rows, cols), axis=-1))
+    return Frontiers(frame, points, owner, largest, free)
 
 
-def _border(free: Image, blocked: Image, min_unknown: float) -> Image:
-    """Free cells beside a patch of at least ``min_unknown`` unknown cells."""
+def _unknown_area(free: Image, blocked: Image, resolution: float) -> npt.NDArray[np.float32]:
+    """Area of the largest unknown patch in the four-neighbourhood of each cell [m2]."""
     unknown = (1 - (free | blocked)).astype(np.uint8)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(unknown, connectivity=4, ltype=cv2.CV_32S)
-    worth = (stats[:, cv2.CC_STAT_AREA] >= min_unknown).astype(np.uint8)
-    worth[0] = 0
-    beside = cv2.dilate(worth[labels], CROSS) > 0
-    return (beside & (free > 0)).astype(np.uint8)
+    areas = stats[:, cv2.CC_STAT_AREA].astype(np.float32) * np.float32(resolution**2)
+    areas[0] = 0.0
+    return np.asarray(cv2.dilate(areas[labels], CROSS), dtype=np.float32)
 
 
-def _clusters(border: Image, frame: GridFrame, min_length: float) -> tuple[tuple[Frontier, ...], IntArray]:
-    """Connected borders of at least ``min_length`` metres, and their labels (index + 1)."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(border, connectivity=8, ltype=cv2.CV_32S)
-    long_enough = stats[:, cv2.CC_STAT_AREA] * frame.resolution >= min_length - 1e-9
-    long_enough[0] = False
-    number = np.zeros(count, dtype=np.int64)
-    number[long_enough] = np.arange(1, int(long_enough.sum()) + 1)
-    numbered: IntArray = number[labels]
-    rows, cols = np.nonzero(numbered)
-    owner = numbered[rows, cols]
-    order = np.argsort(owner, kind="stable")
-    points = frame.to_points(np.stack((rows[order], cols[order]), axis=-1))
-    pieces = np.split(points, np.flatnonzero(np.diff(owner[order])) + 1) if len(points) else []
-    frontiers = tuple(
-        Frontier(piece, len(piece) * frame.resolution, (float(piece[:, 0].mean()), float(piece[:, 1].mean())))
-        for piece in pieces
-    )
-    return frontiers, numbered
+def seen_from(navigation: NavigationMap, place: tuple[float, float], points: FloatArray, reach: float) -> FloatArray:
+    """The frontier points within ``reach`` [m] of a place that connect with it through free space close by.
 
+    Args:
+        navigation: The map, as of its last update.
+        place: Map frame [m].
+        points: Frontier points, map frame, shape (n, 2) [m].
+        reach: Distance [m].
 
-def _spread(labels: IntArray, free: Image, steps: int) -> IntArray:
-    """Labels grown through free cells by ``steps`` cells."""
-    grown = labels.astype(np.uint16)
-    mask = free.astype(np.uint16)
-    for _ in range(max(steps, 0)):
-        grown = np.where(grown > 0, grown, cv2.dilate(grown, CROSS) * mask)
-    return grown.astype(np.int64)
+    Returns:
+        The points, shape (k, 2); never those behind a wall.
+    """
+    frame = navigation.frontier_frame
+    row, col = (int(v) for v in frame.to_cells(np.array(place)))
+    span = round(reach / frame.resolution) + 1
+    r0, c0 = max(row - span, 0), max(col - span, 0)
+    window = navigation.free[r0 : row + span + 1, c0 : col + span + 1]
+    _, labels = cv2.connectedComponents(np.ascontiguousarray(window), connectivity=4, ltype=cv2.CV_32S)
+    home = labels[row - r0, col - c0]
+    cells = frame.to_cells(points) - np.array([r0, c0])
+    inside = (cells >= 0).all(axis=1) & (cells[:, 0] < window.shape[0]) & (cells[:, 1] < window.shape[1])
+    inside &= np.hypot(*(points - np.array(place)).T) <= reach
+    at = cells[inside]
+    seen: FloatArray = points[inside][np.asarray(labels)[at[:, 0], at[:, 1]] == home]
+    return seen
 
 
 def still_unknown(grid: OccupancyGrid, points: FloatArray, config: NavigationConfig) -> float:
@@ -148,7 +135,8 @@ def still_unknown(grid: OccupancyGrid, points: FloatArray, config: NavigationCon
     frame = grid.frame.cropped(int(r0), int(c0), int(r1 - r0), int(c1 - c0))
     unknown = grid.on(frame).unknown.astype(np.float32)
     # The share of unknown in a block of three frontier cells: one unknown neighbour is a ninth.
-    share = cv2.blur(unknown, (3 * factor + 1 - factor % 2, 3 * factor + 1 - factor % 2))
+    side = 3 * factor + 1 - factor % 2
+    share = cv2.blur(unknown, (side, side))
     at = cells - np.array([r0, c0])
     left = share[at[:, 0], at[:, 1]] > 1.0 / 9.0
     return float(np.count_nonzero(left)) * config.frontier_resolution

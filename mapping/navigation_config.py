@@ -33,6 +33,12 @@ class NavigationConfig:
     min_unknown_area: float = 0.12
     """Smallest patch of unknown cells worth a look [m2]; smaller ones are gaps between beams."""
 
+    large_area: float = 2.0
+    """Unknown patches from this size on are worth any way [m2]; closed rooms and the outside are such."""
+
+    worth: float = 15.0
+    """How far the robot goes for a smaller patch, per square metre of it [m/m2]."""
+
     approach: float = 0.50
     """How close to a frontier a goal is put, measured through free space [m]."""
 
@@ -42,19 +48,19 @@ class NavigationConfig:
     fruitless_radius: float = 0.80
     """Frontier cells this close to a goal that was reached without learning anything are given up [m]."""
 
-    max_speed: float = 0.8
+    max_speed: float = 1.0
     """Fastest drive command [m/s]."""
 
-    max_turn_rate: float = 1.5
+    max_turn_rate: float = 2.0
     """Fastest turn command [rad/s]."""
 
-    acceleration: float = 0.8
+    acceleration: float = 1.2
     """Deceleration used to plan stopping distances [m/s2]."""
 
     lookahead: float = 0.55
     """Distance of the pure-pursuit target along the path [m]."""
 
-    turn_in_place: float = 0.9
+    turn_in_place: float = 1.2
     """Heading error above which the robot stops and turns [rad]."""
 
     goal_tolerance: float = 0.20

@@ -63,9 +63,7 @@ def start_cell(costmap: Costmap, fits: BoolArray, start: Point) -> tuple[int, in
 
 
 def plan_path(costmap: Costmap, start: Point, goals: BoolArray, config: NavigationConfig) -> Path | None:
-    """The cheapest path from ``start`` to the nearest of several goals (Dijkstra, ended at the first goal).
-
-    A metre costs 1 in the open and up to ``1 + clearance_weight`` beside an obstacle.
+    """The cheapest path from ``start`` to the nearest of several goals.
 
     Args:
         costmap: Planning grid.
@@ -76,28 +74,55 @@ def plan_path(costmap: Costmap, start: Point, goals: BoolArray, config: Navigati
     Returns:
         The path, or ``None`` when no goal can be reached.
     """
-    from skimage.graph import MCP_Geometric
-
-    fits = traversable(costmap, config)
-    first = start_cell(costmap, fits, start)
-    goals = goals & fits
-    if first is None or not goals.any():
+    search = Search.begin(costmap, start, config)
+    if search is None:
         return None
-    if goals[first]:
-        cells: IntArray = np.array([first])
-        cost = 0.0
-    else:
-        ends = np.argwhere(goals)
-        search = MCP_Geometric(cell_costs(costmap.clearance, fits, config))
-        costs, _ = search.find_costs([first], ends.tolist(), find_all_ends=False)
-        reached = costs[ends[:, 0], ends[:, 1]]
-        best = int(np.argmin(reached))
-        if not np.isfinite(reached[best]):
-            return None
-        cells = np.array(search.traceback(ends[best]), dtype=np.int64)
-        cost = float(reached[best]) * costmap.frame.resolution
-    points = straighten(np.vstack((np.array(start), costmap.anchors(cells))), costmap, config)
-    return Path(points, cost, (int(cells[-1, 0]), int(cells[-1, 1])))
+    search.run(goals)
+    cell, _ = search.nearest(goals)
+    return None if cell is None else search.path(cell)
+
+
+class Search:
+    """Dijkstra's algorithm over the planning grid from one start (scikit-image's minimum cost path).
+
+    A metre costs 1 in the open and up to ``1 + clearance_weight`` beside an obstacle.
+    """
+
+    def __init__(self, costmap: Costmap, start: Point, first: tuple[int, int], config: NavigationConfig) -> None:
+        from skimage.graph import MCP_Geometric
+
+        self._costmap, self._start, self._first, self._config = costmap, start, first, config
+        fits = traversable(costmap, config)
+        self._search = MCP_Geometric(cell_costs(costmap.clearance, fits, config))
+        self._costs: FloatArray = np.empty((0, 0))
+
+    @classmethod
+    def begin(cls, costmap: Costmap, start: Point, config: NavigationConfig) -> "Search | None":
+        """A search from ``start`` (map frame), ``None`` when the robot does not fit anywhere near."""
+        first = start_cell(costmap, traversable(costmap, config), start)
+        return None if first is None else cls(costmap, start, first, config)
+
+    def run(self, goals: BoolArray) -> None:
+        """Spread out until the first of ``goals`` (coarse cells) is reached, or over everything when there is none."""
+        ends = np.argwhere(goals).tolist()
+        costs, _ = self._search.find_costs([self._first], ends or None, find_all_ends=False)
+        self._costs = costs * self._costmap.frame.resolution
+
+    def nearest(self, goals: BoolArray) -> tuple[IntArray | None, float]:
+        """The cheapest of some coarse cells that the search has reached, and its cost [m]."""
+        cells = np.argwhere(goals)
+        costs = self._costs[cells[:, 0], cells[:, 1]]
+        if len(cells) == 0 or not np.isfinite(costs.min()):
+            return None, math.inf
+        best = int(np.argmin(costs))
+        return cells[best], float(costs[best])
+
+    def path(self, cell: IntArray) -> Path:
+        """The way to a coarse cell whose cost is finite."""
+        cells = np.array(self._search.traceback(cell), dtype=np.int64)
+        points = np.vstack((np.array(self._start), self._costmap.anchors(cells)))
+        points = straighten(points, self._costmap, self._config)
+        return Path(points, float(self._costs[cell[0], cell[1]]), (int(cell[0]), int(cell[1])))
 
 
 def cell_costs(clearance: Field, fits: BoolArray, config: NavigationConfig) -> FloatArray:
