@@ -58,9 +58,8 @@ def _square(growth: Growth, room: int) -> BorderRoom:
     start, end = arrangement.edges[edge]
     along = growth.along(room)
     outward = np.array([-along[1], along[0]])
-    inside = np.array(arrangement.faces[face].centroid.coords[0]) - start
-    if inside @ outward < 0:
-        outward = -outward
+    if (end - start) @ along < 0:
+        start, end = end, start
     size = float(np.hypot(*(end - start)))
     corners = shapely.get_coordinates(arrangement.faces[face].exterior)[:-1]
     cut = [_on_boundary(growth, point) for point in (start, end)]

@@ -9,7 +9,7 @@ from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.predictor.arrangement import Arrangement
 from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.evaluation import FaceSet, evaluate, face_set
-from closedrooms.predictor.initial import Entrance
+from closedrooms.predictor.initial import Entrance, along_edge
 from closedrooms.predictor.subsets import best_subset
 
 
@@ -67,9 +67,14 @@ class Growth:
         return beside - {-1, room}
 
     def along(self, room: int) -> FloatArray:
-        """Unit vector of a room's door edge, shape (2,)."""
-        start, end = self.arrangement.edges[self.entrances[room].edge]
-        return np.asarray((end - start) / np.hypot(*(end - start)))
+        """Unit vector of a room's door edge with the room on its left, shape (2,)."""
+        return along_edge(self.arrangement, self.entrances[room])
+
+    def position(self, room: int) -> tuple[float, ...]:
+        """To break ties between rooms: how far its door is from the middle of all doors, then where it is [m]."""
+        doors = np.array([entrance.door.midpoint for entrance in self.entrances])
+        away = float(np.hypot(*(doors[room] - doors.mean(axis=0))))
+        return (round(away, 6), *self.entrances[room].door.midpoint)
 
     def face_set(self, room: int, faces: IntArray, returnable: BoolArray) -> FaceSet:
         """The faces that a layout of a room may be made of."""
@@ -107,7 +112,7 @@ def _turn(growth: Growth, room: int) -> tuple[float, ...]:
         candidates.size,
         round(float(areas[candidates].sum()), 6),
         round(float(areas[growth.layout(room)].sum()), 6),
-        *growth.entrances[room].door.midpoint,
+        *growth.position(room),
     )
 
 

@@ -27,6 +27,15 @@ class Entrance:
     face: int
 
 
+def along_edge(arrangement: Arrangement, entrance: Entrance) -> FloatArray:
+    """Unit vector of the door's edge with the initial face on its left, shape (2,)."""
+    start, end = arrangement.edges[entrance.edge]
+    along = (end - start) / np.hypot(*(end - start))
+    inside = np.array(arrangement.faces[entrance.face].centroid.coords[0]) - start
+    left: FloatArray = along if along[0] * inside[1] - along[1] * inside[0] > 0 else -along
+    return left
+
+
 def distances_to_edges(arrangement: Arrangement, point: FloatArray) -> FloatArray:
     """Distance of a point to every edge [m], shape (m,)."""
     start, span = arrangement.edges[:, 0], arrangement.edges[:, 1] - arrangement.edges[:, 0]

@@ -31,8 +31,8 @@ def _position(growth: Growth, pair: tuple[int, int]) -> tuple[float, ...]:
     """Smallest total area first, then by position."""
     areas = growth.arrangement.areas
     total = sum(float(areas[growth.layout(room)].sum()) for room in pair)
-    doors = sorted(growth.entrances[room].door.midpoint for room in pair)
-    return (round(total, 6), *doors[0], *doors[1])
+    first, second = sorted(growth.position(room) for room in pair)
+    return (round(total, 6), *first, *second)
 
 
 def _swap(growth: Growth, a: int, b: int, config: PredictorConfig) -> None:
@@ -53,7 +53,8 @@ def _swap(growth: Growth, a: int, b: int, config: PredictorConfig) -> None:
     to_a = np.concatenate(((growth.owner[faces] == a)[None, :], to_a))  # the first is the layout as it is
     values = _joint(pool.areas, to_a, pool, config)
     as_it_is = values[0]
-    for row in np.argsort(-values, kind="stable"):
+    swapped = (to_a != to_a[0]).sum(axis=1)
+    for row in np.lexsort((swapped, -values.round(7))):
         if values[row] <= as_it_is + TIE:
             return
         if _connected(pool.inner, to_a[row]) and _connected(pool.inner, ~to_a[row]):

@@ -1,5 +1,6 @@
 """Representative and boundary lines (paper, section 3.1)."""
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import Literal
@@ -85,15 +86,28 @@ def _merge(ends: FloatArray, walls: IntArray, reach: float) -> list[tuple[float,
     groups: list[IntArray] = [np.flatnonzero(walls == wall) for wall in np.unique(walls)]
     groups.sort(key=lambda members: _median(across[members], length[members]))
     offsets = [_median(across[members], length[members]) for members in groups]
-    while len(groups) > 1:
-        gaps = np.diff(offsets)
-        closest = int(gaps.argmin())
-        if gaps[closest] >= reach:
-            break
-        joined = np.concatenate((groups[closest], groups[closest + 1]))
-        groups[closest : closest + 2] = [joined]
-        offsets[closest : closest + 2] = [_median(across[joined], length[joined])]
+    while len(groups) > 1 and np.diff(offsets).min() < reach:
+        groups = _join_closest(groups, np.diff(offsets), length)
+        offsets = [_median(across[members], length[members]) for members in groups]
     return list(zip(offsets, groups, strict=True))
+
+
+def _join_closest(groups: list[IntArray], gaps: FloatArray, length: FloatArray) -> list[IntArray]:
+    """Join the closest two neighbours; of equally close ones those with most wall, and all of them where that is equal.
+
+    Offsets lie on the lattice of the cells, so that equal gaps are common: taking the first would depend on the side
+    one comes from.
+    """
+    closest = gaps <= gaps.min() + 1e-9
+    wall = np.array([length[a].sum() + length[b].sum() for a, b in itertools.pairwise(groups)])
+    joined = closest & (wall >= wall[closest].max() - 1e-9)
+    result = [groups[0]]
+    for join, group in zip(joined, groups[1:], strict=True):
+        if join:
+            result[-1] = np.concatenate((result[-1], group))
+        else:
+            result.append(group)
+    return result
 
 
 def _median(values: FloatArray, weights: FloatArray) -> float:

@@ -11,6 +11,7 @@ from closedrooms.predictor.expansion import Growth
 from closedrooms.predictor.inpaint import passage
 from closedrooms.predictor.prediction import Shape
 from closedrooms.predictor.start import Start
+from closedrooms.predictor.thickness import free_interior, measure_thickness
 
 
 def finish_rooms(start: Start, growth: Growth, config: PredictorConfig) -> tuple[tuple[Room, ...], list[Shape]]:
@@ -20,12 +21,16 @@ def finish_rooms(start: Start, growth: Growth, config: PredictorConfig) -> tuple
         Rooms in the order of the doors, and what to clear at each door [m].
     """
     outside = border_rooms(growth, config)
-    shapes: dict[int, Shape] = {
+    shapes: dict[int, Polygon] = {
         room: union(growth, room) for room in range(len(start.entrances)) if room not in outside
     }
     for room in sorted(outside, key=lambda r: (outside[r].depth, start.entrances[r].door.midpoint)):
         free = outside[room].polygon().difference(shapely.union_all(list(shapes.values())))
         shapes[room] = max(shapely.get_parts(free).tolist(), key=lambda part: part.area)
+    thickness = config.wall_thickness
+    if thickness is None:
+        thickness = measure_thickness(start.grid, start.structure.angles)
+    shapes = {room: free_interior(shape, start.grid, thickness) for room, shape in shapes.items()}
     rooms, passages = [], []
     for room, entrance in enumerate(start.entrances):
         kind: RoomKind = "border" if room in outside else "dependent" if growth.touches(room) else "independent"

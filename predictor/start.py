@@ -10,7 +10,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.arrangement import Arrangement, arrange
 from closedrooms.predictor.config import PredictorConfig
-from closedrooms.predictor.initial import Entrance, find_entrance, splits_between
+from closedrooms.predictor.initial import Entrance, along_edge, find_entrance, splits_between
 from closedrooms.predictor.structure import WallLines, find_structure
 from closedrooms.predictor.unknown import unknown_faces
 from closedrooms.predictor.window import at_resolution, known_window
@@ -35,16 +35,13 @@ class Start:
     entrances: tuple[Entrance, ...]
 
     def along(self, room: int) -> FloatArray:
-        """Unit vector of a room's door edge, shape (2,)."""
-        start, end = self.arrangement.edges[self.entrances[room].edge]
-        return np.asarray((end - start) / np.hypot(*(end - start)))
+        """Unit vector of a room's door edge with the room on its left, shape (2,)."""
+        return along_edge(self.arrangement, self.entrances[room])
 
     def inward(self, room: int) -> FloatArray:
         """Unit vector from a room's door edge into its initial face, shape (2,)."""
-        along, entrance = self.along(room), self.entrances[room]
-        across = np.array([-along[1], along[0]])
-        centre = np.array(self.arrangement.faces[entrance.face].centroid.coords[0])
-        return across if (centre - self.arrangement.edges[entrance.edge][0]) @ across > 0 else -across
+        along = self.along(room)
+        return np.array([-along[1], along[0]])
 
 
 def start_rooms(

@@ -22,12 +22,14 @@ class WallLines:
         clusters: Line of each segment, -1 for none, shape (n,).
         lines: Representative lines.
         boundary: The four boundary lines.
+        angles: Directions of the walls in [0, pi) [rad], strongest first, shape (k,).
     """
 
     segments: FloatArray
     clusters: IntArray
     lines: tuple[Line, ...]
     boundary: tuple[Line, ...]
+    angles: FloatArray
 
 
 def find_structure(grid: OccupancyGrid, config: PredictorConfig) -> WallLines | None:
@@ -46,4 +48,4 @@ def find_structure(grid: OccupancyGrid, config: PredictorConfig) -> WallLines | 
         return None
     lines, clusters = find_lines(segments, directions, config.lines)
     carried = segments[clusters >= 0]
-    return WallLines(segments, clusters, lines, boundary_lines(carried, directions, config.lines))
+    return WallLines(segments, clusters, lines, boundary_lines(carried, directions, config.lines), directions.angles)

@@ -53,7 +53,8 @@ def best_subset(
         max_nodes: Limit of the search beyond.
 
     Returns:
-        The best layout; of equal ones the layout as it is, then the larger, the more compact, the closer to the door.
+        The best layout; of equal ones the layout as it is, then the larger, the more compact, the closer to the door,
+        the further to one side as seen from the door.
     """
     options = np.flatnonzero(~fixed)
     if options.size <= exact:
@@ -86,6 +87,7 @@ def _best_row(
             round(float(terms.area[0]), 6),
             -round(float(terms.hull[0]), 6),
             -round(_spread(pool, chosen[i], door), 6),
+            round(float(pool.boxes[chosen[i], :2].mean()), 6),
         )
         if score > top + TIE or key > best:
             top, best, winner = max(score, top), key, chosen[i]

@@ -4,39 +4,51 @@ import itertools
 
 import numpy as np
 import shapely
+from shapely.geometry import Polygon
 
-from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.predictor.arrangement import Arrangement
 
-
-def label_cells(arrangement: Arrangement, frame: GridFrame) -> IntArray:
-    """The face that holds the centre of each cell, -1 outside all, shape ``frame.shape``."""
-    labels = np.full(frame.shape, -1, dtype=np.int64)
-    for number, face in enumerate(arrangement.faces):
-        ring = frame.to_corners(shapely.get_coordinates(face.exterior)) - 0.5  # cell centres on whole numbers
-        (c0, r0), (c1, r1) = np.ceil(ring.min(axis=0) - 1e-9), np.floor(ring.max(axis=0) + 1e-9)
-        rows = np.arange(max(int(r0), 0), min(int(r1), frame.rows - 1) + 1)
-        cols = np.arange(max(int(c0), 0), min(int(c1), frame.cols - 1) + 1)
-        if rows.size == 0 or cols.size == 0:
-            continue
-        inside = np.ones((rows.size, cols.size), dtype=np.bool_)
-        for (ax, ay), (bx, by) in itertools.pairwise(ring):  # left of every side of a convex face
-            inside &= ((bx - ax) * (rows - ay))[:, None] >= ((by - ay) * (cols - ax))[None, :] - 1e-9
-        view = labels[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
-        view[inside & (view < 0)] = number
-    return labels
+# A cell centre this close to a side lies on it [cells].
+ON_SIDE = 1e-6
 
 
 def observed_shares(arrangement: Arrangement, grid: OccupancyGrid) -> tuple[FloatArray, FloatArray]:
-    """Share of each face that is free and that is occupied, shape (n,) each; cells outside the grid are unknown."""
-    labels = label_cells(arrangement, grid.frame)
-    count = len(arrangement.faces)
-    cells = np.bincount(labels[labels >= 0], minlength=count)
-    whole = np.maximum(arrangement.areas / grid.frame.resolution**2, np.maximum(cells, 1))
-    free = np.bincount(labels[grid.free & (labels >= 0)], minlength=count) / whole
-    occupied = np.bincount(labels[grid.occupied & (labels >= 0)], minlength=count) / whole
-    return free, occupied
+    """Share of each face that is free and that is occupied, shape (n,) each; cells outside the grid are unknown.
+
+    A cell counts for the face that holds its centre. Lines of walls run through centres of cells as a rule: a centre
+    on a side counts half on either side of it, so that no face is preferred.
+    """
+    shares = np.zeros((len(arrangement.faces), 2))
+    free, occupied = grid.free, grid.occupied
+    for number, face in enumerate(arrangement.faces):
+        window, weights = _weights(face, grid.frame)
+        total = float(weights.sum())
+        if total > 0.0:
+            whole = max(face.area / grid.frame.resolution**2, total)
+            shares[number] = (weights * free[window]).sum() / whole, (weights * occupied[window]).sum() / whole
+            continue
+        row, col = grid.frame.to_cells(np.array(face.centroid.coords[0]))  # narrower than a cell
+        if grid.frame.contains(np.array([row, col])):
+            shares[number] = free[row, col], occupied[row, col]
+    return shares[:, 0], shares[:, 1]
+
+
+def _weights(face: Polygon, frame: GridFrame) -> tuple[tuple[slice, slice], FloatArray]:
+    """How much of each cell of a window counts for a convex, counter-clockwise face: 1, 1/2 on a side, 0."""
+    ring = frame.to_corners(shapely.get_coordinates(face.exterior)) - 0.5  # cell centres on whole numbers
+    (c0, r0), (c1, r1) = np.ceil(ring.min(axis=0) - ON_SIDE), np.floor(ring.max(axis=0) + ON_SIDE)
+    rows = np.arange(max(int(r0), 0), min(int(r1), frame.rows - 1) + 1)
+    cols = np.arange(max(int(c0), 0), min(int(c1), frame.cols - 1) + 1)
+    if rows.size == 0 or cols.size == 0:
+        return (slice(0, 0), slice(0, 0)), np.zeros((0, 0))
+    weights = np.ones((rows.size, cols.size))
+    for (ax, ay), (bx, by) in itertools.pairwise(ring):
+        length = np.hypot(bx - ax, by - ay)
+        left = ((bx - ax) / length * (rows - ay))[:, None] - ((by - ay) / length * (cols - ax))[None, :]
+        weights *= np.where(left > ON_SIDE, 1.0, np.where(left >= -ON_SIDE, 0.5, 0.0))
+    return (slice(rows[0], rows[-1] + 1), slice(cols[0], cols[-1] + 1)), weights
 
 
 def unknown_faces(arrangement: Arrangement, grid: OccupancyGrid, *, min_unknown: float, max_free: float) -> BoolArray:

@@ -1,0 +1,101 @@
+"""How thick the walls of a map are, and rooms without what their walls take."""
+
+import itertools
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Polygon
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.grid import OccupancyGrid
+
+# Thicker than this is no interior wall but something built in [m].
+MAX_WALL = 0.60
+# With less wall than this seen from both sides [m], nothing is measured and walls are taken to be thin [m].
+MIN_EVIDENCE, THIN_WALL = 2.0, 0.10
+# The share of a side beyond which free space must have been seen, for the wall to be placed by it.
+SEEN = 0.3
+
+
+def measure_thickness(grid: OccupancyGrid, directions: FloatArray) -> float:
+    """Typical thickness of the walls that are seen from both sides, face to face [m].
+
+    Along the normal of each main direction, runs between two free cells that begin and end with an occupied cell are
+    walls; each cell of a wall's length counts once.
+
+    Args:
+        grid: The map, cropped to what is known.
+        directions: Directions of walls, strongest first [rad], shape (k,).
+
+    Returns:
+        The median; ``THIN_WALL`` where hardly any wall is seen from both sides.
+    """
+    resolution = grid.frame.resolution
+    longest = int(MAX_WALL / resolution)
+    runs = [_runs(grid, float(angle), longest) for angle in directions[:2]]
+    lengths = np.concatenate(runs) if runs else np.zeros(0)
+    if lengths.size * resolution < MIN_EVIDENCE:
+        return THIN_WALL
+    return float(np.median(lengths)) * resolution
+
+
+def _runs(grid: OccupancyGrid, angle: float, longest: int) -> FloatArray:
+    """Lengths [cells] of walls across a direction, from every occupied cell with a free one before it, shape (k,)."""
+    normal = np.array([np.cos(angle), -np.sin(angle)])  # (row, col) of one cell across the wall
+    starts = np.argwhere(grid.occupied)
+    steps = np.arange(-1, longest + 1)
+    cells = np.rint(starts[:, None, :] + steps[None, :, None] * normal).astype(np.int64)  # (k, steps, 2)
+    cells = np.clip(cells, 0, np.array(grid.frame.shape) - 1)
+    free = grid.free[cells[..., 0], cells[..., 1]]
+    occupied = grid.occupied[cells[..., 0], cells[..., 1]]
+    first = free[:, 1:].argmax(axis=1) + 1  # index of the first free cell behind; its step is one less
+    wall = free[:, 0] & free[:, 1:].any(axis=1) & occupied[np.arange(len(starts)), first - 1]
+    lengths: FloatArray = first[wall].astype(np.float64) - 1.0
+    return lengths
+
+
+def free_interior(room: Polygon, grid: OccupancyGrid, thickness: float) -> Polygon:
+    """A layout without what its walls take: the free interior, wall face to wall face.
+
+    A line of the layout lies on a wall's middle, or on the face that was seen. Where free space was seen beyond it,
+    the wall begins there and takes its thickness from then on; elsewhere, towards other predicted rooms too, half of
+    it lies on either side.
+
+    Args:
+        room: The layout, line to line, map frame [m].
+        grid: The map, cropped to what is known.
+        thickness: Of walls [m].
+
+    Returns:
+        The largest piece left; the layout itself where it is all wall.
+    """
+    if thickness <= 0.0:
+        return room
+    ring = shapely.get_coordinates(shapely.geometry.polygon.orient(room).simplify(1e-6))
+    walls = []
+    for start, end in itertools.pairwise(ring):
+        depth = _depth(start, end, grid, thickness)
+        if depth > 1e-9:
+            walls.append(LineString((start, end)).buffer(depth, cap_style="square"))
+    left = room.difference(shapely.union_all(walls))
+    parts = [part for part in shapely.get_parts(left).tolist() if isinstance(part, Polygon) and not part.is_empty]
+    return max(parts, key=lambda part: part.area) if parts else room
+
+
+def _depth(start: FloatArray, end: FloatArray, grid: OccupancyGrid, thickness: float) -> float:
+    """How deep the wall on a side of a counter-clockwise layout reaches into it [m]."""
+    span = float(np.hypot(*(end - start)))
+    along = (end - start) / span
+    outward = np.array([along[1], -along[0]])
+    resolution = grid.frame.resolution
+    places = np.arange(resolution / 2, span, resolution)
+    steps = np.arange(-thickness, thickness + resolution, resolution / 2)
+    cells = grid.frame.to_cells(start + places[:, None, None] * along + steps[None, :, None] * outward)
+    inside = grid.frame.contains(cells)  # (places, steps)
+    free = np.zeros(inside.shape, dtype=np.bool_)
+    free[inside] = grid.free[cells[inside, 0], cells[inside, 1]]
+    seen = free.any(axis=1)
+    if places.size == 0 or seen.mean() < SEEN:
+        return thickness / 2
+    furthest_in = steps[free.argmax(axis=1)][seen]
+    return float(np.clip(thickness - np.median(furthest_in), 0.0, 2.0 * thickness))
