@@ -20,6 +20,8 @@ GAP_MARGIN = 0.01
 BARE_GAP = 0.1
 # A usual interior door leaf is 40 to 50 mm thick [m].
 LEAF_THICKNESS = 0.05
+# Corners are rounded to this [m].
+GRID = 1e-6
 # Ends of walls closer than this are one corner [m].
 CORNER = 1e-3
 # Corners that would reach out further than this many half thicknesses are cut off.
@@ -37,7 +39,7 @@ def wall_area(plan: FloorPlan) -> Polygon | MultiPolygon:
         return walls
     lines = WallLines(plan)
     gaps = shapely.union_all([lines.gap(passage.segment) for passage in passages])
-    return areal(shapely.difference(walls, gaps))
+    return _without_twins(shapely.difference(walls, gaps))
 
 
 def solid_walls(walls: Sequence[Wall]) -> Polygon | MultiPolygon:
@@ -47,7 +49,12 @@ def solid_walls(walls: Sequence[Wall]) -> Polygon | MultiPolygon:
     segments = np.array([wall.segment for wall in walls], dtype=np.float64)
     halves = np.array([wall.thickness / 2 for wall in walls], dtype=np.float64)
     bodies = list(np.asarray(shapely.polygons(rectangles(segments, halves))))
-    return areal(shapely.union_all([*bodies, *_corners(segments, halves)]))
+    return _without_twins(shapely.union_all([*bodies, *_corners(segments, halves)]))
+
+
+def _without_twins(area: BaseGeometry) -> Polygon | MultiPolygon:
+    """The area with its corners on a grid of 1 um: corners that nearly coincide would tear the extruded mesh."""
+    return areal(shapely.set_precision(shapely.set_precision(area, GRID), 0.0))
 
 
 def rectangles(segments: FloatArray, halves: FloatArray) -> FloatArray:
