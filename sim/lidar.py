@@ -11,7 +11,7 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.sim.config import LidarConfig, NoiseConfig
 from closedrooms.sim.physics import PhysicsWorld
 
-# A ray is first cast this much further than its neighbours went last time [share, m]; see ``Lidar.cast``.
+# A ray is first cast this much further than its neighbours went last time [share, m]; see ``Lidar.track``.
 FURTHER, MARGIN = 1.05, 0.2
 # Neighbours on each side whose last distances are looked at.
 NEIGHBOURS = 3
@@ -36,11 +36,7 @@ class Lidar:
         self._last_heading = 0.0
 
     def cast(self, world_T_robot: Pose2) -> tuple[FloatArray, IntArray]:
-        """True distances of the first hits.
-
-        A ray's cost grows with its length, and most end after a few metres of the twenty they may go. So each is cast
-        as far as its neighbours went in the last sweep and a little further; the few that hit nothing are cast whole.
-        The first hit of a shorter ray is the first hit of the whole one: nothing is lost.
+        """True distances of the first hits, every ray cast whole.
 
         Args:
             world_T_robot: Where the robot stands.
@@ -49,18 +45,31 @@ class Lidar:
             Distances [m], shape (beams,), infinity where nothing is within ``range_max``, and the bodies hit, shape
             (beams,), -1 without one.
         """
-        sensor = world_T_robot @ self._mount
-        angles = self._angles + sensor.theta
-        directions = np.column_stack((np.cos(angles), np.sin(angles)))
-        start = (sensor.x, sensor.y)
-        lengths = self._expected(sensor.theta)
+        start, directions, _ = self._rays(world_T_robot)
+        return self._shoot(start, directions, np.full(self.config.beams, self.config.range_max))
+
+    def track(self, world_T_robot: Pose2) -> tuple[FloatArray, IntArray]:
+        """The same as :meth:`cast`, sooner, for poses that follow each other.
+
+        A ray's cost grows with its length, and most end after a few metres of the twenty they may go. So each is cast
+        as far as its neighbours went in the last sweep and a little further; the few that hit nothing are cast whole.
+        The first hit of a shorter ray is the first hit of the whole one: nothing is lost.
+        """
+        start, directions, heading = self._rays(world_T_robot)
+        lengths = self._expected(heading)
         distances, bodies = self._shoot(start, directions, lengths)
         missed = np.flatnonzero(np.isinf(distances) & (lengths < self.config.range_max))
         if missed.size:
             whole = np.full(missed.size, self.config.range_max)
             distances[missed], bodies[missed] = self._shoot(start, directions[missed], whole)
-        self._last, self._last_heading = np.minimum(distances, self.config.range_max), sensor.theta
+        self._last, self._last_heading = np.minimum(distances, self.config.range_max), heading
         return distances, bodies
+
+    def _rays(self, world_T_robot: Pose2) -> tuple[tuple[float, float], FloatArray, float]:
+        """Where the sensor is [m], the beams' directions, shape (beams, 2), and its heading [rad]."""
+        sensor = world_T_robot @ self._mount
+        angles = self._angles + sensor.theta
+        return (sensor.x, sensor.y), np.column_stack((np.cos(angles), np.sin(angles))), sensor.theta
 
     def _expected(self, heading: float) -> FloatArray:
         """How far to cast each ray at first [m], shape (beams,)."""
@@ -90,7 +99,7 @@ class Lidar:
             The scan, and for each beam the body that it really measured, shape (beams,): -1 where it hit nothing,
             dropped out or gave an outlier.
         """
-        distances, bodies = self.cast(world_T_robot)
+        distances, bodies = self.track(world_T_robot)
         ranges, measured = self._disturbed(distances)
         config = self.config
         scan = LaserScan(

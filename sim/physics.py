@@ -18,8 +18,8 @@ MAX_RAYS = 16_383
 MAX_TRIANGLES = 30_000
 # Links of one body are truncated silently at 127.
 MAX_LINKS = 126
-# The robot's collision group, which rays skip: a robot never sees itself.
-ROBOT_GROUP = 64
+# Collision groups that rays meet: static bodies are in group 2, moving ones in group 1.
+EVERYTHING = -1
 # A face whose normal is steeper than this against the floor is floor or ceiling.
 UPRIGHT = 0.5
 
@@ -125,20 +125,6 @@ class PhysicsWorld:
         """Put a joint at ``position`` [rad or m]; rays see it at once."""
         self._bullet.resetJointState(body, link, position, physicsClientId=self._client)
 
-    def add_robot(self, radius: float, height: float) -> int:
-        """An upright cylinder [m] that rays do not see; returns the body."""
-        shape = self._bullet.createCollisionShape(
-            self._bullet.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self._client
-        )
-        body: int = self._bullet.createMultiBody(0.0, shape, physicsClientId=self._client)
-        self._bullet.setCollisionFilterGroupMask(body, -1, ROBOT_GROUP, -1, physicsClientId=self._client)
-        return body
-
-    def place(self, body: int, position: tuple[float, float, float], heading: float) -> None:
-        """Put a body at ``position`` [m], turned around the vertical by ``heading`` [rad]."""
-        turn = [0.0, 0.0, np.sin(heading / 2), np.cos(heading / 2)]
-        self._bullet.resetBasePositionAndOrientation(body, position, turn, physicsClientId=self._client)
-
     def cast(self, start: tuple[float, float, float], ends: FloatArray) -> tuple[FloatArray, IntArray]:
         """The first thing that each ray hits.
 
@@ -158,7 +144,7 @@ class PhysicsWorld:
             hits = self._bullet.rayTestBatch(
                 [start] * count,
                 ends[part].tolist(),
-                collisionFilterMask=~ROBOT_GROUP,
+                collisionFilterMask=EVERYTHING,
                 physicsClientId=self._client,
             )
             bodies[part] = np.fromiter(map(itemgetter(0), hits), dtype=np.int64, count=count)

@@ -60,11 +60,10 @@ class Simulation:
             start, robot = self.world_T_map, self.config.robot
             self._drive = Drive(robot, self._building.obstacles, start.x, start.y, start.theta)
             self._check_start()
-            self._physics = physics
-            self._body = physics.add_robot(robot.radius, robot.height)
             self._odometry = Odometry(self.config.noise, self._seed)
             self._lidar = Lidar(self.config.lidar, self.config.noise, physics, self._seed)
             self._time = 0.0
+            self.physics = physics
             self._stack = stack.pop_all()
         return self
 
@@ -149,7 +148,6 @@ class Simulation:
         if end - self._time > 1e-9:
             drive.advance(v, w, end - self._time, self._odometry.add)
         self._time = end
-        self._physics.place(self._body, (drive.x, drive.y, drive.config.height / 2), drive.theta)
 
     def open_door(self, door_id: str) -> None:
         """Let a closed door open while time passes; it waits for a robot that stands in its way.

@@ -79,11 +79,13 @@ def test_rays_agree_with_exact_geometry_on_an_imported_plan(
 def test_rays_cast_short_first_are_the_rays_cast_whole(plan: FloorPlan, exact_config: SimConfig) -> None:
     rng = np.random.default_rng(3)
     with Simulation(plan, ["hinged"], exact_config, 0) as sim:
-        warm = Lidar(exact_config.lidar, exact_config.noise, sim._physics, 0)
+        warm = Lidar(exact_config.lidar, exact_config.noise, sim.physics, 0)
         for _ in range(20):
             pose = Pose2(rng.uniform(0.3, 11.7), rng.uniform(0.3, 3.7), rng.uniform(-math.pi, math.pi))
-            cold = Lidar(exact_config.lidar, exact_config.noise, sim._physics, 0)
-            np.testing.assert_allclose(warm.cast(pose)[0], cold.cast(pose)[0], rtol=0, atol=1e-9)
+            short, whole = warm.track(pose), warm.cast(pose)
+            np.testing.assert_allclose(short[0], whole[0], rtol=0, atol=1e-9)
+            # Where an open leaf lies flush with the wall, either may be named.
+            assert np.mean(short[1] != whole[1]) < 0.005
 
 
 def test_more_rays_than_pybullet_takes_at_once_are_cast_in_chunks(plan: FloorPlan, solids_now: Solids) -> None:
