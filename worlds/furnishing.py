@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-from shapely.geometry import Point, Polygon
+from shapely.geometry import LineString, Point, Polygon
 
 from closedrooms.worlds.geometry import room_interiors
 from closedrooms.worlds.plan import FloorPlan, Furniture
 
-# What stays clear around the middle of a door: its leaf's swing and a step [m].
-DOOR_CLEAR = 1.3
+# What stays clear around a door: its leaf's swing [m].
+DOOR_CLEAR = 1.0
 # A robot of 0.2 m radius passes between things with this clearance [m].
 ROBOT_CLEAR = 0.3
 # Things stand off the wall by this [m].
@@ -53,18 +53,13 @@ def furnish(plan: FloorPlan, rng: np.random.Generator) -> FloorPlan:
     interiors = room_interiors(plan, [room.id for room in plan.rooms])
     things: list[Polygon] = []
     for room in plan.rooms:
-        doors = [Point(_middle(p.segment)) for p in plan.passages if room.id in p.rooms]
+        doors = [LineString(p.segment) for p in plan.passages if room.id in p.rooms]
         things += _furnish_room(rng, room.label, interiors[room.id], doors)
     furniture = tuple(Furniture(f"f{number:03d}", thing) for number, thing in enumerate(things))
     return replace(plan, furniture=furniture)
 
 
-def _middle(segment: tuple[tuple[float, float], tuple[float, float]]) -> tuple[float, float]:
-    (x0, y0), (x1, y1) = segment
-    return ((x0 + x1) / 2, (y0 + y1) / 2)
-
-
-def _furnish_room(rng: np.random.Generator, label: str, interior: Polygon, doors: list[Point]) -> list[Polygon]:
+def _furnish_room(rng: np.random.Generator, label: str, interior: Polygon, doors: list[LineString]) -> list[Polygon]:
     if label == "corridor" and shapely.maximum_inscribed_circle(interior).length * 2 < WIDE_CORRIDOR:
         return []
     keep_clear = shapely.union_all([door.buffer(DOOR_CLEAR) for door in doors])
@@ -78,7 +73,7 @@ def _furnish_room(rng: np.random.Generator, label: str, interior: Polygon, doors
     return placed
 
 
-def _passable(interior: Polygon, things: list[Polygon], doors: list[Point]) -> bool:
+def _passable(interior: Polygon, things: list[Polygon], doors: list[LineString]) -> bool:
     """Whether what a robot can reach stays in one piece that touches every door."""
     free = interior.buffer(0.05).difference(shapely.union_all(things)).buffer(-ROBOT_CLEAR)
     parts = [part for part in shapely.get_parts(free) if part.area > 0.2]
