@@ -79,7 +79,7 @@ def _building(layout: Layout) -> rrb.Container:
         contents=["+ /building/**", "+ /map/grid", "+ /map/scan", "+ /map/path/truth", "+ /rooms/predicted/**"],
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,
-            position=(cx, cy - 0.55 * reach, 0.72 * reach),
+            position=(cx, cy - 0.6 * reach, 0.8 * reach),
             look_target=(cx, cy - 0.02 * reach, 0.0),
             eye_up=(0.0, 0.0, 1.0),
         ),

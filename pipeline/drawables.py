@@ -19,6 +19,19 @@ Z_GRID, Z_FILL, Z_LINE, Z_PATH, Z_POINT = 0.0, 0.02, 0.04, 0.06, 0.08
 THIN, MEDIUM, THICK = -0.75, -1.5, -2.5
 
 
+def _grey_values() -> np.ndarray[tuple[int], np.dtype[np.uint8]]:
+    """Grey of each of the 256 values of a cell."""
+    values = np.arange(256, dtype=np.uint8).view(np.int8)
+    grid = OccupancyGrid(GridFrame(1.0, 0.0, 0.0, 1, 256), values[None])
+    grey = np.full(256, colours.UNKNOWN, dtype=np.uint8)
+    grey[grid.free[0]] = colours.FREE
+    grey[grid.occupied[0]] = colours.OCCUPIED
+    return grey
+
+
+GREY = _grey_values()
+
+
 def lifted(points: FloatArray, z: float) -> FloatArray:
     """Points in the plane, shape (..., 2), at height ``z``, shape (..., 3)."""
     points = np.asarray(points, dtype=np.float64)
@@ -30,13 +43,9 @@ def grid_map(grid: OccupancyGrid) -> rr.GridMap:
 
     rerun draws the first row at the top and places the lower-left corner, so that the rows are turned.
     """
-    window = grid.known_bounds() or (0, 0, 1, 1)
-    row, col, rows, cols = window
+    row, col, rows, cols = grid.known_bounds() or (0, 0, 1, 1)
     frame: GridFrame = grid.frame.cropped(row, col, rows, cols)
-    cells = OccupancyGrid(frame, grid.cells[row : row + rows, col : col + cols])
-    pixels = np.full(frame.shape, colours.UNKNOWN, dtype=np.uint8)
-    pixels[cells.free] = colours.FREE
-    pixels[cells.occupied] = colours.OCCUPIED
+    pixels = GREY[grid.cells[row : row + rows, col : col + cols].view(np.uint8)]
     return rr.GridMap(
         data=pixels[::-1].tobytes(),
         format=rr.components.ImageFormat(width=cols, height=rows, color_model="L", channel_datatype="U8"),

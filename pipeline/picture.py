@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 # Size of one panel, of the strip with its title, and of the gap between panels [pixels].
 PANEL, TITLE, GAP = 900, 40, 14
+# A room lower than this has its name and figure on one line [pixels].
+TWO_LINES = 44
 # Free space around what is known [m].
 MARGIN = 1.0
 # A tour starts in the first colour and ends in the last: the eye can follow it.
@@ -173,7 +175,8 @@ def _draw_rooms(
         label = "+".join(room.doors)
         known = [figures[door] for door in room.doors if door in figures]
         if known:
-            label += f"\n{max(known):.2f}"
+            _, low, _, high = room.polygon.bounds
+            label += ("\n" if (high - low) * canvas.scale > TWO_LINES else "  ") + f"{max(known):.2f}"
         place = shapely.get_coordinates(room.polygon.representative_point())[0]
         canvas.text(place, label)
 

@@ -13,7 +13,7 @@ import rerun as rr
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.core.pose import Pose2, wrap_angle
+from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.core.scan import LaserScan
 from closedrooms.pipeline import colours, drawables
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 # Out of ten scans a second two are kept, and a map every two seconds: what the eye can follow.
 SCAN_PERIOD, MAP_PERIOD = 0.5, 2.0
+# Scans are handed over in batches of this size.
+SCAN_BATCH = 64
 # A vertex of a drawn path every so many metres.
 PATH_STEP = 0.1
 NOTHING = np.zeros((0, 2))
@@ -69,6 +71,8 @@ class Recorder:
         self._palette: dict[str, colours.Colour] = {}
         self._stage: int = Stage.MAPPING
         self._poses: list[tuple[float, ...]] = []
+        self._scans: list[tuple[float, int, FloatArray]] = []
+        self._corrected: tuple[FloatArray, FloatArray] | None = None
         self._areas: list[tuple[float, float]] = []
         self._paths: dict[str, list[Point]] = {"odometry": [], "estimate": [], "truth": []}
         self._seen: set[str] = set()
@@ -127,6 +131,8 @@ class Recorder:
         """Keep the poses, and draw every few scans."""
         if not self._poses:
             self._draw_robot("map/robot", colours.ESTIMATE)
+            style = rr.Points3D.from_fields(colors=[colours.SCAN], radii=[drawables.MEDIUM])
+            self._stream.log("map/scan", style, static=True)
             self._stream.at(scan.stamp, self._stage)
             self._say("Mapping", "the robot explores until nothing reachable is left unknown")
         known = {"odometry": odometry, "estimate": map_T_robot, "truth": truth}
@@ -139,9 +145,10 @@ class Recorder:
                 path.append((pose.x, pose.y))
         if scan.stamp >= self._last_scan + SCAN_PERIOD - 1e-6:
             self._last_scan = scan.stamp
-            self._stream.at(scan.stamp, self._stage)
             ends = map_T_robot.transform(Pose2(*scan.robot_T_sensor).transform(scan.points_sensor()))
-            self._stream.log("map/scan", drawables.points(ends, colours.SCAN, radius=drawables.MEDIUM))
+            self._scans.append((scan.stamp, self._stage, ends))
+            if len(self._scans) >= SCAN_BATCH:
+                self._send_scans()
 
     def wants_map(self, stamp: float) -> bool:
         """Whether enough time has passed since the last map."""
@@ -152,12 +159,13 @@ class Recorder:
         if not final and not self.wants_map(stamp):
             return
         self._last_map = stamp
-        self._map_bounds = _known_bounds(grid)
+        if not self._arranged:
+            self._map_bounds = _known_bounds(grid)
         self._stream.at(stamp, self._stage)
         self._stream.log("map/grid", drawables.grid_map(grid))
         if final:
             self.frontiers(NOTHING, None, None, stamp)
-        self._areas.append((stamp, float(grid.known.sum()) * grid.frame.resolution**2))
+        self._areas.append((stamp, float(np.count_nonzero(grid.known)) * grid.frame.resolution**2))
         for name, path in self._paths.items():
             if path:
                 colour = {"odometry": colours.ODOMETRY, "estimate": colours.ESTIMATE, "truth": colours.TRUTH}[name]
@@ -191,8 +199,10 @@ class Recorder:
         """The whole trajectory after the last optimisation."""
         if len(stamps):
             self._stream.at(float(stamps[-1]), self._stage)
-            path = np.asarray(poses)[:, :2]
+            path = np.asarray(poses, dtype=np.float64)[:, :2]
+            self._paths["estimate"] = [(float(x), float(y)) for x, y in path[:: max(len(path) // 2000, 1)]]
             self._stream.log("map/path/estimate", drawables.strips([path], colours.ESTIMATE, z=drawables.Z_PATH))
+            self._corrected = (np.asarray(stamps, dtype=np.float64), np.asarray(poses, dtype=np.float64))
 
     def truth(self, grid: OccupancyGrid, rooms: Sequence[Room]) -> None:
         """The true map and rooms."""
@@ -254,34 +264,47 @@ class Recorder:
             static=True,
         )
 
+    def _send_scans(self) -> None:
+        """The scans that were kept since the last time, in one call: many times cheaper than one call each."""
+        if not self._scans:
+            return
+        lengths = [len(ends) for _, _, ends in self._scans]
+        places = drawables.lifted(np.concatenate([ends for _, _, ends in self._scans]), drawables.Z_POINT)
+        columns = rr.Points3D.columns(positions=places).partition(lengths)
+        stages = [stage for _, stage, _ in self._scans]
+        self._stream.columns("map/scan", np.array([stamp for stamp, _, _ in self._scans]), columns, stages)
+        self._scans = []
+
     def _send_series(self) -> None:
         """Poses, errors and areas, as whole columns."""
+        self._send_scans()
         if self._areas:
             stamps, areas = np.array(self._areas).T
             self._series("metrics/known_area/map", stamps, areas, "known area", colours.ESTIMATE)
         if not self._poses:
             return
         table = np.array(self._poses)
-        stamps, odometry, estimate, truth = table[:, 0], table[:, 2:5], table[:, 5:8], table[:, 8:11]
-        self._stream.columns("map/robot", stamps, drawables.pose_columns(estimate))
+        stamps, stages, odometry, estimate, truth = np.split(table, [1, 2, 5, 8], axis=1)
+        stamps, steps = stamps[:, 0], stages[:, 0].astype(int).tolist()
+        self._stream.columns("map/robot", stamps, drawables.pose_columns(estimate), steps)
         given = np.isfinite(truth[:, 0])
         if not given.any():
             return
-        stamps, truth = stamps[given], truth[given]
         if self._building is not None:
-            self._stream.columns("building/robot", stamps, drawables.pose_columns(truth))
-        for name, poses, colour in (
-            ("odometry", odometry[given], colours.ODOMETRY),
-            ("estimate", estimate[given], colours.ESTIMATE),
-        ):
-            away = np.hypot(*(poses[:, :2] - truth[:, :2]).T)
-            turned = np.degrees(np.abs([wrap_angle(angle) for angle in poses[:, 2] - truth[:, 2]]))
-            self._series(f"metrics/position_error/{name}", stamps, away, name, colour)
-            self._series(f"metrics/heading_error/{name}", stamps, turned, name, colour)
+            self._stream.columns("building/robot", stamps, drawables.pose_columns(truth), steps)
+        tracks = {"odometry": (odometry, colours.ODOMETRY), "estimate": (estimate, colours.ESTIMATE)}
+        if self._corrected is not None and np.array_equal(self._corrected[0], stamps):
+            tracks["after the last optimisation"] = (self._corrected[1], colours.LOOP)
+        for name, (poses, colour) in tracks.items():
+            away = np.hypot(*(poses[given, :2] - truth[given, :2]).T)
+            turned = np.degrees(np.abs((poses[given, 2] - truth[given, 2] + np.pi) % (2 * np.pi) - np.pi))
+            path = name.replace(" ", "_")
+            self._series(f"metrics/position_error/{path}", stamps[given], away, name, colour)
+            self._series(f"metrics/heading_error/{path}", stamps[given], turned, name, colour)
 
     def _series(self, path: str, stamps: FloatArray, values: FloatArray, name: str, colour: colours.Colour) -> None:
         self._stream.log(path, rr.SeriesLines(colors=[colour], names=[name], widths=[1.5]), static=True)
-        self._stream.columns(path, stamps, rr.Scalars.columns(scalars=values))
+        self._stream.columns(path, stamps, rr.Scalars.columns(scalars=values), [Stage.MAPPING] * len(stamps))
 
 
 def _known_bounds(grid: OccupancyGrid) -> Bounds | None:

@@ -28,7 +28,7 @@ def draw_doors(stream: RecordingStream, root: str, doors: Sequence[ClosedDoor]) 
     bars = [np.asarray(door.segment) for door in doors if door.segment is not None]
     labels = [door.id for door in doors]
     stream.log(f"{root}/bars", drawables.strips(bars, colours.DOOR_CLOSED, radius=drawables.THICK, z=drawables.Z_PATH))
-    stream.log(f"{root}/ids", drawables.points(places, colours.DOOR_CLOSED, radius=drawables.THICK, labels=labels))
+    stream.log(f"{root}/ids", drawables.points(places, colours.PAPER, radius=drawables.THIN, labels=labels))
 
 
 def draw_input(stream: RecordingStream, grid: OccupancyGrid, doors: Sequence[ClosedDoor]) -> None:

@@ -2,7 +2,7 @@
 
 import contextlib
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from enum import IntEnum
 from pathlib import Path
 from types import TracebackType
@@ -116,11 +116,11 @@ class RecordingStream:
         """Log at the current time, or for all times."""
         self._rec.log(path, *archetypes, static=static)
 
-    def columns(self, path: str, stamps: FloatArray, columns: Any, stage: int = Stage.MAPPING) -> None:
-        """Send one value a stamp [s] at once; all belong to ``stage``."""
+    def columns(self, path: str, stamps: FloatArray, columns: Any, stages: Sequence[int]) -> None:
+        """Send one value a stamp [s] and stage at once."""
         times = [
             rr.TimeColumn("sim_time", duration=stamps),
-            rr.TimeColumn("stage", sequence=[int(stage)] * len(stamps)),
+            rr.TimeColumn("stage", sequence=[int(stage) for stage in stages]),
         ]
         self._rec.send_columns(path, times, columns)
 
