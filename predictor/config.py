@@ -42,8 +42,11 @@ class StructureConfig:
     angle_bandwidth: float = math.radians(12.0)
     """Half width of the mean shift kernel over wall directions [rad]."""
 
+    direction_segment: float = 0.50
+    """Shorter segments have no say in which directions there are [m]: ten cells tell a direction to 6 degrees."""
+
     min_direction_length: float = 2.0
-    """A direction needs this much wall in segments that vote by themselves [m]; less is noise of the raster."""
+    """A direction needs this much wall in longer segments [m]; less is noise of the raster."""
 
     min_direction_share: float = 0.03
     """A direction needs this share of the wall of the strongest direction."""

@@ -33,7 +33,7 @@ def find_directions(segments: FloatArray, config: StructureConfig) -> Directions
     """Cluster segments by direction; any direction may occur, and 0 and 180 degrees are the same.
 
     Mean shift with a flat kernel, weighted by squared length: the direction of a segment of few cells says little.
-    A direction counts when segments long enough to have voted for a line by themselves carry it.
+    A direction counts when segments long enough to tell a direction carry it.
 
     Args:
         segments: Ends [m], shape (n, 4).
@@ -47,7 +47,7 @@ def find_directions(segments: FloatArray, config: StructureConfig) -> Directions
     apart = np.abs(angle_between(angles[:, None], modes[None, :]))  # (n, modes)
     nearest = apart.argmin(axis=1)
     member = apart[np.arange(len(angles)), nearest] <= config.angle_bandwidth
-    long = member & (lengths >= config.hough_votes)
+    long = member & (lengths >= config.direction_segment)
     carried = np.bincount(nearest[long], weights=lengths[long], minlength=modes.size)
     needed = max(config.min_direction_length, config.min_direction_share * float(carried.max(initial=0.0)))
     strengths = np.zeros(modes.size)

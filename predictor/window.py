@@ -2,7 +2,14 @@
 
 import numpy as np
 
+from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
+
+# What of an interpolated cell must be occupied to stay so: below a half, as slanted walls one cell thick touch at
+# corners only.
+STAYS = 0.4
+# Width of the Gaussian that evens out staircases [coarse cells].
+SMOOTH = 0.5
 
 
 def known_window(grid: OccupancyGrid, *, margin: int = 8) -> OccupancyGrid | None:
@@ -17,8 +24,8 @@ def known_window(grid: OccupancyGrid, *, margin: int = 8) -> OccupancyGrid | Non
 def at_resolution(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:
     """The same map in cells of ``resolution`` [m]; walls survive in coarser cells.
 
-    A coarser cell is occupied when any of the cells whose centre it holds is, else free when any is free. A finer
-    cell takes the value at its centre.
+    A coarser cell is occupied when any of the cells whose centre it holds is, else free when any is free. Finer cells
+    interpolate, so that a slanted wall does not become a staircase, which has no direction.
     """
     frame = grid.frame
     if abs(frame.resolution - resolution) < 1e-6 * resolution:
@@ -33,8 +40,20 @@ def at_resolution(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:
             held = target.to_cells(frame.to_points(np.argwhere(mask)))
             cells[held[:, 0], held[:, 1]] = value
         return OccupancyGrid(target, cells)
-    centres = target.to_points(np.stack((np.arange(max(rows, cols)),) * 2, axis=-1))
-    source = frame.to_cells(centres)
-    row = np.clip(source[:rows, 0], 0, frame.rows - 1)
-    col = np.clip(source[:cols, 1], 0, frame.cols - 1)
-    return OccupancyGrid(target, grid.cells[np.ix_(row, col)])
+    occupied = _interpolated(grid.occupied, resolution / frame.resolution, target) >= STAYS
+    free = _interpolated(grid.free, resolution / frame.resolution, target) >= STAYS
+    cells[free] = FREE
+    cells[occupied] = OCCUPIED
+    return OccupancyGrid(target, cells)
+
+
+def _interpolated(mask: BoolArray, scale: float, target: GridFrame) -> FloatArray:
+    """A mask of coarse cells, interpolated linearly at the centres of finer ones."""
+    import cv2
+
+    shift = 0.5 * scale - 0.5
+    to_source = np.array([[scale, 0.0, shift], [0.0, scale, shift]])
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    size = (target.cols, target.rows)
+    fine = cv2.warpAffine(mask.astype(np.float32), to_source, size, flags=flags)
+    return cv2.GaussianBlur(fine, (0, 0), SMOOTH / scale).astype(np.float64)
