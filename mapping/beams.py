@@ -11,7 +11,11 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 
 OUTLIER_GAP = 0.30
-"""A beam that is longer or shorter than both its neighbours by this [m] (ten sigma of a common lidar) hit nothing."""
+"""A beam that is longer than its surroundings, or shorter than both its neighbours, by this [m] (six sigma of a noisy
+lidar) is not believed."""
+SURROUNDINGS = 2
+"""Beams to each side whose median says how far one can see: two outliers in a row, at 1 % of them one scan in ten,
+still open no way through a wall."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,12 +33,21 @@ class Beams:
     origin: FloatArray
 
 
+def hit_points(scan: LaserScan, *, max_range: float) -> FloatArray:
+    """End points of all beams that ended on something up to ``max_range`` [m], robot frame, shape (n, 2)."""
+    ranges = scan.ranges
+    hits = (ranges >= scan.range_min) & (ranges < min(max_range, scan.range_max))
+    directions, _ = _directions(scan.angle_min, scan.angle_increment, ranges.size)
+    return Pose2(*scan.robot_T_sensor).transform(directions[hits] * ranges[hits, None])
+
+
 def clean(scan: LaserScan, *, max_range: float) -> Beams:
     """Sort out what a scan says.
 
-    Lone beams (outliers, mixed pixels at edges) are no surface, and count as free only as far as a neighbour reaches;
-    one drop-out between two measurements takes the shorter of them. Half-way between two beams only the shorter range
-    counts as crossed, so that nothing is cleared which no beam went through.
+    Beams far beyond their surroundings (outliers, mixed pixels at edges) are no surface and count as free only as far
+    as the surroundings reach; beams far before both neighbours are no surface; a drop-out between two measurements
+    takes the shorter of them. Half-way between two beams only the shorter range counts as crossed, so that nothing is
+    cleared which no beam went through.
 
     Args:
         scan: NaN is a drop-out, infinity (or anything from ``range_max``) is no return up to ``range_max``.
@@ -44,15 +57,16 @@ def clean(scan: LaserScan, *, max_range: float) -> Beams:
     ranges = np.where(scan.ranges >= scan.range_max, np.inf, scan.ranges)
     ranges[ranges < scan.range_min] = np.nan
     wrap = abs(abs(scan.angle_increment) * ranges.size - 2.0 * math.pi) < 1.5 * abs(scan.angle_increment)
-    before, after = _neighbours(ranges, wrap=wrap)
-    lower, upper = np.fmin(before, after), np.fmax(before, after)
-    lone_long = ranges > upper + OUTLIER_GAP
-    lone = lone_long | (ranges < lower - OUTLIER_GAP)
-    crossed = np.where(lone_long, upper, ranges)
+    around = _around(ranges, wrap=wrap)
+    before, after = around[SURROUNDINGS - 1], around[SURROUNDINGS + 1]
+    typical = _median(around)
+    too_long = ranges > typical + OUTLIER_GAP
+    too_short = ranges < np.fmin(before, after) - OUTLIER_GAP
+    surface: BoolArray = ~too_long & ~too_short & (ranges < reach)
+    crossed = np.where(too_long, typical, ranges)
     gap = np.isnan(ranges) & ~np.isnan(before) & ~np.isnan(after)
-    crossed = np.minimum(np.where(gap, lower, crossed), reach)
+    crossed = np.minimum(np.where(gap, np.minimum(np.minimum(before, after), typical), crossed), reach)
     crossed[np.isnan(crossed)] = 0.0
-    surface: BoolArray = ~lone & (ranges < reach)
 
     sensor = Pose2(*scan.robot_T_sensor)
     directions, halves = _directions(scan.angle_min, scan.angle_increment, ranges.size)
@@ -66,17 +80,27 @@ def clean(scan: LaserScan, *, max_range: float) -> Beams:
     return Beams(sensor.transform(points), sensor.transform(outline), np.array([sensor.x, sensor.y]))
 
 
+def _around(ranges: FloatArray, *, wrap: bool) -> FloatArray:
+    """Ranges of each beam's neighbours and itself, shape (2 * SURROUNDINGS + 1, n), NaN beyond the ends."""
+    ends = np.full(SURROUNDINGS, np.nan)
+    first, last = (ranges[-SURROUNDINGS:], ranges[:SURROUNDINGS]) if wrap else (ends, ends)
+    padded = np.concatenate((first, ranges, last))
+    return np.stack([padded[i : i + ranges.size] for i in range(2 * SURROUNDINGS + 1)])
+
+
+def _median(around: FloatArray) -> FloatArray:
+    """Median of each column, the lower of two, NaN left out (NaN where there is nothing else)."""
+    measured = around.shape[0] - np.isnan(around).sum(axis=0)
+    middle = np.maximum(measured - 1, 0) // 2
+    return np.asarray(np.sort(around, axis=0)[middle, np.arange(around.shape[1])])
+
+
 @functools.lru_cache(maxsize=8)
 def _directions(angle_min: float, increment: float, beams: int) -> tuple[FloatArray, FloatArray]:
     """Unit vectors of the beams and of the directions half-way to the next ones, shape (beams, 2) each."""
     angles = angle_min + increment * np.arange(beams)
     half = angles + increment / 2.0
     return np.column_stack((np.cos(angles), np.sin(angles))), np.column_stack((np.cos(half), np.sin(half)))
-
-
-def _neighbours(ranges: FloatArray, *, wrap: bool) -> tuple[FloatArray, FloatArray]:
-    first, last = (ranges[-1:], ranges[:1]) if wrap else (np.full(1, np.nan), np.full(1, np.nan))
-    return np.concatenate((first, ranges[:-1])), np.concatenate((ranges[1:], last))
 
 
 def thin(points: FloatArray, spacing: float, most: int) -> FloatArray:

@@ -40,8 +40,11 @@ class MatcherConfig:
     min_score: float = 0.45
     """Mean likelihood [0..1] below which a refinement is doubted and a search is made."""
 
-    doubt: float = 0.8
+    doubt: float = 0.85
     """Share of the usual score below which a refinement is doubted and a search is made."""
+
+    sure_angle: float = 0.02
+    """Standard deviation of the odometry's heading above which headings are searched before a refinement [rad]."""
 
     window_sigmas: float = 3.0
     """Half width of the search window in standard deviations of the odometry."""

@@ -60,9 +60,7 @@ def search(
     """
     lattice = field.lattice
     points = points[:: -(-len(points) // MAX_POINTS)]
-    reach = max(float(np.percentile(np.hypot(points[:, 0], points[:, 1]), 80)), 1.0) if len(points) else 1.0
-    # A turn by this moves a far point by two cells (Olson, section III.B, takes one; walls blur over several).
-    angle_step = min(max(2.0 * lattice.resolution / reach, 0.004), 0.04)
+    angle_step = _angle_step(field, points)
     n_angles = math.ceil(window.angle / angle_step)
     turns: FloatArray = np.arange(-n_angles, n_angles + 1, dtype=np.float64) * angle_step
     half = max(1, math.ceil(window.distance / lattice.resolution))
@@ -88,6 +86,38 @@ def search(
             dy, dx = fine[k] * lattice.resolution
             best_pose = Pose2(guess.x + float(dx), guess.y + float(dy), guess.theta + float(turns[i]))
     return Found(best_pose, best_score)
+
+
+def search_heading(field: LikelihoodField, points: FloatArray, guess: Pose2, sigma: float, reach: float) -> Pose2:
+    """Find the heading with the highest mean likelihood at the guessed position.
+
+    Odometry is worst in turns, and a wrong heading is what a refinement does not recover from; one look-up per point
+    and heading is nearly free.
+
+    Args:
+        field: The surfaces.
+        points: Robot frame, shape (n, 2) [m].
+        guess: ``map_T_robot``.
+        sigma: Standard deviation of its heading [rad].
+        reach: Half width of the search in standard deviations.
+    """
+    points = points[:: -(-len(points) // MAX_POINTS)]
+    step = _angle_step(field, points)
+    count = math.ceil(reach * sigma / step)
+    turns: FloatArray = np.arange(-count, count + 1, dtype=np.float64) * step
+    values, rows, cols = _surroundings(field, points, guess, turns, 0)
+    no_shift = np.zeros((1, 2), dtype=np.int64)
+    scores = _scores(values, rows, cols, no_shift) - _penalties(turns, no_shift, 1, 1.0, (1.0, sigma))
+    # From the middle outwards, so that the odometry wins ties.
+    order = np.argsort(np.abs(turns), kind="stable")
+    best = order[int(np.argmax(scores[order, 0]))]
+    return Pose2(guess.x, guess.y, guess.theta + float(turns[best]))
+
+
+def _angle_step(field: LikelihoodField, points: FloatArray) -> float:
+    """A turn that moves a far point by two cells [rad] (Olson, section III.B, takes one; walls blur over several)."""
+    far = float(np.percentile(np.hypot(points[:, 0], points[:, 1]), 80)) if len(points) else 1.0
+    return min(max(2.0 * field.lattice.resolution / max(far, 1.0), 0.004), 0.04)
 
 
 def _surroundings(
@@ -131,6 +161,8 @@ def _scores(values: Float32Array, rows: IntArray, cols: IntArray, shifts: IntArr
     flat = rows * width + cols
     offsets = (shifts[:, 0] * width + shifts[:, 1])[:, None]
     scores: FloatArray = np.empty((rows.shape[0], len(shifts)), dtype=np.float64)
+    if len(shifts) == 1:
+        return np.asarray(flat_values[flat + offsets[0]].mean(axis=1, dtype=np.float64)[:, None])
     for i in range(rows.shape[0]):
         scores[i] = flat_values[flat[i] + offsets].mean(axis=1)
     return scores

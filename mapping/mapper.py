@@ -10,7 +10,7 @@ from closedrooms.core.door import ClosedDoor, DoorSighting
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.beams import clean, thin
+from closedrooms.mapping.beams import clean, hit_points, thin
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.doors import fuse_doors
 from closedrooms.mapping.evidence import EvidenceGrid
@@ -21,8 +21,6 @@ from closedrooms.mapping.matcher import Motion, match_scan
 from closedrooms.mapping.posegraph import Edge, PoseGraph, optimise
 from closedrooms.mapping.refinement import refine
 
-STILL = (0.005, 0.003)
-"""Motion ([m], [rad]) below which a scan is not matched again."""
 MOVED = (0.015, 0.003)
 """Correction of a keyframe ([m], [rad]) beyond which it is drawn anew."""
 SCORE_MEMORY = 0.05
@@ -75,11 +73,12 @@ class Mapper:
             ``map_T_robot`` as estimated.
         """
         self._predict(odometry)
-        beams = clean(scan, max_range=self._config.max_range)
-        points = thin(beams.points, self._config.matcher.point_spacing, self._config.matcher.max_points)
+        matcher, max_range = self._config.matcher, self._config.max_range
+        points = thin(hit_points(scan, max_range=max_range), matcher.point_spacing, matcher.max_points)
         if self._keyframes:
             self._match(points)
         if self._wants_keyframe():
+            beams = clean(scan, max_range=max_range)
             self._insert(Keyframe(len(self._keyframes), scan.stamp, self._pose, beams, points, self._way))
         latest = self._keyframes[-1]
         keyframe_T_robot = latest.pose.inverse() @ self._pose
@@ -95,11 +94,11 @@ class Mapper:
             self._pose = self._pose @ step
             way = math.hypot(step.x, step.y)
             self._way += way
-            self._motion = Motion(self._motion.way + way, self._motion.turn + abs(step.theta))
+            self._motion = self._motion.then(way, abs(step.theta))
         self._odometry = odometry
 
     def _match(self, points: FloatArray) -> None:
-        if self._motion.way < STILL[0] and self._motion.turn < STILL[1]:
+        if self._motion.still:
             return
         match = match_scan(
             self._local.field,
@@ -113,7 +112,7 @@ class Mapper:
             return
         self._pose = match.pose
         self._hessian = match.hessian
-        self._motion = Motion()
+        self._motion = self._motion.matched()
         self._usual_score += SCORE_MEMORY * (match.score - self._usual_score)
 
     def _wants_keyframe(self) -> bool:
@@ -143,7 +142,7 @@ class Mapper:
         previous = self._keyframes[keyframe.index - 1]
         way = keyframe.way - previous.way
         turn = abs(wrap_angle(keyframe.pose.theta - previous.pose.theta))
-        distance, angle = Motion(way, turn).sigmas(self._config.matcher)
+        distance, angle = Motion(way=way, turn=turn).sigmas(self._config.matcher)
         odometry = np.diag([distance**-2, distance**-2, angle**-2])
         information = odometry + self._information(self._hessian, keyframe.pose)
         a_T_b = previous.pose.inverse() @ keyframe.pose

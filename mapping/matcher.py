@@ -8,10 +8,14 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MatcherConfig
-from closedrooms.mapping.correlative import Window, search
+from closedrooms.mapping.correlative import Window, search, search_heading
 from closedrooms.mapping.likelihood import LikelihoodField
 from closedrooms.mapping.refinement import Refined, refine
 
+STILL = (0.005, 0.003)
+"""Motion ([m], [rad]) below which a scan is not matched again."""
+FADING = 0.6
+"""Share of the last step's motion that the next one is thought capable of, whatever its odometry says."""
 ADVANTAGE = 0.03
 """Mean likelihood by which a searched pose must beat the refined odometry to replace it."""
 
@@ -23,18 +27,44 @@ class Motion:
     Attributes:
         way: Distance driven [m].
         turn: Absolute turn [rad].
+        recent_way: The largest of the last steps, fading [m].
+        recent_turn: The largest of the last turns, fading [rad].
     """
 
     way: float = 0.0
     turn: float = 0.0
+    recent_way: float = 0.0
+    recent_turn: float = 0.0
+
+    def then(self, way: float, turn: float) -> "Motion":
+        """After one more step.
+
+        What moved a moment ago hardly stands still: a noisy odometry may read zero by chance in the middle of a turn.
+        """
+        return Motion(
+            self.way + way,
+            self.turn + turn,
+            max(way, FADING * self.recent_way),
+            max(turn, FADING * self.recent_turn),
+        )
+
+    def matched(self) -> "Motion":
+        """From a match on."""
+        return Motion(recent_way=self.recent_way, recent_turn=self.recent_turn)
+
+    @property
+    def still(self) -> bool:
+        """Too little to match again."""
+        return max(self.way, self.recent_way) < STILL[0] and max(self.turn, self.recent_turn) < STILL[1]
 
     def sigmas(self, config: MatcherConfig) -> tuple[float, float]:
         """Standard deviations of the predicted position [m] and heading [rad]; the variance grows with the way."""
-        distance = math.sqrt(config.odometry_floor**2 + config.odometry_distance**2 * self.way)
+        way, turn = max(self.way, self.recent_way), max(self.turn, self.recent_turn)
+        distance = math.sqrt(config.odometry_floor**2 + config.odometry_distance**2 * way)
         angle = math.sqrt(
             (config.odometry_floor / 2.0) ** 2
-            + config.odometry_turn_per_metre**2 * self.way
-            + config.odometry_turn**2 * self.turn
+            + config.odometry_turn_per_metre**2 * way
+            + config.odometry_turn**2 * turn
         )
         return distance, angle
 
@@ -90,7 +120,10 @@ def match_scan(
         return refine(field, points, start, prior=guess, prior_information=information, iterations=config.iterations)
 
     doubted = max(config.min_score, config.doubt * usual_score)
-    direct = refined(guess)
+    start = guess
+    if sigma_angle > config.sure_angle:
+        start = search_heading(field, points, guess, sigma_angle, config.window_sigmas)
+    direct = refined(start)
     if direct.score >= doubted:
         return Match(direct.pose, direct.score, direct.hessian, searched=False)
     window = Window(
