@@ -1,0 +1,96 @@
+"""The tour of a graph from the tours of its blocks.
+
+A closed walk over a graph, cut at a vertex that alone holds two sides together, falls into a closed walk of each side.
+So the shortest tour is the union of the shortest tours of the blocks (the parts that no single vertex cuts), and the
+sum of their lower bounds is a lower bound. A block of two vertices is a bridge: there and back, exactly. Floors are
+mostly trees of rooms along corridors, so that little is left to search.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.coverage.graph import TopologicalGraph
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Metric:
+    """Shortest ways over a graph between some of its vertices.
+
+    Attributes:
+        vertices: Numbers in the graph, shape (k,).
+        distances: Length of the shortest way along edges [m], shape (k, k).
+        before: Position in ``vertices`` of the last stop before ``[i, j]``, on the way from i to j.
+    """
+
+    vertices: IntArray
+    distances: FloatArray
+    before: IntArray
+
+    def walk(self, tour: list[int]) -> list[int]:
+        """The closed walk over vertices of the graph that visits the positions of ``tour`` in turn and returns."""
+        walk = [tour[0]]
+        for a, b in pairwise([*tour, tour[0]]):
+            way, stop = [], b
+            while stop != a:
+                way.append(stop)
+                stop = int(self.before[a, stop])
+            walk += reversed(way)
+        return [int(self.vertices[stop]) for stop in walk]
+
+
+def metric(graph: TopologicalGraph, members: list[int]) -> Metric:
+    """Shortest ways between ``members`` that stay among them."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import dijkstra
+
+    vertices = np.array(members, dtype=np.int64)
+    position = np.full(len(graph.vertices), -1, dtype=np.int64)
+    position[vertices] = np.arange(len(vertices))
+    ends = position[graph.edges]
+    inside = (ends >= 0).all(axis=1)
+    ends = ends[inside]
+    # Two vertices at one place would be an edge of weight 0, which a sparse matrix takes for none.
+    weights = np.maximum(graph.lengths[inside], 1e-9)
+    links = coo_array((weights, (ends[:, 0], ends[:, 1])), shape=(len(vertices), len(vertices)))
+    distances, before = dijkstra(links.tocsr(), directed=False, return_predecessors=True)
+    return Metric(vertices, np.minimum(distances, distances.T), before.astype(np.int64))
+
+
+def find_blocks(graph: TopologicalGraph, members: list[int]) -> list[list[int]]:
+    """The blocks (biconnected components) of one connected part, each sorted, in a fixed order."""
+    import networkx as nx
+
+    chosen = set(members)
+    links: Any = nx.Graph()
+    links.add_edges_from((u, v) for u, v in graph.edges.tolist() if u in chosen)
+    found: Any = nx.biconnected_components(links)
+    blocks: list[list[int]] = [sorted(block) for block in found]
+    return sorted(blocks)
+
+
+def join_walks(walks: list[list[int]], start: int) -> list[int]:
+    """One closed walk from ``start`` that takes every step of the given closed walks (Hierholzer)."""
+    steps: dict[int, list[tuple[int, int]]] = {start: []}
+    number = 0
+    for walk in walks:
+        for a, b in pairwise(walk):
+            steps.setdefault(a, []).append((b, number))
+            steps.setdefault(b, []).append((a, number))
+            number += 1
+    used = [False] * number
+    stack, joined = [start], []
+    while stack:
+        way = steps[stack[-1]]
+        while way and used[way[-1][1]]:
+            way.pop()
+        if way:
+            other, step = way.pop()
+            used[step] = True
+            stack.append(other)
+        else:
+            joined.append(stack.pop())
+    return joined

@@ -1,0 +1,66 @@
+"""How well a map tells the cost of coverage (paper, sections 5.2 and 5.3)."""
+
+from dataclasses import dataclass
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.coverage.tour import CoverageTour
+
+
+@dataclass(frozen=True, slots=True)
+class CoverageErrors:
+    """The four estimates of the length of a coverage tour and the three errors.
+
+    Attributes:
+        tsp_closed: Tour on M with a vertex at each closed door [m].
+        tsp_baseline: ``tsp_closed + tsp_closed / |R| * |D|`` [m].
+        tsp_pred: Tour on M_pred [m].
+        tsp_gt: Tour on M_GT [m].
+        error_closed: ``|tsp_gt - tsp_closed| / tsp_gt`` in percent.
+        error_baseline: Likewise for the baseline, percent.
+        error_pred: Likewise for the prediction, percent.
+    """
+
+    tsp_closed: float
+    tsp_baseline: float
+    tsp_pred: float
+    tsp_gt: float
+    error_closed: float
+    error_baseline: float
+    error_pred: float
+
+
+def coverage_errors(
+    closed: CoverageTour, predicted: CoverageTour, truth: CoverageTour, n_rooms: int, n_doors: int
+) -> CoverageErrors:
+    """The estimates and errors of section 5.2 and 5.3.
+
+    Args:
+        closed: Tour on M.
+        predicted: Tour on M_pred.
+        truth: Tour on M_GT.
+        n_rooms: |R|, the rooms that the robot observed: true rooms seen where truth is known, else
+            :func:`closedrooms.coverage.rooms.count_rooms` of M. At least 1: a map that holds a tour holds a room.
+        n_doors: |D|, the closed doors in M.
+
+    Raises:
+        InvalidInputError: Tours of different methods, or a true tour of length 0.
+    """
+    methods = {tour.method for tour in (closed, predicted, truth)}
+    if len(methods) > 1:
+        raise InvalidInputError(f"tours by {', '.join(sorted(methods))}", expected="the same method for all three")
+    if truth.length <= 0.0:
+        raise InvalidInputError("a true tour of length 0", expected="a building with more than one place to visit")
+    baseline = closed.length + closed.length / max(n_rooms, 1) * n_doors
+
+    def error(estimate: float) -> float:
+        return abs(truth.length - estimate) / truth.length * 100.0
+
+    return CoverageErrors(
+        closed.length,
+        baseline,
+        predicted.length,
+        truth.length,
+        error(closed.length),
+        error(baseline),
+        error(predicted.length),
+    )

@@ -1,0 +1,73 @@
+"""Whether a straight segment crosses an obstacle, cell by cell."""
+
+import numpy as np
+
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+
+
+def cells_between(a: FloatArray, b: FloatArray) -> IntArray:
+    """Cells (row, col) whose inside the segment from ``a`` to ``b`` crosses, exact.
+
+    Args:
+        a: Start as (row, col) in continuous cells, cell (0, 0) from 0 to 1.
+        b: End, likewise.
+    """
+    step = b - a
+    cuts = [np.array([0.0, 1.0])]
+    for axis in (0, 1):
+        if step[axis] != 0.0:
+            low, high = sorted((a[axis], b[axis]))
+            lines = np.arange(np.floor(low) + 1.0, np.ceil(high))
+            cuts.append((lines - a[axis]) / step[axis])
+    at = np.sort(np.concatenate(cuts))
+    # Two cuts closer than this (in cells) are one corner that the segment passes through.
+    apart = np.diff(at) * np.hypot(step[0], step[1]) > 1e-9
+    middles = (at[:-1] + at[1:])[apart] / 2.0
+    if middles.size == 0:
+        middles = np.array([0.5])
+    cells: IntArray = np.floor(a + middles[:, None] * step).astype(np.int64)
+    return cells
+
+
+def is_clear(passable: BoolArray, a: FloatArray, b: FloatArray) -> bool:
+    """Whether all cells between two points (row, col; continuous cells) are passable and inside the grid."""
+    cells = cells_between(np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64))
+    rows, cols = cells[:, 0], cells[:, 1]
+    if (cells < 0).any() or (rows >= passable.shape[0]).any() or (cols >= passable.shape[1]).any():
+        return False
+    return bool(passable[rows, cols].all())
+
+
+def split_where_blocked(chain: IntArray, passable: BoolArray) -> list[int]:
+    """Indices of a chain, first and last included, between which straight segments cross no obstacle.
+
+    Where the segment between two ends is blocked, the cell of the chain farthest from it becomes a vertex, and both
+    halves are asked again; a step from cell to neighbouring cell is never split. A closed chain is split at the cell
+    farthest from its end.
+
+    Args:
+        chain: Cells (row, col), each a neighbour of the one before, shape (n, 2).
+        passable: Cells that a segment may cross.
+    """
+    points = chain.astype(np.float64) + 0.5
+    keep = [0]
+    pending = [(0, len(chain) - 1)]
+    while pending:
+        first, last = pending.pop()
+        a, b = points[first], points[last]
+        closed = bool((chain[first] == chain[last]).all()) and last - first > 1
+        if last - first <= 1 or (not closed and is_clear(passable, a, b)):
+            keep.append(last)
+            continue
+        middle = first + 1 + int(np.argmax(_distances(points[first + 1 : last], a, b)))
+        pending += [(middle, last), (first, middle)]
+    return keep
+
+
+def _distances(points: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
+    """Squared distances of points from the segment from ``a`` to ``b``."""
+    step = b - a
+    squared = float(step @ step)
+    t = np.clip((points - a) @ step / squared, 0.0, 1.0) if squared > 0.0 else np.zeros(len(points))
+    distances: FloatArray = ((points - a - t[:, None] * step) ** 2).sum(axis=1)
+    return distances

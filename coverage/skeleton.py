@@ -1,0 +1,182 @@
+"""The Voronoi graph of free space, from its skeleton (paper, section 5.1)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from closedrooms.core.arrays import BoolArray, IntArray
+
+# The eight neighbours of a cell (row, col): the four sides first, so that walks prefer them.
+NEIGHBOURS = np.array([(-1, 0), (0, -1), (0, 1), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VoronoiGraph:
+    """Vertices and polylines of a skeleton one cell wide.
+
+    Attributes:
+        cells: Cell (row, col) of each vertex, shape (n, 2): a leaf, a junction of three or more branches, a lone cell,
+            or one cell of a ring that has neither.
+        edges: Pairs of vertices, shape (m, 2); a ring ends where it begins.
+        chains: The cells (row, col) from the first to the second vertex of each edge, both included, every step to one
+            of the eight neighbours.
+    """
+
+    cells: IntArray
+    edges: IntArray
+    chains: tuple[IntArray, ...]
+
+
+def thin(mask: BoolArray) -> BoolArray:
+    """The skeleton of ``mask``, whose border is empty: one cell wide, same connectivity.
+
+    scikit-image's ``skeletonize``, as the paper. A part that thinning takes away whole keeps one cell.
+    """
+    import cv2
+    from skimage.morphology import skeletonize
+
+    skeleton: BoolArray = skeletonize(mask)  # type: ignore[no-untyped-call]
+    count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
+    lost = np.setdiff1d(np.arange(1, count), labels[skeleton])
+    if lost.size:
+        depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        for part in lost.tolist():
+            deepest = np.argmax(np.where(labels == part, depth, -1.0))
+            skeleton.flat[deepest] = True
+    return skeleton
+
+
+def trace_skeleton(skeleton: BoolArray) -> VoronoiGraph:
+    """Vertices where the skeleton ends or branches, and the chains of cells between them.
+
+    Neighbours of all cells are looked up at once; only the walk along the chains is a loop.
+
+    Args:
+        skeleton: One cell wide, empty on its border.
+    """
+    pixels, links = _link(skeleton)
+    degree = [len(link) for link in links]
+    group, members = _junction_groups(degree, links)
+    vertex_pixels = [_centre(pixels, group_members) for group_members in members]
+    edges, chains = _walk(degree, links, group, members, vertex_pixels)
+    return VoronoiGraph(
+        pixels[vertex_pixels].reshape(-1, 2),
+        np.array(edges, dtype=np.int64).reshape(-1, 2),
+        tuple(pixels[chain] for chain in chains),
+    )
+
+
+def _link(skeleton: BoolArray) -> tuple[IntArray, list[list[int]]]:
+    """Cells of the skeleton and, for each, the numbers of its neighbours.
+
+    A diagonal step is left out where two side steps through one skeleton cell do the same: else every corner of the
+    skeleton would look like a junction.
+    """
+    pixels = np.argwhere(skeleton)
+    number = np.full(skeleton.shape, -1, dtype=np.int64)
+    number[pixels[:, 0], pixels[:, 1]] = np.arange(len(pixels))
+    around = pixels[:, None, :] + NEIGHBOURS[None, :, :]
+    neighbours = number[around[..., 0], around[..., 1]]
+    for diagonal in range(4, 8):
+        row, col = NEIGHBOURS[diagonal]
+        beside = neighbours[:, [0 if row < 0 else 3, 1 if col < 0 else 2]]
+        neighbours[(beside >= 0).any(axis=1), diagonal] = -1
+    flat, counts = neighbours[neighbours >= 0].tolist(), (neighbours >= 0).sum(axis=1).tolist()
+    links, position = [], 0
+    for count in counts:
+        links.append(flat[position : position + count])
+        position += count
+    return pixels, links
+
+
+def _junction_groups(degree: list[int], links: list[list[int]]) -> tuple[list[int], list[list[int]]]:
+    """Group of each cell (-1 on a chain) and the cells of each group.
+
+    Leaves and lone cells are groups of their own, junction cells that touch are one.
+    """
+    group = [-1] * len(degree)
+    members: list[list[int]] = []
+    for pixel, own in enumerate(degree):
+        if own == 2 or group[pixel] >= 0:
+            continue
+        group[pixel] = len(members)
+        found = [pixel]
+        if own >= 3:
+            for reached in found:
+                for other in links[reached]:
+                    if degree[other] >= 3 and group[other] < 0:
+                        group[other] = group[pixel]
+                        found.append(other)
+        members.append(found)
+    return group, members
+
+
+def _centre(pixels: IntArray, members: list[int]) -> int:
+    """The member next to the middle of the group."""
+    if len(members) == 1:
+        return members[0]
+    cells = pixels[members]
+    return members[int(np.argmin(((cells - cells.mean(axis=0)) ** 2).sum(axis=1)))]
+
+
+def _walk(
+    degree: list[int],
+    links: list[list[int]],
+    group: list[int],
+    members: list[list[int]],
+    centres: list[int],
+) -> tuple[list[tuple[int, int]], list[list[int]]]:
+    """Chains from group to group, then rings that touch none (each gets a vertex: ``centres`` grows)."""
+    edges: list[tuple[int, int]] = []
+    chains: list[list[int]] = []
+    ways = [_ways(links, group, members[g], centres[g]) for g in range(len(members))]
+    seen = [False] * len(degree)
+    for g, pixels in enumerate(members):
+        for pixel in pixels:
+            for first in links[pixel]:
+                if group[first] == g or seen[first] or (0 <= group[first] < g):
+                    continue
+                chain = _follow(pixel, first, links, group, seen)
+                other = group[chain[-1]]
+                edges.append((g, other))
+                chains.append(ways[g][pixel][::-1] + chain[1:-1] + ways[other][chain[-1]])
+    for pixel, own in enumerate(degree):
+        if own == 2 and not seen[pixel]:
+            centres.append(pixel)
+            seen[pixel] = True
+            edges.append((len(centres) - 1, len(centres) - 1))
+            chains.append(_ring(pixel, links, seen))
+    return edges, chains
+
+
+def _ways(links: list[list[int]], group: list[int], members: list[int], centre: int) -> dict[int, list[int]]:
+    """From each cell of a group the cells to the group's centre, both included."""
+    ways = {centre: [centre]}
+    reached = [centre]
+    for pixel in reached:
+        for other in links[pixel]:
+            if other not in ways and group[other] == group[centre] and len(members) > 1:
+                ways[other] = [other, *ways[pixel]]
+                reached.append(other)
+    return ways
+
+
+def _follow(start: int, first: int, links: list[list[int]], group: list[int], seen: list[bool]) -> list[int]:
+    """The chain that leaves ``start`` through ``first``, up to the first cell of a group."""
+    chain = [start, first]
+    while group[chain[-1]] < 0:
+        here, before = chain[-1], chain[-2]
+        seen[here] = True
+        one, two = links[here]
+        chain.append(two if one == before else one)
+    return chain
+
+
+def _ring(pixel: int, links: list[list[int]], seen: list[bool]) -> list[int]:
+    ring = [pixel, links[pixel][0]]
+    while ring[-1] != pixel:
+        here, before = ring[-1], ring[-2]
+        seen[here] = True
+        one, two = links[here]
+        ring.append(two if one == before else one)
+    return ring
