@@ -89,7 +89,10 @@ def _parse(
     """Options of one command; wrong usage ends the program with status 2, ``--help`` with 0 (both by tyro)."""
     import tyro
 
-    return tyro.cli(config, prog=f"closedrooms {name}", description=summary, args=list(words), default=default)
+    prog, args = f"closedrooms {name}", list(words)
+    if default is None:
+        return tyro.cli(config, prog=prog, description=summary, args=args)
+    return tyro.cli(config, prog=prog, description=summary, args=args, default=default)
 
 
 def _named_presets(words: Sequence[str]) -> "RunConfig":
