@@ -12,16 +12,16 @@ def act(config: ListWorlds | ShowWorld | GenerateWorld | ConvertWorld) -> Iterab
         InvalidInputError: A world that cannot be read or a format that is not known.
         OutputError: The output cannot be written.
     """
-    from closedrooms.worlds import commands
+    from closedrooms.worlds.commands import convert_world, generate_world, list_worlds, show_world
 
     match config:
         case ListWorlds():
-            return commands.list_worlds()
+            return list_worlds()
         case ShowWorld():
-            commands.show_world(config.world, config.out)
+            show_world(config.world, config.out)
         case GenerateWorld():
-            commands.generate_world(config.kind, config.seed, config.out)
+            generate_world(config.kind, config.seed, config.out)
         case ConvertWorld():
-            commands.convert_world(config.source, config.destination, config.to)
+            convert_world(config.source, config.destination, config.to)
             return [f"written to {config.destination}"]
     return [f"written to {config.out}"]
