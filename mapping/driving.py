@@ -8,7 +8,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.following import Steering, free_distance, limit_speed, near_points, steer, turn_rate
+from closedrooms.mapping.following import Steering, Track, free_distance, limit_speed, near_points, steer, turn_rate
 from closedrooms.mapping.navigation_config import NavigationConfig
 
 DriveState = Literal["idle", "driving", "arrived", "stuck", "recovering"]
@@ -37,7 +37,7 @@ class Driver:
         self.state: DriveState = "idle"
         self.remaining = 0.0
         self.recoveries = 0
-        self._points: FloatArray | None = None
+        self._track: Track | None = None
         self._progress = 0.0
         self._best = math.inf
         self._moved_at = 0.0
@@ -46,9 +46,9 @@ class Driver:
 
     def follow(self, points: FloatArray, stamp: float) -> None:
         """Take a path, shape (n, 2), map frame [m], at time ``stamp`` [s]; it replaces the one before."""
-        self._points = points
+        self._track = Track.of(points)
         self._progress = 0.0
-        self.remaining = float(np.hypot(*np.diff(points, axis=0).T).sum())
+        self.remaining = self._track.length
         if self.state != "driving":
             self._moved_at = stamp
         self._best = self.remaining
@@ -56,16 +56,15 @@ class Driver:
 
     def ahead(self, distance: float) -> FloatArray:
         """The path from the robot's place on it, up to ``distance`` [m], as points about 0.1 m apart, shape (n, 2)."""
-        if self._points is None:
+        if self._track is None:
             return np.empty((0, 2))
-        along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(self._points, axis=0).T))))
-        end = min(self._progress + distance, float(along[-1]))
-        s = np.linspace(self._progress, end, max(2, math.ceil((end - self._progress) / 0.1) + 1))
-        return np.column_stack((np.interp(s, along, self._points[:, 0]), np.interp(s, along, self._points[:, 1])))
+        end = min(self._progress + distance, self._track.length)
+        steps = max(2, math.ceil((end - self._progress) / 0.1) + 1)
+        return np.array([self._track.at(s) for s in np.linspace(self._progress, end, steps).tolist()])
 
     def stop(self) -> None:
         """Forget the path."""
-        self._points = None
+        self._track = None
         self.state = "idle"
         self.recoveries = 0
 
@@ -73,14 +72,14 @@ class Driver:
         """Speed [m/s] and turn rate [rad/s] for now; ``state`` says what they are about."""
         if self.state in {"stuck", "recovering"}:
             return self._recover(pose, scan, stamp)
-        if self._points is None:
+        if self._track is None:
             self.state = "idle"
             return (0.0, 0.0)
         obstacles = near_points(scan)
-        wish = steer(self._points, pose, self._progress, self.config)
+        wish = steer(self._track, pose, self._progress, self.config)
         self._progress, self.remaining = wish.progress, wish.remaining
-        end = self._points[-1]
-        if math.hypot(pose.x - end[0], pose.y - end[1]) < self.config.goal_tolerance and self.remaining < 1.0:
+        end = self._track.at(self._track.length)
+        if math.dist((pose.x, pose.y), end) < self.config.goal_tolerance and self.remaining < 1.0:
             self.state, self.recoveries = "arrived", 0
             return (0.0, 0.0)
         done = limit_speed(wish, obstacles, self.config)
@@ -124,5 +123,5 @@ class Driver:
         if stamp - started < RECOVERY_TURN:
             side = 1.0 if self.recoveries % 2 else -1.0
             return (0.0, side * self.config.max_turn_rate)
-        self._points, self.state = None, "idle"
+        self._track, self.state = None, "idle"
         return (0.0, 0.0)

@@ -12,7 +12,7 @@ from closedrooms.core.door import Point
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.costmap import Costmap, NavigationMap, clearance_field
+from closedrooms.mapping.costmap import Costmap, NavigationMap, clearance_field, pooled
 from closedrooms.mapping.driving import Driver
 from closedrooms.mapping.following import near_points
 from closedrooms.mapping.frontiers import Frontiers, find_frontiers, seen_from, still_unknown
@@ -179,12 +179,12 @@ class Explorer:
         """The frontier whose way costs least, small patches of unknown only where they are worth the way."""
         config = self.config
         is_large = found.unknown_area[found.labels] >= config.large_area
-        large = _goal_cells(found.within(distance, is_large), found, costmap) & component
-        small = _goal_cells(found.within(distance, ~is_large), found, costmap) & component
+        large = _goal_cells(found.within(distance, is_large), costmap) & component
+        small = _goal_cells(found.within(distance, ~is_large), costmap) & component
         search = Search.begin(costmap, here, config)
         if search is None or not (large.any() or small.any()):
             return None
-        search.run(large)
+        search.run(large, limit=math.inf if large.any() else config.worth * config.large_area)
         nearest, cost = search.nearest(large)
         refused = np.zeros(len(found.unknown_area), dtype=np.bool_)
         while True:
@@ -200,7 +200,7 @@ class Explorer:
                 return goal
             # Every cell from which this patch is seen costs at least as much.
             refused[self._labels(goal, found)] = True
-            small &= _goal_cells(found.within(distance, ~is_large & ~refused[found.labels]), found, costmap)
+            small &= _goal_cells(found.within(distance, ~is_large & ~refused[found.labels]), costmap)
         return None if nearest is None else self._goal(search.path(nearest), found)
 
     def _goal(self, path: Path, found: Frontiers) -> Goal | None:
@@ -259,13 +259,10 @@ class Explorer:
             self._map.add_obstacles(pose.transform(touching))
 
 
-def _goal_cells(mask: BoolArray, found: Frontiers, costmap: Costmap) -> BoolArray:
+def _goal_cells(mask: BoolArray, costmap: Costmap) -> BoolArray:
     """The cells of the planning grid that hold a cell of ``mask`` on the frontier grid."""
-    goals = np.zeros(costmap.frame.shape, dtype=np.bool_)
-    cells = costmap.frame.to_cells(found.frame.to_points(np.argwhere(mask)))
-    cells = cells[costmap.frame.contains(cells)]
-    goals[cells[:, 0], cells[:, 1]] = True
-    return goals
+    cells: BoolArray = pooled(mask, mask.shape[0] // costmap.frame.rows)
+    return cells
 
 
 def _is_free(grid: OccupancyGrid, points: FloatArray, config: NavigationConfig) -> bool:

@@ -1,5 +1,6 @@
 """Velocity commands that keep a differential-drive robot on a path and off what its scan shows."""
 
+import bisect
 import math
 from dataclasses import dataclass
 
@@ -16,9 +17,9 @@ TURN_GAIN = 3.0
 # Smallest turn rate while turning in place [rad/s], so that the last degrees do not take for ever.
 MIN_TURN_RATE = 0.3
 # Scan points beyond this cannot matter before the next command [m].
-HORIZON = 1.5
-# Stands for no return while ranges are smoothed [m].
-FAR = 1e3
+HORIZON = 1.0
+# Stands for everything farther, and for no measurement, while ranges are smoothed [m].
+FAR = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +39,64 @@ class Steering:
     remaining: float
 
 
-def steer(points: FloatArray, pose: Pose2, progress: float, config: NavigationConfig) -> Steering:
+@dataclass(frozen=True, slots=True)
+class Track:
+    """A path prepared for following.
+
+    Attributes:
+        xs: Corners, map frame [m].
+        ys: Corners, map frame [m].
+        along: Distance of each corner from the start of the path [m].
+    """
+
+    xs: tuple[float, ...]
+    ys: tuple[float, ...]
+    along: tuple[float, ...]
+
+    @classmethod
+    def of(cls, points: FloatArray) -> "Track":
+        """The track over path corners, shape (n, 2) [m]."""
+        along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+        return cls(tuple(points[:, 0].tolist()), tuple(points[:, 1].tolist()), tuple(along.tolist()))
+
+    @property
+    def length(self) -> float:
+        """Length of the path [m]."""
+        return self.along[-1]
+
+    def at(self, distance: float) -> tuple[float, float]:
+        """The point at a distance along the path [m]."""
+        i = min(max(bisect.bisect_right(self.along, distance) - 1, 0), len(self.along) - 1)
+        if i == len(self.along) - 1 or self.along[i + 1] <= self.along[i]:
+            return (self.xs[i], self.ys[i])
+        t = (distance - self.along[i]) / (self.along[i + 1] - self.along[i])
+        return (self.xs[i] + t * (self.xs[i + 1] - self.xs[i]), self.ys[i] + t * (self.ys[i + 1] - self.ys[i]))
+
+    def project(self, place: tuple[float, float], progress: float, window: float) -> float:
+        """Distance along the path of the place's nearest point, from ``progress`` to ``progress + window`` [m]."""
+        x, y = place
+        best, best_distance = progress, math.inf
+        for i in range(max(bisect.bisect_right(self.along, progress) - 1, 0), len(self.along) - 1):
+            if self.along[i] > progress + window:
+                break
+            length = self.along[i + 1] - self.along[i]
+            if length < 1e-9:
+                continue
+            dx, dy = (self.xs[i + 1] - self.xs[i]) / length, (self.ys[i + 1] - self.ys[i]) / length
+            t = min(max((x - self.xs[i]) * dx + (y - self.ys[i]) * dy, 0.0), length)
+            s = min(max(self.along[i] + t, progress), progress + window)
+            t = s - self.along[i]
+            distance = math.hypot(self.xs[i] + t * dx - x, self.ys[i] + t * dy - y)
+            if distance < best_distance - 1e-9:
+                best, best_distance = s, distance
+        return best
+
+
+def steer(track: Track, pose: Pose2, progress: float, config: NavigationConfig) -> Steering:
     """Pure pursuit (Coulter, CMU-RI-TR-92-01) with turns in place where the path leaves the heading.
 
     Args:
-        points: Corners of the path, map frame, shape (n, 2) [m].
+        track: The path.
         pose: ``map_T_robot``.
         progress: Distance along the path at the last call [m]; the robot never loses what it has done.
         config: Speeds, look-ahead.
@@ -50,12 +104,9 @@ def steer(points: FloatArray, pose: Pose2, progress: float, config: NavigationCo
     Returns:
         The command and the new progress.
     """
-    lengths = np.hypot(*np.diff(points, axis=0).T)
-    along = np.concatenate(([0.0], np.cumsum(lengths)))
-    total = float(along[-1])
-    progress = _project(points, along, (pose.x, pose.y), progress, 2.0 * config.lookahead)
-    remaining = total - progress
-    target = _at(points, along, min(progress + config.lookahead, total))
+    progress = track.project((pose.x, pose.y), progress, 2.0 * config.lookahead)
+    remaining = track.length - progress
+    target = track.at(progress + config.lookahead)
     dx, dy = target[0] - pose.x, target[1] - pose.y
     distance = math.hypot(dx, dy)
     error = wrap_angle(math.atan2(dy, dx) - pose.theta) if distance > 1e-6 else 0.0
@@ -82,8 +133,9 @@ def near_points(scan: LaserScan) -> FloatArray:
     A median over five beams leaves out lone outliers and halves the noise: the nearest of a hundred noisy points would
     otherwise always lie too close.
     """
-    ranges = np.where(scan.hits, scan.ranges, np.inf).astype(np.float32)
-    ranges[np.isinf(ranges)] = FAR
+    ranges = np.where(scan.ranges < FAR, scan.ranges, FAR).astype(np.float32)
+    if float(ranges.min()) >= HORIZON:
+        return np.empty((0, 2))
     smooth = cv2.medianBlur(np.concatenate((ranges[-2:], ranges, ranges[:2]))[None, :], 5)[0, 2:-2]
     near = np.flatnonzero(smooth < HORIZON)
     angles = scan.angle_min + scan.angle_increment * near
@@ -101,7 +153,7 @@ def free_distance(points_robot: FloatArray, v: float, w: float, config: Navigati
         config: Footprint.
 
     Returns:
-        Distance along the arc, at most ``HORIZON`` less the footprint.
+        Distance along the arc, at most ``HORIZON`` less the footprint: more than it takes to stop.
     """
     reach = HORIZON - config.required_clearance
     if len(points_robot) == 0:
@@ -113,8 +165,9 @@ def free_distance(points_robot: FloatArray, v: float, w: float, config: Navigati
         path = np.column_stack((signed, np.zeros_like(signed)))
     else:
         path = np.column_stack((np.sin(curvature * signed), 1.0 - np.cos(curvature * signed))) / curvature
-    gaps = np.hypot(*(path[:, None, :] - points_robot[None, :, :]).transpose(2, 0, 1)).min(axis=1)
-    now = float(np.hypot(*points_robot.T).min())
+    now = math.sqrt(float(np.einsum("ij,ij->i", points_robot, points_robot).min()))
+    offset = path[:, None, :] - points_robot[None, :, :]
+    gaps = np.sqrt(np.einsum("ijk,ijk->ij", offset, offset).min(axis=1))
     # Where the robot already is inside the margin it may still drive as long as it does not get closer.
     limit = min(config.robot_radius + 0.3 * config.clearance_margin, now - 0.005)
     hit = np.flatnonzero(gaps < limit)
@@ -128,32 +181,3 @@ def limit_speed(command: Steering, points_robot: FloatArray, config: NavigationC
     distance = free_distance(points_robot, command.v, command.w, config)
     v = min(command.v, math.sqrt(2.0 * config.acceleration * distance) if distance > 0.0 else 0.0)
     return Steering(v, command.w * v / command.v, command.progress, command.remaining)
-
-
-def _project(
-    points: FloatArray, along: FloatArray, place: tuple[float, float], progress: float, window: float
-) -> float:
-    """Distance along the path of the place's nearest point, searched from ``progress`` to ``progress + window``."""
-    best, best_distance = progress, math.inf
-    for i in range(len(points) - 1):
-        if along[i + 1] < progress or along[i] > progress + window:
-            continue
-        span = points[i + 1] - points[i]
-        length = float(along[i + 1] - along[i])
-        if length < 1e-9:
-            continue
-        t = ((place[0] - points[i, 0]) * span[0] + (place[1] - points[i, 1]) * span[1]) / length**2
-        s = min(max(float(along[i]) + min(max(t, 0.0), 1.0) * length, progress), progress + window)
-        x, y = _at(points, along, s)
-        distance = math.hypot(place[0] - x, place[1] - y)
-        if distance < best_distance - 1e-9:
-            best, best_distance = s, distance
-    return best
-
-
-def _at(points: FloatArray, along: FloatArray, distance: float) -> tuple[float, float]:
-    """The point at a distance along the path."""
-    return (
-        float(np.interp(distance, along, points[:, 0])),
-        float(np.interp(distance, along, points[:, 1])),
-    )

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from closedrooms.mapping.navigation_config import NavigationConfig
 
 # How far the robot's own estimate may lie inside an obstacle's margin before no path can start [m].
 START_RADIUS = 0.8
+# Half width of the window in which a search begins [m]: the next frontier is rarely farther.
+FIRST_WINDOW = 6.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,16 +88,15 @@ def plan_path(costmap: Costmap, start: Point, goals: BoolArray, config: Navigati
 class Search:
     """Dijkstra's algorithm over the planning grid from one start (scikit-image's minimum cost path).
 
-    A metre costs 1 in the open and up to ``1 + clearance_weight`` beside an obstacle.
+    A metre costs 1 in the open and up to ``1 + clearance_weight`` beside an obstacle. The search begins in a window
+    around the start: whatever costs less than its half width is found exactly there, as every way out of it costs more.
     """
 
     def __init__(self, costmap: Costmap, start: Point, first: tuple[int, int], config: NavigationConfig) -> None:
-        from skimage.graph import MCP_Geometric
-
         self._costmap, self._start, self._first, self._config = costmap, start, first, config
-        fits = traversable(costmap, config)
-        self._search = MCP_Geometric(cell_costs(costmap.clearance, fits, config))
+        self._window = (slice(0), slice(0))
         self._costs: FloatArray = np.empty((0, 0))
+        self._search: Any = None
 
     @classmethod
     def begin(cls, costmap: Costmap, start: Point, config: NavigationConfig) -> "Search | None":
@@ -102,27 +104,50 @@ class Search:
         first = start_cell(costmap, traversable(costmap, config), start)
         return None if first is None else cls(costmap, start, first, config)
 
-    def run(self, goals: BoolArray) -> None:
-        """Spread out until the first of ``goals`` (coarse cells) is reached, or over everything when there is none."""
-        ends = np.argwhere(goals).tolist()
-        costs, _ = self._search.find_costs([self._first], ends or None, find_all_ends=False)
+    def run(self, goals: BoolArray, *, limit: float = math.inf) -> None:
+        """Spread out until the nearest of ``goals`` (coarse cells) is found or everything within ``limit`` [m]."""
+        rows, cols = self._costmap.frame.shape
+        reach = FIRST_WINDOW
+        while True:
+            span = math.ceil(reach / self._costmap.frame.resolution)
+            (row, col), whole = self._first, False
+            self._window = (slice(max(row - span, 0), row + span + 1), slice(max(col - span, 0), col + span + 1))
+            whole = row <= span and col <= span and row + span >= rows - 1 and col + span >= cols - 1
+            self._flood()
+            if whole or reach >= limit or self.nearest(goals)[1] <= reach:
+                return
+            reach *= 2.0
+
+    def _flood(self) -> None:
+        from skimage.graph import MCP_Geometric
+
+        clearance = self._costmap.clearance[self._window]
+        fits = clearance >= self._config.required_clearance
+        self._search = MCP_Geometric(cell_costs(clearance, fits, self._config))
+        first = (self._first[0] - self._window[0].start, self._first[1] - self._window[1].start)
+        costs, _ = self._search.find_costs([first])
         self._costs = costs * self._costmap.frame.resolution
 
     def nearest(self, goals: BoolArray) -> tuple[IntArray | None, float]:
         """The cheapest of some coarse cells that the search has reached, and its cost [m]."""
-        cells = np.argwhere(goals)
+        cells = np.argwhere(goals[self._window])
         costs = self._costs[cells[:, 0], cells[:, 1]]
         if len(cells) == 0 or not np.isfinite(costs.min()):
             return None, math.inf
         best = int(np.argmin(costs))
-        return cells[best], float(costs[best])
+        return cells[best] + self._corner, float(costs[best])
 
     def path(self, cell: IntArray) -> Path:
-        """The way to a coarse cell whose cost is finite."""
-        cells = np.array(self._search.traceback(cell), dtype=np.int64)
+        """The way to a coarse cell that the search has reached."""
+        row, col = (int(v) for v in cell - self._corner)
+        cells = np.array(self._search.traceback((row, col)), dtype=np.int64) + self._corner
         points = np.vstack((np.array(self._start), self._costmap.anchors(cells)))
         points = straighten(points, self._costmap, self._config)
-        return Path(points, float(self._costs[cell[0], cell[1]]), (int(cell[0]), int(cell[1])))
+        return Path(points, float(self._costs[row, col]), (int(cell[0]), int(cell[1])))
+
+    @property
+    def _corner(self) -> IntArray:
+        return np.array([self._window[0].start, self._window[1].start])
 
 
 def cell_costs(clearance: Field, fits: BoolArray, config: NavigationConfig) -> FloatArray:
