@@ -100,9 +100,10 @@ def _mapping(layout: Layout) -> rrb.Container:
     side = rrb.Vertical(
         _series("position_error", "Position error [m]"),
         _series("heading_error", "Heading error [deg]"),
+        _series("odometry_error", "Error of the odometry alone [m]"),
         _series("known_area", "Known area [m²]"),
         rrb.Tabs(rrb.TextDocumentView(origin="/legend", name="Colours"), _log(), active_tab=0),
-        row_shares=[3, 3, 3, 3],
+        row_shares=[3, 3, 3, 3, 4],
     )
     return rrb.Horizontal(view, side, column_shares=[2, 1], name="Mapping")
 

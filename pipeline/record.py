@@ -292,15 +292,16 @@ class Recorder:
             return
         if self._building is not None:
             self._stream.columns("building/robot", stamps, drawables.pose_columns(truth), steps)
-        tracks = {"odometry": (odometry, colours.ODOMETRY), "estimate": (estimate, colours.ESTIMATE)}
+        tracks = {"estimate": (estimate, colours.ESTIMATE)}
         if self._corrected is not None and np.array_equal(self._corrected[0], stamps):
-            tracks["after the last optimisation"] = (self._corrected[1], colours.LOOP)
+            tracks["corrected"] = (self._corrected[1], colours.LOOP)
+        times, true = stamps[given], truth[given]
         for name, (poses, colour) in tracks.items():
-            away = np.hypot(*(poses[given, :2] - truth[given, :2]).T)
-            turned = np.degrees(np.abs((poses[given, 2] - truth[given, 2] + np.pi) % (2 * np.pi) - np.pi))
-            path = name.replace(" ", "_")
-            self._series(f"metrics/position_error/{path}", stamps[given], away, name, colour)
-            self._series(f"metrics/heading_error/{path}", stamps[given], turned, name, colour)
+            self._series(f"metrics/position_error/{name}", times, _apart(poses[given], true), name, colour)
+            self._series(f"metrics/heading_error/{name}", times, _turned(poses[given], true), name, colour)
+        self._series(
+            "metrics/odometry_error/position", times, _apart(odometry[given], true), "odometry", colours.ODOMETRY
+        )
 
     def _series(self, path: str, stamps: FloatArray, values: FloatArray, name: str, colour: colours.Colour) -> None:
         self._stream.log(path, rr.SeriesLines(colors=[colour], names=[name], widths=[1.5]), static=True)
@@ -310,6 +311,18 @@ class Recorder:
 def _known_bounds(grid: OccupancyGrid) -> Bounds | None:
     window = grid.known_bounds()
     return None if window is None else grid.frame.cropped(*window).bounds
+
+
+def _apart(poses: FloatArray, true: FloatArray) -> FloatArray:
+    """Distance [m] of positions, shape (n,)."""
+    distance: FloatArray = np.hypot(poses[:, 0] - true[:, 0], poses[:, 1] - true[:, 1])
+    return distance
+
+
+def _turned(poses: FloatArray, true: FloatArray) -> FloatArray:
+    """Angle [deg] between headings, 0 to 180, shape (n,)."""
+    angle: FloatArray = np.degrees(np.abs((poses[:, 2] - true[:, 2] + np.pi) % (2 * np.pi) - np.pi))
+    return angle
 
 
 def _markdown(text: str) -> rr.TextDocument:

@@ -169,7 +169,8 @@ def test_another_run_gives_another_recording(recording: Path, tmp_path: Path) ->
         "/prediction/faces/unknown", "/prediction/faces/edges", "/prediction/initial/d01", "/prediction/layouts/d01",
         "/rooms/predicted/grid", "/rooms/predicted/rooms/d01", "/rooms/truth/grid", "/rooms/truth/rooms/d01",
         "/coverage/closed/edges", "/coverage/predicted/tour", "/coverage/truth/vertices", "/driving/tour",
-        "/metrics/position_error/estimate", "/metrics/heading_error/odometry", "/metrics/known_area/map",
+        "/metrics/position_error/estimate", "/metrics/heading_error/estimate",
+        "/metrics/odometry_error/position", "/metrics/known_area/map",
         "/metrics/score/d01", "/log/run", "/configuration", "/result", "/stage",
     ],
 )  # fmt: skip
