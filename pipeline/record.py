@@ -220,6 +220,7 @@ class Recorder:
         failed = "".join(f"\n- {door}: {why}" for door, why in prediction.failures.items())
         self._say("Rooms", f"{len(prediction.rooms)} rooms predicted, {len(prediction.failures)} failed{failed}")
         draw_rooms(self._stream, "rooms/predicted", prediction.grid, prediction.rooms, self._palette)
+        self.table(_rooms_table(prediction))
 
     def tours(self, tours: Mapping[str, "CoverageTour"]) -> None:
         """Graphs and tours."""
@@ -311,6 +312,17 @@ class Recorder:
 def _known_bounds(grid: OccupancyGrid) -> Bounds | None:
     window = grid.known_bounds()
     return None if window is None else grid.frame.cropped(*window).bounds
+
+
+def _rooms_table(prediction: "Prediction") -> str:
+    """What stands under ``result`` until the run's own table comes."""
+    rows = [
+        [", ".join(room.doors), room.kind or "", f"{room.polygon.area:.1f} m²", "cut" if room.bounded else ""]
+        for room in prediction.rooms
+    ]
+    rows += [[door, f"not predicted: {why}", "", ""] for door, why in prediction.failures.items()]
+    head = [["doors", "room", "area", "search"], ["---"] * 4]
+    return "\n".join(["# Prediction", "", *("| " + " | ".join(row) + " |" for row in [*head, *rows])])
 
 
 def _apart(poses: FloatArray, true: FloatArray) -> FloatArray:
