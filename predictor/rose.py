@@ -15,6 +15,8 @@ from closedrooms.predictor.segments import angles_of, lengths_of
 PROMINENCE, PAIR_TOLERANCE, BAND, STRUCTURAL = 0.2, 0.1, 2.5, 0.18
 # Directions sampled around the circle: half a degree, finer than the width of any peak.
 BINS = 720
+# A profile that varies less than this share of its largest value has no direction: a map of single cells.
+FLAT = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,16 +77,20 @@ def _dominant(magnitude: FloatArray) -> FloatArray:
         magnitude.astype(np.float32), (size // 2, BINS), (centre, centre), centre, cv2.WARP_POLAR_LINEAR
     )
     profile = polar[:, 2:].sum(axis=1).astype(np.float64)  # (BINS,); the centre itself has no direction
+    if np.ptp(profile) < FLAT * profile.max():
+        return np.zeros(0)
     turns = np.concatenate((profile, profile, profile))
     peaks, _ = find_peaks(turns, prominence=PROMINENCE * float(np.ptp(profile)))
     peaks = np.unique(peaks[(peaks >= BINS) & (peaks < 2 * BINS)] - BINS)
     refined = np.array([_between(profile, int(p)) for p in peaks]) * 2 * np.pi / BINS
-    paired: list[tuple[float, float]] = []
-    for angle, peak in zip(refined, peaks, strict=True):
-        opposite = np.abs((refined - angle - np.pi + np.pi) % (2 * np.pi) - np.pi)
-        if opposite.min(initial=np.inf) <= PAIR_TOLERANCE and angle < np.pi - 1e-9:
-            paired.append((-float(profile[peak]), float(angle)))
-    return np.array([angle % np.pi for _, angle in sorted(paired)])
+    directions: list[float] = []
+    for i in np.argsort(-profile[peaks], kind="stable"):
+        opposite = np.abs(refined % (2 * np.pi) - (refined[i] + np.pi) % (2 * np.pi))
+        paired = np.minimum(opposite, 2 * np.pi - opposite).min() <= PAIR_TOLERANCE
+        known = any(abs(float(angle_between(refined[i], other))) <= PAIR_TOLERANCE for other in directions)
+        if paired and not known:
+            directions.append(float(refined[i] % np.pi))
+    return np.array(directions)
 
 
 def _between(profile: FloatArray, peak: int) -> float:

@@ -55,6 +55,8 @@ def start_rooms(
     window = known_window(grid)
     if window is None:
         return None, {door.id: "the map is all unknown" for door in doors}
+    if not window.free.any():
+        return None, {door.id: "the map holds no free cell" for door in doors}
     working = at_resolution(window, config.lines.resolution)
     structure = find_structure(working, config)
     if structure is None:

@@ -1,0 +1,122 @@
+import math
+
+import numpy as np
+import pytest
+import shapely
+from shapely.geometry import box
+
+from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
+from closedrooms.predictor.baselines import geometric, line_of_sight
+from closedrooms.predictor.clutter import filter_clutter
+from closedrooms.predictor.config import preset
+from closedrooms.predictor.inpaint import inpaint, passage
+from closedrooms.predictor.rose import find_rose
+from closedrooms.predictor.thickness import free_interior, measure_thickness
+
+PAPER = preset("paper")
+
+
+@pytest.mark.parametrize("degrees", [0, 20, 48])
+def test_rose_finds_the_two_directions_of_a_building(mapped, degrees):
+    rose = find_rose(mapped(angle=math.radians(degrees)).grid)
+    found = np.sort(np.degrees(rose.angles) % 90)
+    assert rose.angles.size == 2
+    np.testing.assert_allclose((found - degrees + 45) % 90 - 45, 0.0, atol=0.5)
+
+
+def test_clutter_goes_and_walls_stay(mapped):
+    grid = mapped().grid
+    cells = grid.cells.copy()
+    rng = np.random.default_rng(1)
+    inside = grid.frame.to_cells(np.column_stack((rng.uniform(0.5, 20.0, 40), rng.uniform(0.5, 1.5, 40))))
+    cells[inside[:, 0], inside[:, 1]] = OCCUPIED
+    cluttered = OccupancyGrid(grid.frame, cells)
+    cleaned = filter_clutter(cluttered)
+    assert cleaned.free[inside[:, 0], inside[:, 1]].all()
+    assert (cleaned.occupied == grid.occupied).mean() > 0.999
+    assert (cleaned.unknown == grid.unknown).all()
+
+
+def test_a_map_without_directions_keeps_its_clutter():
+    cells = np.full((80, 80), FREE, dtype=np.int8)
+    cells[40, 40] = OCCUPIED
+    grid = OccupancyGrid(GridFrame(0.05, 0, 0, 80, 80), cells)
+    assert filter_clutter(grid) is grid
+
+
+def test_line_of_sight_fills_a_gap_and_ends_at_the_bounds_of_the_map(mapped, iou):
+    scene = mapped(closed=("t1", "b3"))
+    prediction = line_of_sight(scene.grid, scene.doors, PAPER)
+    row, col, rows, cols = scene.grid.known_bounds()
+    x0, y0, x1, y1 = scene.grid.frame.cropped(row, col, rows, cols).bounds
+    for room in prediction.rooms:
+        assert iou(room.polygon, scene.hidden[room.doors[0]]) > 0.8
+        assert room.polygon.within(box(x0, y0, x1, y1).buffer(0.1))
+
+
+def test_geometric_takes_the_faces_in_sight(mapped, iou):
+    scene = mapped(closed=("t1", "t2"))
+    prediction = geometric(scene.grid, scene.doors, PAPER)
+    both = shapely.union_all(list(scene.hidden.values()))
+    for room in prediction.rooms:  # nothing parts the two: each sees into the other
+        assert iou(room.polygon, both) > 0.8
+
+
+@pytest.mark.parametrize("degrees", [0, 30])
+def test_the_thickness_of_walls_is_measured(mapped, degrees):
+    angle = math.radians(degrees)
+    measured = measure_thickness(mapped(angle=angle).grid, np.array([angle, angle + math.pi / 2]))
+    assert measured == pytest.approx(0.2, abs=0.05)
+
+
+def test_thin_walls_are_assumed_where_none_is_seen_from_both_sides():
+    grid = OccupancyGrid(GridFrame(0.05, 0, 0, 40, 40), np.full((40, 40), FREE, dtype=np.int8))
+    assert measure_thickness(grid, np.array([0.0, math.pi / 2])) == pytest.approx(0.10)
+
+
+def test_walls_take_half_their_thickness_and_all_of_it_beside_known_space():
+    frame = GridFrame(0.05, -1.0, -1.0, 140, 140)
+    cells = np.full(frame.shape, UNKNOWN, dtype=np.int8)
+    cells[:20] = FREE  # free below y = 0: the wall is above it
+    interior = free_interior(box(0.0, 0.0, 4.0, 3.0), OccupancyGrid(frame, cells), 0.2)
+    x0, y0, x1, y1 = interior.bounds
+    assert (x0, x1, y1) == pytest.approx((0.1, 3.9, 2.9))
+    assert y0 == pytest.approx(0.2, abs=0.051)
+
+
+def test_a_layout_that_is_all_wall_stays():
+    grid = OccupancyGrid(GridFrame(0.05, 0, 0, 40, 40), np.full((40, 40), UNKNOWN, dtype=np.int8))
+    thin = box(0.0, 0.0, 2.0, 0.1)
+    assert free_interior(thin, grid, 0.3) is thin
+
+
+def test_a_room_is_drawn_free_inside_and_occupied_on_its_outline():
+    grid = OccupancyGrid(GridFrame(0.1, 0, 0, 20, 20), np.full((20, 20), UNKNOWN, dtype=np.int8))
+    out = inpaint(grid, [box(0.5, 0.5, 1.5, 1.5)], [])
+    assert out.frame == grid.frame
+    assert out.free[6:14, 6:14].all()
+    assert out.occupied[5, 5:15].all()
+    assert out.unknown[:4].all()
+    grown = inpaint(grid, [box(-1.03, 0.5, 1.5, 3.0)], [])
+    assert grown.frame.origin_x == pytest.approx(-1.3)
+    assert grown.frame.bounds[3] >= 3.0
+
+
+def test_a_passage_leads_from_free_space_into_the_room():
+    frame = GridFrame(0.05, 0.0, 0.0, 80, 80)
+    cells = np.full(frame.shape, UNKNOWN, dtype=np.int8)
+    cells[:30] = FREE
+    cells[30:32] = OCCUPIED
+    way = passage(
+        OccupancyGrid(frame, cells),
+        box(0, 1.8, 4, 4),
+        np.array([2.0, 1.6]),
+        np.array([1.0, 0.0]),
+        np.array([0.0, 1.0]),
+        width=0.8,
+        reach=1.0,
+    )
+    x0, y0, x1, y1 = way.bounds
+    assert (x0, x1) == pytest.approx((1.6, 2.4))
+    assert y0 < 1.5
+    assert y1 > 1.85
