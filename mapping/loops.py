@@ -72,7 +72,7 @@ def find_loop(
             field.add(other.pose.transform(other.beams.points))
     points = recent_points(keyframes, loops.recent_way, config)
     window = Window(doubt(older), min(loops.window_angle + loops.drift_angle * ways[older.index], 0.5))
-    found = search(field, points, latest.pose, window, coarse_cells=8, prior_sigmas=(window.distance, window.angle))
+    found = search(field, points, latest.pose, window, coarse_cells=6, prior_sigmas=(window.distance, window.angle))
     if found.score < loops.min_score - 0.15:
         return None
     match = refine(field, points, found.pose, iterations=12)
