@@ -1,7 +1,6 @@
 """Floor plans of schools and offices as XML after Luperto and Amigoni."""
 
 import math
-from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,13 +12,11 @@ from closedrooms.core.door import Point
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.worlds.outlines import clean_outlines, repaired
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
-from closedrooms.worlds.portals import Portal, plan_of_portals
+from closedrooms.worlds.portals import Portal, paired, plan_of_portals
 from closedrooms.worlds.validate import validate
 from closedrooms.worlds.xmlfile import attribute, child, children, parse_xml, text
 
 WHAT = "a floor plan (Luperto XML)"
-# Portals that both rooms list and that lie this close are one [m].
-SAME_PORTAL = 2.0
 MAX_SPACES = 5000
 
 
@@ -120,7 +117,7 @@ def _from_segments(space: Any, metres: float) -> Polygon | None:
 def _portals(spaces: list[Any], metres: float, repairs: list[str]) -> list[Portal]:
     """The passages, each once although both of its rooms list it."""
     index = {attribute(space, "id"): number for number, space in enumerate(spaces)}
-    found: defaultdict[tuple[int, int], list[tuple[int, Point, bool]]] = defaultdict(list)
+    found: list[tuple[int, Portal]] = []
     lost = 0
     for number, space in enumerate(spaces):
         places = _segment_places(space, metres)
@@ -133,10 +130,10 @@ def _portals(spaces: list[Any], metres: float, repairs: list[str]) -> list[Porta
                 continue
             pair = (min(number, others[0]), max(number, others[0]))
             explicit = text(child(portal, "type")).strip().upper() != "IMPLICIT"
-            found[pair].append((number, place, explicit))
+            found.append((number, Portal(place, pair, explicit)))
     if lost:
         repairs.append(f"{lost} portals left out: no place or no second room")
-    return [portal for pair in sorted(found) for portal in _paired(pair, found[pair])]
+    return paired(found)
 
 
 def _segment_places(space: Any, metres: float) -> dict[str, Point]:
@@ -149,19 +146,3 @@ def _segment_places(space: Any, metres: float) -> dict[str, Point]:
             x, y = (sum(values) / len(usable) for values in zip(*usable, strict=True))
             places[(attribute(segment, "id") or "").strip()] = (x, y)
     return places
-
-
-def _paired(pair: tuple[int, int], ends: list[tuple[int, Point, bool]]) -> list[Portal]:
-    """Portals of two rooms: what one room lists is matched with the nearest that the other lists."""
-    first = [end for end in ends if end[0] == pair[0]]
-    second = [end for end in ends if end[0] != pair[0]]
-    portals = []
-    for _, point, explicit in first:
-        partner = min(second, key=lambda end: math.dist(end[1], point), default=None)
-        if partner is not None and math.dist(partner[1], point) < SAME_PORTAL:
-            second.remove(partner)
-            middle = ((point[0] + partner[1][0]) / 2, (point[1] + partner[1][1]) / 2)
-            portals.append(Portal(middle, pair, explicit and partner[2]))
-        else:
-            portals.append(Portal(point, pair, explicit))
-    return portals + [Portal(point, pair, explicit) for _, point, explicit in second]

@@ -1,9 +1,9 @@
 """Plans from rooms without thickness and portals that are points: walls, doors and openings are made for them."""
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import shapely
 
@@ -11,16 +11,20 @@ from closedrooms.core.door import Point, Segment
 from closedrooms.worlds.assembly import Edge, free_spans, shared_edges, walls_along
 from closedrooms.worlds.geometry import distance_along
 from closedrooms.worlds.passages import hung, is_circulation
-from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom
+from closedrooms.worlds.plan import DoorKind, FloorPlan, Opening, PlanDoor, PlanRoom
 
 # Usual outer and inner walls, where a file gives walls no thickness [m].
 OUTER_WALL, INNER_WALL = 0.3, 0.15
 # An interior door, where a file gives doors no width [m].
 DOOR_WIDTH = 0.9
+# Wider doors have two leaves [m].
+DOUBLE = 1.3
 # Passages without a door: as wide as the shared wall, at most this between circulation rooms and between others [m].
 WIDE_OPENING, OPENING = 5.0, 1.5
 # Clear wall between a door and a corner, and the narrowest door made [m]: as it should be, and where nothing else fits.
 FITS = ((0.12, 0.7), (0.08, 0.6))
+# What two rooms list is one portal up to this distance [m].
+SAME = 2.0
 # A door that has to stand further from its portal than this is reported [m].
 MOVED = 1.0
 
@@ -42,17 +46,56 @@ class Portal:
     width: float | None = None
 
 
-def plan_of_portals(rooms: tuple[PlanRoom, ...], portals: Sequence[Portal], repairs: list[str]) -> FloorPlan:
+def paired(listed: Sequence[tuple[int, Portal]], *, within: float = SAME) -> list[Portal]:
+    """Portals, each once although both of its rooms list it.
+
+    Args:
+        listed: Index of the room that lists a portal, and the portal.
+        within: What both rooms list is one portal up to this distance [m].
+
+    Returns:
+        In order of their rooms; a pair becomes one portal in the middle, with a door when both say so.
+    """
+    by_rooms: defaultdict[tuple[int, int], list[tuple[int, Portal]]] = defaultdict(list)
+    for room, portal in listed:
+        by_rooms[portal.rooms].append((room, portal))
+    result = []
+    for rooms in sorted(by_rooms):
+        first = [portal for room, portal in by_rooms[rooms] if room == rooms[0]]
+        second = [portal for room, portal in by_rooms[rooms] if room != rooms[0]]
+        for portal in first:
+            partner = min(second, key=lambda other: math.dist(other.point, portal.point), default=None)
+            if partner is None or math.dist(partner.point, portal.point) >= within:
+                result.append(portal)
+                continue
+            second.remove(partner)
+            (x0, y0), (x1, y1) = portal.point, partner.point
+            middle = ((x0 + x1) / 2, (y0 + y1) / 2)
+            result.append(replace(portal, point=middle, has_door=portal.has_door and partner.has_door))
+        result += second
+    return result
+
+
+def plan_of_portals(
+    rooms: tuple[PlanRoom, ...],
+    portals: Sequence[Portal],
+    repairs: list[str],
+    *,
+    outer: float = OUTER_WALL,
+    inner: float = INNER_WALL,
+) -> FloorPlan:
     """A plan whose walls run along the rooms' outlines, with the portals' doors and openings in them.
 
     Args:
         rooms: Their outlines share edges.
         portals: In the order in which the doors are numbered.
         repairs: What had to be moved, narrowed or left out is added here.
+        outer: Thickness of walls to the outside [m].
+        inner: Thickness of walls between rooms [m].
     """
     edges = shared_edges([room.polygon for room in rooms])
     doors, openings = _passages(portals, rooms, edges, repairs)
-    walls = tuple(walls_along(edges, lambda edge: OUTER_WALL if edge.rooms[1] is None else INNER_WALL))
+    walls = tuple(walls_along(edges, lambda edge: outer if edge.rooms[1] is None else inner))
     repairs += _unreached(rooms, doors, openings)
     return FloorPlan("", rooms, walls, hung(doors, openings, rooms), tuple(openings))
 
@@ -72,7 +115,8 @@ def _passages(
         taken.append(segment)
         sides = (rooms[portal.rooms[0]].id, rooms[portal.rooms[1]].id)
         if portal.has_door:
-            doors.append(PlanDoor(f"d{len(doors):02d}", segment, sides))
+            kind: DoorKind = "double" if math.dist(*segment) > DOUBLE else "hinged"
+            doors.append(PlanDoor(f"d{len(doors):02d}", segment, sides, kind))
         else:
             openings.append(Opening(f"o{len(openings):02d}", segment, sides))
     repairs.extend(f"{count} portals {what}" for what, count in sorted(problems.items()))

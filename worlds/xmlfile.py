@@ -42,6 +42,13 @@ def children(element: Any, name: str) -> list[Any]:
     return [c for c in element if isinstance(c.tag, str) and c.tag.rpartition("}")[2].lower() == name.lower()]
 
 
+def descendants(element: Any, name: str) -> list[Any]:
+    """All elements called ``name`` below ``element``, in any case, in the order of the file."""
+    if element is None:
+        return []
+    return [e for e in element.iter() if isinstance(e.tag, str) and e.tag.rpartition("}")[2].lower() == name.lower()]
+
+
 def attribute(element: Any, name: str) -> str | None:
     """An attribute spelt in any case."""
     return next((value for key, value in element.attrib.items() if key.lower() == name.lower()), None)
