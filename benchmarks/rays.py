@@ -62,13 +62,13 @@ def wander(sim: Simulation, count: int) -> list[Pose2]:
 
 
 def best(ways: dict[str, Callable[[], object]], repeats: int) -> dict[str, float]:
-    """Shortest time of each way [s]; they take turns, so that a busy machine is unfair to none."""
+    """Shortest processor time of each way [s]; they take turns, so that a busy machine is unfair to none."""
     times: dict[str, list[float]] = {name: [] for name in ways}
     for _ in range(repeats):
         for name, run in ways.items():
-            start = time.perf_counter()
+            start = time.process_time()
             run()
-            times[name].append(time.perf_counter() - start)
+            times[name].append(time.process_time() - start)
     return {name: min(taken) for name, taken in times.items()}
 
 

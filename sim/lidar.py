@@ -13,8 +13,6 @@ from closedrooms.sim.physics import PhysicsWorld
 
 # A ray is first cast this much further than its neighbours went last time [share, m]; see ``Lidar.track``.
 FURTHER, MARGIN = 1.05, 0.2
-# Neighbours on each side whose last distances are looked at.
-NEIGHBOURS = 3
 
 
 class Lidar:
@@ -28,6 +26,7 @@ class Lidar:
         self._noise = noise
         self._physics = physics
         self._angles = config.angle_min + config.angle_increment * np.arange(config.beams)
+        self._offsets = np.arange(-3, config.beams + 3)
         self._mount = Pose2(*config.mount)
         self._range_noise = stream(seed, "lidar", "range")
         self._outliers = stream(seed, "lidar", "outliers")
@@ -77,9 +76,11 @@ class Lidar:
         if self._last is None:
             return np.full(self.config.beams, longest)
         turned = round(wrap_angle(heading - self._last_heading) / self.config.angle_increment)
-        last = np.roll(self._last, -turned)
-        beams = np.arange(-NEIGHBOURS, self.config.beams + NEIGHBOURS) % self.config.beams
-        around = np.lib.stride_tricks.sliding_window_view(last[beams], 2 * NEIGHBOURS + 1).max(axis=1)
+        around = self._last[(self._offsets + turned) % self.config.beams]
+        # The largest of seven neighbours, by pairs, fours and two overlapping fours.
+        around = np.maximum(around[:-1], around[1:])
+        around = np.maximum(around[:-2], around[2:])
+        around = np.maximum(around[:-3], around[3:])
         expected: FloatArray = np.minimum(around * FURTHER + MARGIN, longest)
         return expected
 
