@@ -9,6 +9,7 @@ from closedrooms.core.errors import InvalidInputError
 PresetName = Literal["paper", "best"]
 Structure = Literal["hough", "rose"]
 Phi = Literal["as-run", "as-printed"]
+RoomOrder = Literal["smallest-first", "largest-first", "by-position"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +57,9 @@ class StructureConfig:
 
     merge_distance: float = 0.60
     """Walls of one direction whose lines are closer than this share a line [m]."""
+
+    min_line_wall: float = 2.0
+    """A line needs this much wall in its segments [m], where each thin wall shows twice; less is a jamb or clutter."""
 
     border_margin: float = 1.0
     """Distance of the boundary lines from the outermost segments [m]."""
@@ -123,6 +127,9 @@ class PredictorConfig:
 
     max_free: float = 0.50
     """A face is unknown when at most this share of it is free."""
+
+    room_order: RoomOrder = "smallest-first"
+    """Who takes its turn first in a step: by number of candidate faces, as printed, or by position, to compare."""
 
     max_level: int = 9
     """Largest k of the expansion."""

@@ -84,7 +84,8 @@ class Growth:
 def expand(growth: Growth, config: PredictorConfig, report: Callable[[int], None] = lambda _level: None) -> None:
     """Grow all rooms jointly until nothing improves or ``max_level`` is reached.
 
-    At each level the rooms take their turn from the smallest to the largest set of candidates; whether a room is
+    At each level the rooms take their turn from the smallest to the largest set of candidates (or as
+    ``room_order`` says); whether a room is
     dependent is asked again at every turn. A layout stays as it is when no subset improves it.
 
     Args:
@@ -98,18 +99,20 @@ def expand(growth: Growth, config: PredictorConfig, report: Callable[[int], None
     report(0)
     for level in range(1, config.max_level + 1):
         changed = False
-        for room in sorted(rooms, key=lambda r: _turn(growth, r)):
+        for room in sorted(rooms, key=lambda r: _turn(growth, r, config)):
             changed |= _grow(growth, room, config)
         report(level)
         if not changed:
             break
 
 
-def _turn(growth: Growth, room: int) -> tuple[float, ...]:
+def _turn(growth: Growth, room: int, config: PredictorConfig) -> tuple[float, ...]:
     """Order within a level: fewest candidates first; ties by their area, the layout's, then by position."""
+    if config.room_order == "by-position":
+        return growth.position(room)
     candidates, areas = growth.candidates(room), growth.arrangement.areas
     return (
-        candidates.size,
+        candidates.size if config.room_order == "smallest-first" else -candidates.size,
         round(float(areas[candidates].sum()), 6),
         round(float(areas[growth.layout(room)].sum()), 6),
         *growth.position(room),

@@ -10,6 +10,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.config import StructureConfig
 from closedrooms.predictor.directions import Directions, angle_between
+from closedrooms.predictor.segments import lengths_of
 
 LineKind = Literal["wall", "border", "split"]
 
@@ -49,19 +50,22 @@ def find_lines(
     """Cluster collinear segments of each direction and represent each cluster by a line.
 
     Segments closer than ``collinear_distance`` chain into one wall, whose line lies at the median offset; walls
-    whose lines are closer than ``merge_distance`` share one line.
+    whose lines are closer than ``merge_distance`` share one line. Lines with hardly any wall are dropped.
 
     Returns:
         The lines, ordered by direction and offset, and the line of each segment (-1 for none), shape (n,).
     """
     lines: list[Line] = []
     labels = np.full(len(segments), -1, dtype=np.int64)
+    lengths = lengths_of(segments)
     for cluster, angle in enumerate(directions.angles):
         members = np.flatnonzero(directions.labels == cluster)
         axes = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
         ends = segments[members].reshape(-1, 2, 2) @ axes.T  # (k, 2 ends, along and across)
         walls = _chain(ends, config.collinear_distance)
         for offset, inside in _merge(ends, walls, config.merge_distance):
+            if lengths[members[inside]].sum() < config.min_line_wall:
+                continue
             labels[members[inside]] = len(lines)
             lines.append(Line(float(angle), offset))
     return tuple(lines), labels

@@ -44,8 +44,8 @@ def find_structure(grid: OccupancyGrid, config: PredictorConfig) -> WallLines | 
     else:
         segments = find_segments(grid, config.lines)
         directions = find_directions(segments, config.lines)
-    if directions.angles.size == 0:
-        return None
     lines, clusters = find_lines(segments, directions, config.lines)
+    if not lines:
+        return None
     carried = segments[clusters >= 0]
     return WallLines(segments, clusters, lines, boundary_lines(carried, directions, config.lines), directions.angles)

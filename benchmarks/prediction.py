@@ -1,0 +1,93 @@
+"""Speed, memory and agreement of the predictor, side by side with the authors' own completed maps.
+
+    python benchmarks/prediction.py ../shared/data/authors [--config preset ...]
+
+A sample is any folder with ``map.yaml`` and ``doors.geojson``; with ``authors.yaml`` the area that the prediction adds
+(cells free in it and unknown in the map) is compared with the area that the authors' program added, with
+``truth.yaml`` with the area that is really there.
+"""
+
+import resource
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.geojson import read_doors
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.rosmap import read_map
+from closedrooms.predictor.baselines import geometric, line_of_sight
+from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.predict import predict
+
+METHODS = {"predict": predict, "line-of-sight": line_of_sight, "geometric": geometric}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """What to measure."""
+
+    folder: tyro.conf.Positional[Path]
+    """Where the samples are, at any depth."""
+    config: PredictorConfig = field(default_factory=PredictorConfig)
+    """Settings of the predictor."""
+    method: str = "predict"
+    """predict, line-of-sight or geometric."""
+    each: bool = False
+    """Print a row a map."""
+
+
+def added_iou(predicted: OccupancyGrid, other: OccupancyGrid, map_grid: OccupancyGrid) -> float:
+    """IoU of the cells that two completed maps add to a map."""
+    frame = predicted.frame.covering(*other.frame.bounds)
+    unknown = map_grid.on(frame).unknown
+    a, b = predicted.on(frame).free & unknown, other.on(frame).free & unknown
+    return float((a & b).sum() / max((a | b).sum(), 1))
+
+
+def measure(folder: Path, options: Options) -> dict[str, float]:
+    grid = read_map(folder / "map.yaml")
+    doors: list[ClosedDoor] = read_doors(folder / "doors.geojson")
+    start = time.perf_counter()
+    prediction = METHODS[options.method](grid, doors, options.config)
+    row = {"doors": len(doors), "failures": len(prediction.failures), "seconds": time.perf_counter() - start}
+    for name in ("authors", "truth"):
+        if (folder / f"{name}.yaml").exists():
+            row[name] = added_iou(prediction.grid, read_map(folder / f"{name}.yaml"), grid)
+    return row
+
+
+def main() -> None:
+    options = tyro.cli(Options, description=__doc__)
+    folders = sorted(path.parent for path in options.folder.rglob("map.yaml"))
+    rows = {str(f.relative_to(options.folder)): measure(f, options) for f in folders}
+    table = Table("maps", "doors", "failures", "median s", "max s", "agreement", "IoU with truth", "peak MB")
+    console = Console()
+    if options.each:
+        for name, row in sorted(rows.items(), key=lambda item: item[1].get("authors", 0.0)):
+            console.print(name, {key: round(value, 3) for key, value in row.items()})
+
+    def column(key: str) -> np.ndarray:
+        return np.array([row[key] for row in rows.values() if key in row] or [np.nan])
+
+    seconds = column("seconds")
+    table.add_row(
+        str(len(rows)),
+        f"{column('doors').sum():.0f}",
+        f"{column('failures').sum():.0f}",
+        f"{np.median(seconds):.2f}",
+        f"{seconds.max():.2f}",
+        f"{column('authors').mean():.3f}",
+        f"{column('truth').mean():.3f}",
+        f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f}",
+    )
+    console.print(table)
+
+
+if __name__ == "__main__":
+    main()
