@@ -104,7 +104,7 @@ class Explorer:
         if driver.state == "arrived":
             self._facing_since = now
         elif driver.state == "stuck":
-            self._remember_obstacles(pose, scan)
+            self._map.add_obstacles(touching_points(pose, scan, self.config))
             self.goal = None
             if driver.recoveries > self.config.max_recoveries:
                 self.status = "stuck"
@@ -117,7 +117,7 @@ class Explorer:
         assert goal is not None
         if still_unknown(grid, goal.frontier, self.config) < self.config.min_frontier - 1e-9:
             self._forget()
-        elif self._facing_since is None and not _is_free(grid, self._driver.ahead(CHECK_AHEAD), self.config):
+        elif self._facing_since is None and not is_free(grid, self._driver.ahead(CHECK_AHEAD), self.config):
             self.goal = None
         elif self._facing_since is None and now - self._replanned_at >= self.config.replan_interval - 1e-9:
             self._reconsider(goal, pose, grid, now)
@@ -251,13 +251,6 @@ class Explorer:
         self._chosen.append((place, 1))
         return 1
 
-    def _remember_obstacles(self, pose: Pose2, scan: LaserScan) -> None:
-        """What the scan shows at the footprint of a stuck robot blocks later paths, on the map or not."""
-        points = near_points(scan)
-        touching = points[np.hypot(*points.T) < self.config.required_clearance + TOUCHING]
-        if len(touching):
-            self._map.add_obstacles(pose.transform(touching))
-
 
 def _goal_cells(mask: BoolArray, costmap: Costmap) -> BoolArray:
     """The cells of the planning grid that hold a cell of ``mask`` on the frontier grid."""
@@ -265,7 +258,13 @@ def _goal_cells(mask: BoolArray, costmap: Costmap) -> BoolArray:
     return cells
 
 
-def _is_free(grid: OccupancyGrid, points: FloatArray, config: NavigationConfig) -> bool:
+def touching_points(pose: Pose2, scan: LaserScan, config: NavigationConfig) -> FloatArray:
+    """What the scan shows at the footprint of a stuck robot, map frame, shape (n, 2) [m]: it blocks later paths."""
+    points = near_points(scan)
+    return pose.transform(points[np.hypot(*points.T) < config.required_clearance + TOUCHING])
+
+
+def is_free(grid: OccupancyGrid, points: FloatArray, config: NavigationConfig) -> bool:
     """Whether the robot still fits along path points, shape (n, 2) [m], on the map as known now."""
     if len(points) < 2:
         return True

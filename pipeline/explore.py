@@ -66,7 +66,7 @@ class ExplorationResult:
     wall_seconds: dict[str, float] = field(default_factory=dict)
 
 
-class Stopwatch:
+class StepWatch:
     """Wall-clock time by step."""
 
     def __init__(self) -> None:
@@ -102,7 +102,7 @@ def explore(
     """
     observer = observer or NoObserver()
     explorer = Explorer(config)
-    watch = Stopwatch()
+    watch = StepWatch()
     start: float | None = None
     last: Pose2 | None = None
     status: ExplorationStatus = "limit"

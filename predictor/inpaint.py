@@ -34,18 +34,18 @@ def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Sha
     inside = np.zeros(frame.shape, dtype=np.bool_)
     ring = np.zeros(frame.shape, dtype=np.bool_)
     for shape in shapes:
-        _fill(shape, frame, inside)
+        fill_shape(shape, frame, inside)
         _trace(shape, frame, ring)
     cells[unknown & inside & ~ring] = FREE
     cells[unknown & ring] = OCCUPIED
     cleared = np.zeros(frame.shape, dtype=np.bool_)
     for passage in passages:
-        _fill(passage, frame, cleared)
+        fill_shape(passage, frame, cleared)
     cells[cleared] = FREE
     return OccupancyGrid(frame, cells)
 
 
-def _fill(shape: Shape, frame: GridFrame, mask: BoolArray) -> None:
+def fill_shape(shape: Shape, frame: GridFrame, mask: BoolArray) -> None:
     """Mark cells whose centre lies in a shape."""
     if shape.is_empty:
         return
