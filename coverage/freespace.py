@@ -43,7 +43,9 @@ def clean_free_space(grid: OccupancyGrid, config: GraphConfig) -> FreeSpace:
         InvalidInputError: No free space that is wide enough.
     """
     filtered = _without_clutter(grid) if config.clutter_filter else grid
-    free, occupied, frame = _cropped(filtered)
+    # Door leaves stand in the wall around what is free: they belong to the window.
+    margin = math.ceil(config.wall_thickness / grid.frame.resolution) + 1
+    free, occupied, frame = _cropped(filtered, margin)
     resolution = frame.resolution
     free = _without_gaps(free, occupied, config.gap_width / resolution)
     passable = _without_specks(free, config.speck_area / resolution**2)
@@ -63,15 +65,16 @@ def _without_clutter(grid: OccupancyGrid) -> OccupancyGrid:
     return filter_clutter(grid)
 
 
-def _cropped(grid: OccupancyGrid) -> tuple[BoolArray, BoolArray, GridFrame]:
-    """Free and occupied cells in a window around the free ones, one cell of border that is neither."""
+def _cropped(grid: OccupancyGrid, margin: int) -> tuple[BoolArray, BoolArray, GridFrame]:
+    """Free and occupied cells in a window around the free ones, with a border of ``margin`` cells."""
     free = grid.free
     rows, cols = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
     if rows.size == 0:
         raise InvalidInputError("a map without free space", expected="at least one free room")
     r0, r1, c0, c1 = int(rows[0]), int(rows[-1]) + 1, int(cols[0]), int(cols[-1]) + 1
-    window, occupied = np.pad(free[r0:r1, c0:c1], 1), np.pad(grid.occupied[r0:r1, c0:c1], 1)
-    return window, occupied, grid.frame.cropped(r0 - 1, c0 - 1, r1 - r0 + 2, c1 - c0 + 2)
+    frame = grid.frame.cropped(r0 - margin, c0 - margin, r1 - r0 + 2 * margin, c1 - c0 + 2 * margin)
+    window = grid.on(frame)
+    return window.free, window.occupied, frame
 
 
 def _without_gaps(free: BoolArray, occupied: BoolArray, width: float) -> BoolArray:
