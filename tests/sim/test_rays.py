@@ -1,5 +1,6 @@
 """The lidar against exact geometry."""
 
+import dataclasses
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 import shapely
 
+from closedrooms.core.grid import GridFrame
 from closedrooms.core.pose import Pose2
 from closedrooms.sim.config import LidarConfig, SimConfig, noise_level
 from closedrooms.sim.lidar import Lidar
@@ -16,6 +18,7 @@ from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.closing import draw_closed
 from closedrooms.worlds.library import bundled_names, load_world
 from closedrooms.worlds.plan import FloorPlan
+from closedrooms.worlds.truth import rasterise, truth_bounds
 
 Solids = Callable[[Simulation], shapely.Geometry]
 
@@ -120,3 +123,23 @@ def test_a_physics_world_without_bodies_returns_misses() -> None:
         fractions, bodies = physics.cast((0.0, 0.0, 0.3), np.array([[5.0, 0.0, 0.3], [0.0, 5.0, 0.3]]))
     assert (fractions == 1.0).all()
     assert (bodies == -1).all()
+
+
+def test_rays_and_the_rasterised_truth_mean_the_same_walls(exact_config: SimConfig) -> None:
+    world = dataclasses.replace(load_world(bundled_names()[0]), furniture=())
+    cell = 0.02
+    frame = GridFrame(cell, 0.0, 0.0, 1, 1).covering(*truth_bounds(world, Pose2()))
+    truth = rasterise(world, frame, Pose2())
+    with Simulation(world, [], exact_config, 0) as sim:
+        leaves = shapely.union_all([leaf for name in sim.door_states() for leaf in sim.door_leaves(name)])
+        pose = sim.world_T_robot
+        ranges = sim.true_ranges(pose)
+    angles = pose.theta + exact_config.lidar.angle_min + exact_config.lidar.angle_increment * np.arange(ranges.size)
+    rays = np.column_stack((np.cos(angles), np.sin(angles)))
+    for beyond, occupied in ((1.5 * cell, True), (-1.5 * cell, False)):
+        points = np.array([pose.x, pose.y]) + (ranges + beyond)[:, None] * rays
+        on_walls = ~shapely.dwithin(leaves, shapely.points(points), 0.1)
+        cells = frame.to_cells(points[on_walls])
+        assert len(cells) > 300
+        # A grazing ray may end a cell beside the wall: one cell of slack, few of them.
+        assert np.mean(truth.occupied[cells[:, 0], cells[:, 1]] == occupied) > 0.95
