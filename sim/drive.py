@@ -7,8 +7,8 @@ from typing import NamedTuple
 from closedrooms.sim.config import RobotConfig
 from closedrooms.sim.contacts import SKIN, Edge, Obstacles, distance, move_disc
 
-# While velocities change, an arc is driven with the mean of so much time [s]: at the default limits this leaves the true
-# way by at most 0.1 mm in half a second (0.5 mm with 0.05 s).
+# While velocities change, an arc is driven with the mean of so much time [s]: at the default limits this leaves the
+# true way by at most 0.1 mm in half a second (0.5 mm with 0.05 s).
 RAMP_SECONDS = 0.02
 # One arc is at most this long [m] and turns by no more than this [rad].
 ARC_LENGTH = 0.3
