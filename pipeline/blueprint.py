@@ -24,6 +24,7 @@ class Layout:
             replaces them by those of the building or of the map as soon as it knows them.
         building: There is a simulated building (tab ``Building``).
         mapping: There is a robot that maps (tab ``Mapping``).
+        reference: True poses are known beside the estimated ones.
         prediction: There is a prediction (tabs ``Structure``, ``Expansion``, ``Rooms``).
         coverage: There are tours (tab ``Coverage``).
         driving: The robot drives the tour (tab ``Driving``).
@@ -33,6 +34,7 @@ class Layout:
     bounds: Bounds = (-20.0, -20.0, 20.0, 20.0)
     building: bool = True
     mapping: bool = True
+    reference: bool = True
     prediction: bool = True
     coverage: bool = True
     driving: bool = False
@@ -97,13 +99,16 @@ def _building(layout: Layout) -> rrb.Container:
 
 def _mapping(layout: Layout) -> rrb.Container:
     view = _from_above(layout, "Map", ["+ /map/**"], aspect=1.3)
+    errors = {
+        "position_error": "Position error [m]",
+        "heading_error": "Heading error [deg]",
+        "odometry_error": "Error of the odometry alone [m]",
+    }
     side = rrb.Vertical(
-        _series("position_error", "Position error [m]"),
-        _series("heading_error", "Heading error [deg]"),
-        _series("odometry_error", "Error of the odometry alone [m]"),
+        *(_series(name, title) for name, title in errors.items() if layout.reference),
         _series("known_area", "Known area [m²]"),
         rrb.Tabs(rrb.TextDocumentView(origin="/legend", name="Colours"), _log(), active_tab=0),
-        row_shares=[3, 3, 3, 3, 4],
+        row_shares=[3] * (4 if layout.reference else 1) + [4],
     )
     return rrb.Horizontal(view, side, column_shares=[2, 1], name="Mapping")
 

@@ -57,6 +57,9 @@ class Observer(Protocol):
     def trajectory(self, stamps: FloatArray, poses: FloatArray) -> None:
         """The trajectory after the final optimisation: stamps [s], shape (n,), and ``(x, y, theta)``, shape (n, 3)."""
 
+    def reference(self, stamps: FloatArray, poses: FloatArray) -> None:
+        """Better poses, known only afterwards: stamps [s], shape (n,), and ``(x, y, theta)``, shape (n, 3)."""
+
     def truth(self, grid: OccupancyGrid, rooms: Sequence[Room]) -> None:
         """The true map, doors open, and the true rooms behind the closed doors."""
 
@@ -111,6 +114,9 @@ class NoObserver:
         """Nothing."""
 
     def trajectory(self, stamps: FloatArray, poses: FloatArray) -> None:
+        """Nothing."""
+
+    def reference(self, stamps: FloatArray, poses: FloatArray) -> None:
         """Nothing."""
 
     def truth(self, grid: OccupancyGrid, rooms: Sequence[Room]) -> None:

@@ -76,6 +76,7 @@ class Recorder:
         self._areas: list[tuple[float, float]] = []
         self._paths: dict[str, list[Point]] = {"odometry": [], "estimate": [], "truth": []}
         self._seen: set[str] = set()
+        self._driven: set[str] = set()
         self._map_bounds: Bounds | None = None
         self._last_scan = self._last_map = -np.inf
 
@@ -116,9 +117,7 @@ class Recorder:
         self._draw_robot("building/robot", colours.TRUTH)
 
     def door_states(self, states: Mapping[str, float], stamp: float) -> None:
-        """Doors that move; the first call after the tours begins the stage of driving."""
-        if self._stream.stage >= Stage.COVERAGE and self._layout.driving:
-            self._stage = Stage.DRIVING
+        """Doors that move."""
         if self._building is not None:
             self._stream.at(stamp, self._stage)
             self._building.move(states)
@@ -204,6 +203,15 @@ class Recorder:
             self._stream.log("map/path/estimate", drawables.strips([path], colours.ESTIMATE, z=drawables.Z_PATH))
             self._corrected = (np.asarray(stamps, dtype=np.float64), np.asarray(poses, dtype=np.float64))
 
+    def reference(self, stamps: FloatArray, poses: FloatArray) -> None:
+        """Poses to compare with, where the scans came without any."""
+        if len(stamps) != len(self._poses) or not len(stamps):
+            return
+        self._poses = [(*row[:8], *map(float, pose)) for row, pose in zip(self._poses, poses, strict=True)]
+        self._stream.at(float(stamps[-1]), self._stage)
+        way = np.asarray(poses, dtype=np.float64)[:, :2]
+        self._stream.log("map/path/truth", drawables.strips([way], colours.TRUTH, z=drawables.Z_PATH))
+
     def truth(self, grid: OccupancyGrid, rooms: Sequence[Room]) -> None:
         """The true map and rooms."""
         self._stream.at(stage=Stage.ROOMS)
@@ -225,12 +233,18 @@ class Recorder:
     def tours(self, tours: Mapping[str, "CoverageTour"]) -> None:
         """Graphs and tours."""
         draw_tours(self._stream, tours)
+        if self._layout.driving:
+            self._stage = Stage.DRIVING
 
     def revision(self, prediction: "Prediction", tour: FloatArray, stamp: float) -> None:
         """The prediction and the rest of the tour while the robot drives."""
         self._stage = Stage.DRIVING
         self._stream.at(stamp, self._stage)
-        draw_rooms(self._stream, "driving/predicted", prediction.grid, prediction.rooms, self._palette)
+        self._say("Driving", f"{len(prediction.rooms)} rooms are still predicted")
+        names = draw_rooms(self._stream, "driving/predicted", prediction.grid, prediction.rooms, self._palette)
+        for gone in sorted(self._driven - names):
+            self._stream.log(f"driving/predicted/rooms/{gone}", rr.Clear(recursive=True))
+        self._driven = names
         self._stream.log("driving/tour", drawables.strips([np.asarray(tour)], colours.TOURS["predicted"]))
 
     def note(self, text: str, stamp: float | None = None) -> None:
@@ -294,15 +308,15 @@ class Recorder:
         if self._building is not None:
             self._stream.columns("building/robot", stamps, drawables.pose_columns(truth), steps)
         tracks = {"estimate": (estimate, colours.ESTIMATE)}
-        if self._corrected is not None and np.array_equal(self._corrected[0], stamps):
+        if self._corrected is not None and np.array_equal(self._corrected[0], stamps[: len(self._corrected[0])]):
             tracks["corrected"] = (self._corrected[1], colours.LOOP)
-        times, true = stamps[given], truth[given]
         for name, (poses, colour) in tracks.items():
-            self._series(f"metrics/position_error/{name}", times, _apart(poses[given], true), name, colour)
-            self._series(f"metrics/heading_error/{name}", times, _turned(poses[given], true), name, colour)
-        self._series(
-            "metrics/odometry_error/position", times, _apart(odometry[given], true), "odometry", colours.ODOMETRY
-        )
+            kept = given[: len(poses)]
+            times, theirs, true = stamps[: len(poses)][kept], poses[kept], truth[: len(poses)][kept]
+            self._series(f"metrics/position_error/{name}", times, _apart(theirs, true), name, colour)
+            self._series(f"metrics/heading_error/{name}", times, _turned(theirs, true), name, colour)
+        drift = _apart(odometry[given], truth[given])
+        self._series("metrics/odometry_error/position", stamps[given], drift, "odometry", colours.ODOMETRY)
 
     def _series(self, path: str, stamps: FloatArray, values: FloatArray, name: str, colour: colours.Colour) -> None:
         self._stream.log(path, rr.SeriesLines(colors=[colour], names=[name], widths=[1.5]), static=True)

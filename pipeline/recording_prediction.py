@@ -68,17 +68,18 @@ def draw_trace(stream: RecordingStream, trace: "PredictionTrace", palette: Mappi
 
 def draw_rooms(
     stream: RecordingStream, root: str, grid: OccupancyGrid, rooms: Sequence[Room], palette: Mapping[str, Colour]
-) -> None:
-    """A whole map with the rooms behind the doors in the doors' colours."""
+) -> set[str]:
+    """A whole map with the rooms behind the doors in the doors' colours; returns the rooms' names."""
     stream.log(f"{root}/grid", drawables.grid_map(grid))
-    for number, room in enumerate(rooms):
-        name = "+".join(room.doors) or f"room-{number}"
+    names = ["+".join(room.doors) or f"room-{number}" for number, room in enumerate(rooms)]
+    for name, room in zip(names, rooms, strict=True):
         _draw_room(stream, f"{root}/rooms/{name}", room.polygon, palette.get(next(iter(room.doors), ""), colours.INK))
     places = np.array([shapely.get_coordinates(r.polygon.representative_point())[0] for r in rooms]).reshape(-1, 2)
     stream.log(
         f"{root}/labels",
         drawables.points(places, colours.PAPER, radius=drawables.THIN, labels=[_label(r) for r in rooms]),
     )
+    return set(names)
 
 
 def draw_tours(stream: RecordingStream, tours: Mapping[str, "CoverageTour"]) -> None:

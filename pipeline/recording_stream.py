@@ -45,7 +45,6 @@ class RecordingStream:
 
     def __init__(self, path: Path, name: str) -> None:
         self._path, self._name = path, name
-        self._stamp: float | None = None
         self._stage: int = Stage.BUILDING
         self._rec = rr.RecordingStream(
             APPLICATION,
@@ -93,20 +92,9 @@ class RecordingStream:
         """Say how the recording opens; once, as soon as it is known where the maps lie."""
         self._rec.send_blueprint(arrange(layout))
 
-    @property
-    def stamp(self) -> float | None:
-        """Last time that was set [s]; ``None`` before the first, and in a recording without a clock."""
-        return self._stamp
-
-    @property
-    def stage(self) -> int:
-        """The stage that what is logged now belongs to."""
-        return self._stage
-
     def at(self, stamp: float | None = None, stage: int | None = None) -> None:
         """What follows belongs to ``stamp`` [s] and ``stage``; either stays as it was where not given."""
         if stamp is not None:
-            self._stamp = stamp
             self._rec.set_time("sim_time", duration=stamp)
         if stage is not None:
             self._stage = stage
