@@ -164,20 +164,24 @@ def coverage(polygons: Sequence[Polygon], *, gap: float = 0.0, snap: float = -1.
     return result
 
 
-def without_gaps(polygons: Sequence[Polygon], width: float, *, fixed: int = 0) -> tuple[list[Polygon], list[Polygon]]:
+def without_gaps(
+    polygons: Sequence[Polygon], width: float, *, fixed: int = 0, branches: bool = True
+) -> tuple[list[Polygon], list[Polygon]]:
     """Rooms grown into the gaps and notches between them that are narrower than ``width`` metres.
 
     Args:
         polygons: Side by side.
         width: Metres.
         fixed: So many rooms at the front keep their shape.
+        branches: Cut gaps where they branch and join each piece by itself.
 
     Returns:
         The rooms, each gap joined to the one with the longest border of those around it, and the gaps themselves.
     """
     union = shapely.union_all(polygons)
     closed = union.buffer(width / 2, join_style="mitre").buffer(-width / 2, join_style="mitre")
-    gaps = [part for part in shapely.get_parts(areal(closed.difference(union))) if _is_narrow(part, width)]
+    narrow = [part for part in shapely.get_parts(areal(closed.difference(union))) if _is_narrow(part, width)]
+    gaps = [piece for part in narrow for piece in (_branches(part, width) if branches else [part])]
     rooms = list(polygons)
     filled = []
     for gap in gaps:
@@ -192,3 +196,27 @@ def without_gaps(polygons: Sequence[Polygon], width: float, *, fixed: int = 0) -
 
 def _is_narrow(part: Polygon, width: float) -> bool:
     return part.area > 1e-3 and shapely.maximum_inscribed_circle(part, tolerance=0.02).length < width / 2 + 0.05
+
+
+def _branches(gap: Polygon, width: float) -> list[Polygon]:
+    """A gap cut where it branches, along the faces of the rooms around it, so that each piece lies between two."""
+    cuts = []
+    for number, ring in enumerate((gap.exterior, *gap.interiors)):
+        points = shapely.get_coordinates(ring)[:-1]
+        if ring.is_ccw != (number == 0):
+            points = points[::-1]
+        for before, corner, after in zip(np.roll(points, 1, axis=0), points, np.roll(points, -1, axis=0), strict=True):
+            a, b = corner - before, after - corner
+            # The gap lies to the left of its boundary: a turn to the right is a corner of a room.
+            if a[0] * b[1] - a[1] * b[0] < -0.1 * np.hypot(*a) * np.hypot(*b):
+                for direction in (a / np.hypot(*a), -b / np.hypot(*b)):
+                    cut = shapely.LineString([corner + 1e-6 * direction, corner + 1.5 * width * direction])
+                    inside = shapely.get_parts(cut.intersection(gap))
+                    first = next((part for part in inside if part.distance(shapely.Point(corner)) < 1e-5), None)
+                    if first is not None and first.length < 1.4 * width:
+                        cuts.append(shapely.LineString([corner, corner + (first.length + 1e-4) * direction]))
+    if not cuts:
+        return [gap]
+    pieces = shapely.get_parts(shapely.polygonize([shapely.union_all([gap.boundary, *cuts])]))
+    found = [piece for part in pieces for piece in shapely.get_parts(part)]
+    return [piece for piece in found if isinstance(piece, Polygon) and piece.area > 1e-6]

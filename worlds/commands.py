@@ -79,8 +79,10 @@ def convert_world(src: str, dst: str | Path, to: str, *, level: str | None = Non
 def exporters() -> dict[str, Callable[[Path, FloorPlan], None]]:
     """Writers of floor plans by the name of their format."""
     from closedrooms.worlds.jsonfile import write_plan
+    from closedrooms.worlds.sdf import write_sdf
+    from closedrooms.worlds.stage import write_stage
 
-    return {"json": write_plan, "rosmap": write_ros_map}
+    return {"json": write_plan, "rosmap": write_ros_map, "sdf": write_sdf, "stage": write_stage}
 
 
 def write_ros_map(path: Path, plan: FloorPlan) -> None:

@@ -271,7 +271,7 @@ def _door_place(rng: np.random.Generator, bay: Bay) -> float:
 
 def _turned(sketch: _Sketch, angle: float) -> _Sketch:
     """The sketch with shared edges, turned, its lower left corner at the origin, on a grid of 0.1 mm."""
-    polygons, _ = without_gaps(sketch.polygons, SLIT, fixed=1)
+    polygons, _ = without_gaps(sketch.polygons, SLIT, fixed=1, branches=False)
     polygons = coverage(polygons, gap=SLIT, snap=0.01)
     c, s = math.cos(angle), math.sin(angle)
     turned = shapely.transform(np.array(polygons, dtype=object), lambda p: p @ np.array([[c, s], [-s, c]]))

@@ -1,5 +1,6 @@
 """Worlds by name or file: the bundled ones, and every format that the importers read."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,8 @@ DEFAULT_WORLD = "office-07"
 PLANS = Path(__file__).parent / "plans"
 # Enough of a file to tell its format.
 HEAD_BYTES = 65_536
+# The top-level key of an RMF building may come late.
+YAML_BYTES = 20_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,18 +90,62 @@ def importer_of(path: Path) -> Importer:
 
 def importers() -> list[Importer]:
     """Every importer, the more specific ones first."""
+    from closedrooms.worlds.houseexpo import read_houseexpo
     from closedrooms.worlds.jsonfile import read_plan
+    from closedrooms.worlds.kth import read_kth
     from closedrooms.worlds.luperto import read_luperto
+    from closedrooms.worlds.pyrobosim import read_pyrobosim
+    from closedrooms.worlds.raster import read_raster
+    from closedrooms.worlds.rmf import read_rmf
 
     return [
+        Importer("picture", "a picture of a map (PNG or PGM)", _is_picture, lambda path, _: read_raster(path)),
+        Importer("kth", "KTH XML", _is_kth, lambda path, _: read_kth(path)),
         Importer("luperto", "Luperto XML", _is_luperto, lambda path, _: read_luperto(path)),
+        Importer("houseexpo", "HouseExpo JSON", _is_houseexpo, lambda path, _: read_houseexpo(path)),
         Importer("json", "closedrooms JSON", _is_json, lambda path, _: read_plan(path)),
+        Importer("rmf", "RMF building.yaml", _has_keys("levels"), read_rmf),
+        Importer("pyrobosim", "pyrobosim YAML", _has_keys("rooms"), lambda path, _: read_pyrobosim(path)),
+        Importer("rosmap", "a ROS map (YAML)", _has_keys("image"), lambda path, _: read_raster(path)),
     ]
+
+
+def _is_picture(path: Path, head: str) -> bool:
+    del path
+    return head.startswith(("\ufffdPNG\r\n", "P2\n", "P5\n", "P2 ", "P5 "))
+
+
+def _is_xml(path: Path, head: str) -> bool:
+    return head.lstrip().startswith("<") or (not head.strip() and path.suffix == ".xml")
+
+
+def _is_kth(path: Path, head: str) -> bool:
+    # Its scale stands at the top; Luperto's has another one (represented_distance).
+    lower = head.lower()
+    return _is_xml(path, head) and ("pixeldistance" in lower or "<contour" in lower)
+
+
+def _is_luperto(path: Path, head: str) -> bool:
+    return _is_xml(path, head)
+
+
+def _is_houseexpo(path: Path, head: str) -> bool:
+    del path
+    return head.lstrip().startswith("{") and '"verts"' in head
 
 
 def _is_json(path: Path, head: str) -> bool:
     return head.lstrip().startswith(("{", "[")) or (not head.strip() and path.suffix == ".json")
 
 
-def _is_luperto(path: Path, head: str) -> bool:
-    return head.lstrip().startswith("<") or (not head.strip() and path.suffix == ".xml")
+def _has_keys(*keys: str) -> Callable[[Path, str], bool]:
+    """Whether a text has these top-level YAML keys; large YAML files are looked through to their end."""
+    patterns = [re.compile(rf"^[\"']?{re.escape(key)}[\"']?\s*:", re.MULTILINE) for key in keys]
+
+    def recognises(path: Path, head: str) -> bool:
+        text = head
+        if len(head) >= HEAD_BYTES // 2 and path.suffix.lower() in {".yaml", ".yml"}:
+            text = path.read_bytes()[:YAML_BYTES].decode("utf-8-sig", errors="replace")
+        return all(pattern.search(text) for pattern in patterns)
+
+    return recognises

@@ -83,6 +83,7 @@ def plan_of_portals(
     *,
     outer: float = OUTER_WALL,
     inner: float = INNER_WALL,
+    fits: tuple[tuple[float, float], ...] = FITS,
 ) -> FloorPlan:
     """A plan whose walls run along the rooms' outlines, with the portals' doors and openings in them.
 
@@ -92,16 +93,21 @@ def plan_of_portals(
         repairs: What had to be moved, narrowed or left out is added here.
         outer: Thickness of walls to the outside [m].
         inner: Thickness of walls between rooms [m].
+        fits: Clear wall beside a passage and its least width [m], in the order in which they are tried.
     """
     edges = shared_edges([room.polygon for room in rooms])
-    doors, openings = _passages(portals, rooms, edges, repairs)
+    doors, openings = _passages(portals, rooms, edges, fits, repairs)
     walls = tuple(walls_along(edges, lambda edge: outer if edge.rooms[1] is None else inner))
     repairs += _unreached(rooms, doors, openings)
     return FloorPlan("", rooms, walls, hung(doors, openings, rooms), tuple(openings))
 
 
 def _passages(
-    portals: Sequence[Portal], rooms: tuple[PlanRoom, ...], edges: list[Edge], repairs: list[str]
+    portals: Sequence[Portal],
+    rooms: tuple[PlanRoom, ...],
+    edges: list[Edge],
+    fits: tuple[tuple[float, float], ...],
+    repairs: list[str],
 ) -> tuple[list[PlanDoor], list[Opening]]:
     """Doors and openings on the walls nearest to their portals."""
     doors: list[PlanDoor] = []
@@ -109,7 +115,7 @@ def _passages(
     taken: list[Segment] = []
     problems: Counter[str] = Counter()
     for portal in portals:
-        segment = _place(portal, rooms, edges, taken, problems)
+        segment = _place(portal, _widest(portal, rooms), edges, taken, fits, problems)
         if segment is None:
             continue
         taken.append(segment)
@@ -133,11 +139,15 @@ def _widest(portal: Portal, rooms: tuple[PlanRoom, ...]) -> float:
 
 
 def _place(
-    portal: Portal, rooms: tuple[PlanRoom, ...], edges: list[Edge], taken: list[Segment], problems: Counter[str]
+    portal: Portal,
+    widest: float,
+    edges: list[Edge],
+    taken: list[Segment],
+    fits: tuple[tuple[float, float], ...],
+    problems: Counter[str],
 ) -> Segment | None:
     """The passage's segment: as near to the portal as the wall between its two rooms allows."""
-    widest = _widest(portal, rooms)
-    found = (_nearest(portal, widest, edges, taken, margin, narrowest) for margin, narrowest in FITS)
+    found = (_nearest(portal, widest, edges, taken, margin, narrowest) for margin, narrowest in fits)
     best = next((place for place in found if place is not None), None)
     if best is None:
         problems["left out: their rooms share no wall long enough"] += 1

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
 
@@ -61,7 +62,8 @@ def read_pyrobosim(path: str | Path) -> FloorPlan:
             labels.append("hallway")
             hallway = len(polygons) - 1
             for room, has_door in ((open_at, False), (door_at, True)):
-                portals.append((_meeting(area, polygons[room]), room, hallway, has_door, width))
+                polygons[hallway], polygons[room] = _straight_end(polygons[hallway], polygons[room])
+                portals.append((_meeting(polygons[hallway], polygons[room]), room, hallway, has_door, width))
         if hall.get("is_open") is False:
             repairs.append(f"{name} is closed in the file; here its door may be opened and closed")
     outlines = coverage(polygons, snap=0.01)
@@ -72,6 +74,8 @@ def read_pyrobosim(path: str | Path) -> FloorPlan:
         repairs,
         outer=wall,
         inner=wall,
+        # A hallway's walls end at the door: it is as wide as the hallway.
+        fits=((wall / 2 - 0.005, 0.3),),
     )
     plan = replace(plan, name=path.stem, meta={"source": path.name, "format": "pyrobosim", "repairs": repairs})
     validate(plan, str(path))
@@ -172,3 +176,20 @@ def _meeting(hall: Polygon, room: Polygon) -> shapely.Point:
     """The middle of the border that a hallway shares with a room."""
     shared = hall.boundary.intersection(room.buffer(0.01))
     return shared.centroid if not shared.is_empty else hall.centroid
+
+
+def _straight_end(hall: Polygon, room: Polygon) -> tuple[Polygon, Polygon]:
+    """A hallway that meets a round or bent wall cut straight; what is cut off goes to the room: a door is straight."""
+    shared = shapely.line_merge(hall.boundary.intersection(room.boundary))
+    points = shapely.get_coordinates(shared)
+    if shared.geom_type != "LineString" or len(points) < 3:
+        return hall, room
+    chord = points[-1] - points[0]
+    normal = np.array([-chord[1], chord[0]]) / np.hypot(*chord)
+    if (np.array(hall.centroid.coords[0]) - points[0]) @ normal < 0.0:
+        normal = -normal
+    reach = float(((points - points[0]) @ normal).max())
+    low, high = points[0] - 10.0 * chord, points[-1] + 10.0 * chord
+    strip = Polygon([low - 50.0 * normal, high - 50.0 * normal, high + reach * normal, low + reach * normal])
+    kept, grown = areal(hall.difference(strip)), areal(room.union(hall.intersection(strip)))
+    return (kept, grown) if isinstance(kept, Polygon) and isinstance(grown, Polygon) else (hall, room)

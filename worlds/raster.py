@@ -25,7 +25,7 @@ WALL = 0.1
 # Free areas below this are noise [square metres].
 SMALLEST = 1.0
 # Outlines are simplified to this many cells.
-TOLERANCE = 0.8
+TOLERANCE = 1.1
 # A door without a known width has its jambs within this of its point [m].
 HALF_WIDEST, HALF_DEFAULT = 1.2, 0.45
 # On both sides of a door free space begins within this [m].

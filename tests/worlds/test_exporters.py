@@ -1,0 +1,89 @@
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import shapely
+from defusedxml import ElementTree
+from shapely.geometry import Polygon
+
+from closedrooms.worlds.commands import convert_world
+from closedrooms.worlds.geometry import door_leaf, rectangles, wall_area
+from closedrooms.worlds.library import load_world
+from closedrooms.worlds.pieces import Box, door_leaves, opened, wall_boxes
+from closedrooms.worlds.plan import FloorPlan
+
+
+def area_of(box: Box) -> Polygon:
+    c, s = math.cos(box.angle) * box.length / 2, math.sin(box.angle) * box.length / 2
+    segment = np.array([[[box.x - c, box.y - s], [box.x + c, box.y + s]]])
+    return Polygon(rectangles(segment, np.array([box.thickness / 2]))[0])
+
+
+@pytest.mark.parametrize("name", ["office-08", "office-10", "school-04"])
+def test_wall_boxes_cover_the_walls_and_leave_the_gaps_free(name: str) -> None:
+    plan = load_world(name)
+    boxes = shapely.union_all([area_of(box) for box in wall_boxes(plan)])
+    walls = wall_area(plan)
+    assert boxes.symmetric_difference(walls).area < 0.01 * walls.area
+    for door in plan.doors:
+        assert boxes.intersection(door_leaf(plan, door).buffer(-0.005)).area < 1e-6
+
+
+@pytest.mark.parametrize("name", ["office-07", "school-06"])
+def test_an_open_leaf_stands_in_the_room_that_it_opens_into(name: str) -> None:
+    plan = load_world(name)
+    rooms = {room.id: room.polygon for room in plan.rooms}
+    for door in plan.doors:
+        (leaf,) = door_leaves(plan, door)
+        assert area_of(leaf.box).symmetric_difference(door_leaf(plan, door)).area < 1e-6
+        open_leaf = area_of(opened(leaf))
+        assert door.opens_into is not None
+        assert rooms[door.opens_into].intersection(open_leaf).area > 0.9 * open_leaf.area
+
+
+def test_double_and_sliding_doors_have_their_leaves(small: FloorPlan) -> None:
+    double, sliding = (replace(small.doors[0], kind=kind) for kind in ("double", "sliding"))  # type: ignore[arg-type]
+    leaves = door_leaves(small, double)
+    assert [leaf.box.length for leaf in leaves] == pytest.approx([0.45, 0.45])
+    assert {leaf.turn for leaf in leaves} == {1, -1}
+    for leaf in leaves:
+        assert opened(leaf).y > 2.0
+    (slider,) = door_leaves(small, sliding)
+    assert slider.hinge is None
+    assert opened(slider).x == pytest.approx(slider.box.x + 0.9)
+
+
+def test_sdf_holds_the_walls_and_a_joint_a_door(tmp_path: Path) -> None:
+    plan = convert_world("office-02", tmp_path / "a.sdf", "sdf")
+    root = ElementTree.parse(tmp_path / "a.sdf").getroot()
+    model = root.find("world/model[@name='building']")
+    assert model is not None
+    walls = model.find("link[@name='walls']")
+    assert walls is not None
+    assert len(walls.findall("collision")) == len(wall_boxes(plan))
+    hinged = [joint.get("name") for joint in model.findall("joint") if joint.get("type") == "revolute"]
+    assert hinged == [door.id for door in plan.doors]
+    links = {link.get("name") for link in model.findall("link")}
+    for joint in model.findall("joint"):
+        assert joint.findtext("parent") in links | {"world"}
+        assert joint.findtext("child") in links
+
+
+def test_stage_gets_a_bitmap_cut_at_the_walls(tmp_path: Path) -> None:
+    plan = convert_world("office-01", tmp_path / "a.world", "stage")
+    pixels = cv2.imread(str(tmp_path / "a.png"), cv2.IMREAD_GRAYSCALE)
+    assert pixels is not None
+    dark = pixels == 0
+    assert dark[0].any()
+    assert dark[-1].any()
+    assert dark[:, 0].any()
+    assert dark[:, -1].any()
+    assert dark.sum() * 0.02**2 == pytest.approx(wall_area(plan).area, rel=0.02)
+    text = (tmp_path / "a.world").read_text()
+    assert 'bitmap "a.png"' in text
+    assert text.count("\nleaf (") == len(plan.doors)
+    assert text.count("(") == text.count(")")
+    assert text.count("[") == text.count("]")
