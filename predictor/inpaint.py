@@ -10,6 +10,7 @@ import shapely
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.predictor.prediction import Shape
+from closedrooms.predictor.window import is_free
 
 
 def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Shape]) -> OccupancyGrid:
@@ -101,7 +102,7 @@ def passage(
     before = grid.frame.to_cells(door - steps[:, None] * inward)
     seen = grid.frame.contains(before)
     free = np.zeros(steps.size, dtype=np.bool_)
-    free[seen] = grid.free[before[seen, 0], before[seen, 1]]
+    free[seen] = is_free(grid.cells[before[seen, 0], before[seen, 1]])
     ahead = door + steps[:, None] * inward
     inside = shapely.contains_xy(room.buffer(-1.5 * resolution), ahead[:, 0], ahead[:, 1])
     if not free.any() or not inside.any():

@@ -1,6 +1,5 @@
 """Representative and boundary lines (paper, section 3.1)."""
 
-import itertools
 import math
 from dataclasses import dataclass
 from typing import Literal
@@ -87,31 +86,42 @@ def _merge(ends: FloatArray, walls: IntArray, reach: float) -> list[tuple[float,
     """Offset and members of each line: the two closest lines join until all are ``reach`` apart."""
     across = ends[..., 1].mean(axis=1)
     length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
-    groups: list[IntArray] = [np.flatnonzero(walls == wall) for wall in np.unique(walls)]
-    groups.sort(key=lambda members: _median(across[members], length[members]))
-    offsets = [_median(across[members], length[members]) for members in groups]
-    while len(groups) > 1 and np.diff(offsets).min() < reach:
-        groups = _join_closest(groups, np.diff(offsets), length)
-        offsets = [_median(across[members], length[members]) for members in groups]
-    return list(zip(offsets, groups, strict=True))
+    found = [np.flatnonzero(walls == wall) for wall in np.unique(walls)]
+    groups = sorted(((_median(across[members], length[members]), members) for members in found), key=lambda g: g[0])
+    while len(groups) > 1:
+        gaps = np.diff([offset for offset, _ in groups])
+        if gaps.min() >= reach:
+            break
+        chains = _join_closest([members for _, members in groups], gaps, length)
+        groups = [
+            groups[chain[0]] if len(chain) == 1 else _joined([groups[i][1] for i in chain], across, length)
+            for chain in chains
+        ]
+    return groups
 
 
-def _join_closest(groups: list[IntArray], gaps: FloatArray, length: FloatArray) -> list[IntArray]:
-    """Join the closest two neighbours; of equally close ones those with most wall, and all of them where that is equal.
+def _joined(parts: list[IntArray], across: FloatArray, length: FloatArray) -> tuple[float, IntArray]:
+    members = np.concatenate(parts)
+    return _median(across[members], length[members]), members
+
+
+def _join_closest(groups: list[IntArray], gaps: FloatArray, length: FloatArray) -> list[list[int]]:
+    """Which neighbours to join: the closest two; of equally close ones those with most wall, all where that is equal.
 
     Offsets lie on the lattice of the cells, so that equal gaps are common: taking the first would depend on the side
     one comes from.
     """
     closest = gaps <= gaps.min() + 1e-9
-    wall = np.array([length[a].sum() + length[b].sum() for a, b in itertools.pairwise(groups)])
-    joined = closest & (wall >= wall[closest].max() - 1e-9)
-    result = [groups[0]]
-    for join, group in zip(joined, groups[1:], strict=True):
+    walls = np.array([length[members].sum() for members in groups])
+    pairs = walls[:-1] + walls[1:]
+    joined = closest & (pairs >= pairs[closest].max() - 1e-9)
+    chains = [[0]]
+    for number, join in enumerate(joined.tolist(), start=1):
         if join:
-            result[-1] = np.concatenate((result[-1], group))
+            chains[-1].append(number)
         else:
-            result.append(group)
-    return result
+            chains.append([number])
+    return chains
 
 
 def _median(values: FloatArray, weights: FloatArray) -> float:

@@ -8,7 +8,8 @@ import shapely
 from shapely.geometry import LineString, Polygon
 
 from closedrooms.core.arrays import FloatArray
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.grid import UNKNOWN, OccupancyGrid
+from closedrooms.predictor.window import is_free, is_occupied
 
 # Thicker than this is no interior wall but something built in [m].
 MAX_WALL = 0.60
@@ -49,8 +50,8 @@ def _runs(grid: OccupancyGrid, angle: float, longest: int) -> FloatArray:
     steps = np.arange(-1, longest + 1)
     cells = np.rint(starts[:, None, :] + steps[None, :, None] * normal).astype(np.int64)  # (k, steps, 2)
     cells = np.clip(cells, 0, np.array(grid.frame.shape) - 1)
-    free = grid.free[cells[..., 0], cells[..., 1]]
-    occupied = grid.occupied[cells[..., 0], cells[..., 1]]
+    values = grid.cells[cells[..., 0], cells[..., 1]]
+    free, occupied = is_free(values), is_occupied(values)
     first = free[:, 1:].argmax(axis=1) + 1  # index of the first free cell behind; its step is one less
     wall = free[:, 0] & free[:, 1:].any(axis=1) & occupied[np.arange(len(starts)), first - 1]
     lengths: FloatArray = first[wall].astype(np.float64) - 1.0
@@ -97,8 +98,9 @@ def _depth(start: FloatArray, end: FloatArray, grid: OccupancyGrid, thickness: f
     steps = np.arange(-thickness, thickness + resolution, resolution / 2) + BESIDE * resolution
     cells = grid.frame.to_cells(start + places[:, None, None] * along + steps[None, :, None] * outward)
     inside = grid.frame.contains(cells)  # (places, steps)
-    free = np.zeros(inside.shape, dtype=np.bool_)
-    free[inside] = grid.free[cells[inside, 0], cells[inside, 1]]
+    values = np.full(inside.shape, UNKNOWN, dtype=np.int8)
+    values[inside] = grid.cells[cells[inside, 0], cells[inside, 1]]
+    free = is_free(values)
     seen = free.any(axis=1)
     if seen.mean() < SEEN:
         return thickness / 2
