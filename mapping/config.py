@@ -46,6 +46,9 @@ class MatcherConfig:
     sure_angle: float = 0.02
     """Standard deviation of the odometry's heading above which headings are searched before a refinement [rad]."""
 
+    poor: float = 0.7
+    """Share of the usual score below which a match is not trusted: the next window widens, keyframes wait."""
+
     window_sigmas: float = 3.0
     """Half width of the search window in standard deviations of the odometry."""
 
@@ -144,6 +147,9 @@ class MapperConfig:
 
     keyframe_angle: float = 0.40
     """Turn after which a scan becomes a keyframe and enters the map [rad]."""
+
+    patience: float = 2.5
+    """How many times farther than usual the robot moves before a keyframe is taken at a pose that fits poorly."""
 
     max_range: float = 25.0
     """Longest range that is mapped [m]; longer ones clear the way up to here."""

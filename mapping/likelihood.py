@@ -1,10 +1,8 @@
 """The likelihood field: how likely a scan point lies somewhere, given the surfaces seen so far."""
 
-import functools
-
 import numpy as np
 
-from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.arrays import FloatArray
 from closedrooms.mapping.config import MatcherConfig
 from closedrooms.mapping.lattice import Lattice
 
@@ -18,9 +16,9 @@ BORDER = 4
 class LikelihoodField:
     """Likelihood field (Thrun et al., Probabilistic Robotics, 6.4) kept up to date by stamping hits.
 
-    Each hit raises the cells around it to ``exp(-d^2 / 2 sigma^2)``. Only hits on surfaces that the field does not
-    know yet are stamped: what was seen first, at the smallest drift, stays, and a wall does not grow thick with the
-    noise of every scan.
+    Each hit raises the cells around it to ``exp(-d^2 / 2 sigma^2)``, d from where it fell in its cell: a wall is kept
+    to millimetres, not to half a cell. Only hits on surfaces that the field does not know yet are stamped: what was
+    seen first, at the smallest drift, stays, and a wall does not grow thick with the noise of every scan.
     """
 
     def __init__(self, resolution: float, config: MatcherConfig) -> None:
@@ -37,26 +35,23 @@ class LikelihoodField:
         """Stamp the hits, map frame, shape (n, 2) [m], that lie on no known surface."""
         if len(points) == 0:
             return
-        offsets, weights, reach = _kernel(self._config.field_sigma, self.lattice.resolution)
+        resolution, sigma = self.lattice.resolution, self._config.field_sigma
+        reach = max(1, round(REACH_SIGMAS * sigma / resolution))
         padding = self.lattice.cover(points.min(axis=0), points.max(axis=0), margin=reach + BORDER)
         if padding is not None:
             self.values = np.pad(self.values, padding)
         rows, cols = self.lattice.cells(points)
         flat = rows * self.lattice.cols + cols
         values = self.values.reshape(-1)
-        flat = np.unique(flat[values[flat] < self._config.new_surface])
-        if flat.size:
-            shifts = offsets[:, 0] * self.lattice.cols + offsets[:, 1]
-            targets = (flat[:, None] + shifts).ravel()
-            np.maximum.at(values, targets, np.tile(weights, flat.size))
-
-
-@functools.cache
-def _kernel(sigma: float, resolution: float) -> tuple[IntArray, Float32Array, int]:
-    reach = max(1, round(REACH_SIGMAS * sigma / resolution))
-    axis = np.arange(-reach, reach + 1)
-    rows, cols = np.meshgrid(axis, axis, indexing="ij")
-    squared = (rows**2 + cols**2) * resolution**2
-    inside = squared <= (REACH_SIGMAS * sigma) ** 2
-    offsets = np.column_stack((rows[inside], cols[inside]))
-    return offsets, np.exp(-squared[inside] / (2.0 * sigma**2)).astype(np.float32), reach
+        new = np.flatnonzero(values[flat] < self._config.new_surface)
+        flat, first = np.unique(flat[new], return_index=True)
+        if flat.size == 0:
+            return
+        axis = np.arange(-reach, reach + 1)
+        centres = (np.floor(points[new[first]] / resolution) + 0.5) * resolution
+        # Distance of each cell of the stamp from the hit, along x and y: the Gaussian is their product.
+        distances = centres[:, :, None] + axis * resolution - points[new[first]][:, :, None]  # (k, 2, stamp)
+        weights = np.exp(distances**2 / (-2.0 * sigma**2)).astype(np.float32)
+        stamps = weights[:, 1, :, None] * weights[:, 0, None, :]  # (k, rows, cols)
+        targets = flat[:, None, None] + (axis * self.lattice.cols)[:, None] + axis
+        np.maximum.at(values, targets.ravel(), stamps.ravel())

@@ -41,6 +41,7 @@ class Mapper:
         self._hessian: FloatArray = np.zeros((3, 3))
         self._tied_at = self._tried_at = 0.0
         self._outdated = False
+        self._trusted = True
         self._evidence = EvidenceGrid(self._config)
         self._keyframes: list[Keyframe] = []
         self._pose = Pose2()
@@ -108,20 +109,24 @@ class Mapper:
             usual_score=self._usual_score,
             config=self._config.matcher,
         )
+        self._trusted = False
         if match is None:
             return
         self._pose = match.pose
         self._hessian = match.hessian
-        self._motion = self._motion.matched()
+        self._trusted = match.score >= self._config.matcher.poor * self._usual_score
+        if self._trusted:
+            self._motion = self._motion.matched()
         self._usual_score += SCORE_MEMORY * (match.score - self._usual_score)
 
     def _wants_keyframe(self) -> bool:
         if not self._keyframes:
             return True
         latest = self._keyframes[-1].pose
+        patience = 1.0 if self._trusted else self._config.patience
         return (
-            latest.distance(self._pose) >= self._config.keyframe_distance
-            or abs(wrap_angle(latest.theta - self._pose.theta)) >= self._config.keyframe_angle
+            latest.distance(self._pose) >= patience * self._config.keyframe_distance
+            or abs(wrap_angle(latest.theta - self._pose.theta)) >= patience * self._config.keyframe_angle
         )
 
     def _insert(self, keyframe: Keyframe) -> None:
