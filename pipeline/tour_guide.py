@@ -46,6 +46,8 @@ CHECK_AHEAD = 3.0
 GOAL_RADIUS = 0.4
 # Failed attempts after which a vertex is left out.
 MAX_ATTEMPTS = 3
+# How often the tour is completed by what was discovered on the way before the robot goes home.
+MAX_LAST_LOOKS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,6 +122,7 @@ class TourGuide:
         self._shares: dict[str, tuple[float, float]] = {}
         self._looked_into: set[str] = set()
         self._surprise = (0.0, -math.inf)
+        self._last_looks = 0
 
     def command(self, pose: Pose2, scan: LaserScan, grid: Callable[[], OccupancyGrid]) -> tuple[float, float]:
         """Speed [m/s] and turn rate [rad/s] for now; (0, 0) once ``status`` is set.
@@ -176,6 +179,11 @@ class TourGuide:
     def _next(self, pose: Pose2, grid: OccupancyGrid, now: float) -> bool:
         """Plan the way to the next vertex, or home; vertices that cannot be reached are given up."""
         revised = False
+        if len(self.left) == 0 and self._last_looks < MAX_LAST_LOOKS:
+            # Before going home: whatever was discovered on the way and is in no tour yet.
+            self._last_looks += 1
+            self._revise((), pose, grid, now)
+            self._solve_again(pose)
         while True:
             goal = self._home if len(self.left) == 0 else (float(self.left[0, 0]), float(self.left[0, 1]))
             self._map.update(overlay(self.prediction, grid, self._doors))
@@ -202,16 +210,18 @@ class TourGuide:
     def _check(self, pose: Pose2, grid: OccupancyGrid, now: float) -> None:
         """Compare the map with the prediction, and the path with the map."""
         self._checked_at = now
+        completed = overlay(self.prediction, grid, self._doors)
         if now - self._compared_at >= COMPARE_INTERVAL - 1e-9:
             self._compared_at = now
-            doors = self._news(grid, now)
+            doors = self._news(grid, completed, now)
             if doors is not None:
                 self._revise(doors, pose, grid, now)
+                completed = overlay(self.prediction, grid, self._doors)
         ahead = self._driver.ahead(CHECK_AHEAD)
-        if self._goal is not None and not is_free(overlay(self.prediction, grid, self._doors), ahead, self.config):
+        if self._goal is not None and not is_free(completed, ahead, self.config):
             self._goal = None
 
-    def _news(self, grid: OccupancyGrid, now: float) -> tuple[str, ...] | None:
+    def _news(self, grid: OccupancyGrid, completed: OccupancyGrid, now: float) -> tuple[str, ...] | None:
         """Doors of rooms that have been looked into by now; ``None`` when nothing calls for a revision."""
         doors = []
         for door, share in seen_share(self.prediction, grid).items():
@@ -222,7 +232,7 @@ class TourGuide:
             settled = share >= GLIMPSED and now - since >= SETTLED
             if door not in self._looked_into and (share >= LOOKED_INTO or settled):
                 doors.append(door)
-        surprise = _difference(self.prediction.grid, overlay(self.prediction, grid, self._doors))
+        surprise = _difference(self.prediction.grid, completed)
         last, since = self._surprise
         if abs(surprise - last) > 0.5 * SURPRISE:
             last, since = surprise, now
@@ -253,22 +263,39 @@ class TourGuide:
         done = np.array(self._track + self.unreachable).reshape(-1, 2)
         near = np.hypot(*(vertices[:, None, :] - done[None, :, :]).transpose(2, 0, 1)).min(axis=1) <= DRIVEN
         members = np.flatnonzero(graph.parts == graph.parts[built.start]).tolist()
-        chosen = [built.start, *(v for v in members if not near[v] and v != built.start)]
+        home = int(np.argmin(np.hypot(*(vertices[members] - np.array(self._home)).T)))
+        ends = [built.start, members[home]]
+        chosen = list(dict.fromkeys([*ends, *(v for v in members if not near[v])]))
         position = {v: i for i, v in enumerate(members)}
         at = [position[v] for v in chosen]
-        distances = metric(graph, members).distances[np.ix_(at, at)]
-        order = christofides(distances)
-        if len(order) > 3:
-            settings = self._coverage.tour
-            order, _ = search_tour(distances, order, lower_bound=0.0, kicks=settings.kicks, patience=settings.patience)
-        first = order.index(0)
-        order = order[first:] + order[:first]
-        if len(order) > 2 and distances[0, order[-1]] < distances[0, order[1]]:
-            order = [0, *reversed(order[1:])]
-        self.left = vertices[[chosen[i] for i in order]]
+        order = _open_tour(metric(graph, members).distances[np.ix_(at, at)], self._coverage)
+        # The last stop is home, which is driven to anyway.
+        self.left = vertices[[chosen[i] for i in order if chosen[i] not in ends]]
         self.replans += 1
         self._goal, self._attempts = None, 0
         return True
+
+
+def _open_tour(distances: FloatArray, config: CoverageConfig) -> list[int]:
+    """A short way from place 0 over all places to place 1 (a closed tour where both are one).
+
+    The closed tour is solved with the way from 1 back to 0 made free; all other ways are lengthened alike, which keeps
+    the triangle inequality and makes every good tour use the free one.
+    """
+    count = len(distances)
+    if count <= 2:
+        return list(range(count))
+    lengthened = distances + float(distances.max())
+    np.fill_diagonal(lengthened, 0.0)
+    lengthened[0, 1] = lengthened[1, 0] = 0.0
+    order = christofides(lengthened)
+    if count > 3:
+        order, _ = search_tour(
+            lengthened, order, lower_bound=0.0, kicks=config.tour.kicks, patience=config.tour.patience
+        )
+    first = order.index(0)
+    order = order[first:] + order[:first]
+    return order if order[1] != 1 else [0, *reversed(order[1:])]
 
 
 def _cells_near(place: Point, costmap: Costmap) -> BoolArray:

@@ -15,7 +15,7 @@ from shapely.geometry import Polygon
 
 from closedrooms.core.arrays import BoolArray, IntArray
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.grid import FREE, GridFrame, OccupancyGrid
+from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.inpaint import fill_shape, inpaint
@@ -24,8 +24,6 @@ from closedrooms.predictor.prediction import Prediction, Shape
 
 # A room counts as looked into when so much of its free space is observed [m2].
 LOOKED_INTO = 0.5
-# What is left of a prediction beside the observed part of a room is kept from this share of the whole on.
-LEFT_SHARE = 0.10
 # A prediction that nobody has looked into is cut when observation takes at least this share of it.
 CONFLICT_SHARE = 0.02
 # Rooms smaller than this are none [m2].
@@ -34,6 +32,8 @@ SMALLEST_ROOM = 0.5
 BELONGS = 0.6
 # Half of the depth of a doorway that is cleared of its own leaf [m]: a thick wall and the error of the map.
 DOORWAY_DEPTH = 0.35
+# Observed space this far behind a doorway is what the door leads to [m].
+THRESHOLD = 0.15
 SQUARE = np.ones((3, 3), dtype=np.uint8)
 
 
@@ -44,7 +44,10 @@ class _Scene:
     frame: GridFrame
     before: OccupancyGrid
     now: OccupancyGrid
+    rooms: list[Room]
     masks: list[BoolArray]
+    thresholds: list[BoolArray]
+    own_doorways: list[BoolArray]
     doorways: BoolArray
 
 
@@ -72,22 +75,23 @@ def update(
     rooms: dict[int, Room] = {}
     failures = dict(prediction.failures)
     shape: Shape | None
-    for index, room in enumerate(prediction.rooms):
+    for index, room in enumerate(scene.rooms):
         if observed[index].any():
             shape = _shape(_observed_room(scene, observed[index], index), scene.frame)
         else:
             shape = _cut(scene, observed, index, room)
-        if shape is None or shape.area < SMALLEST_ROOM:
-            failures |= dict.fromkeys(room.doors, "there is no room where one was predicted")
-        else:
+        if shape is not None and shape.area >= SMALLEST_ROOM:
             rooms[index] = replace(room, polygon=shape)
+        elif index < len(prediction.rooms):
+            failures |= dict.fromkeys(room.doors, "there is no room where one was predicted")
     looked_into = {index for index in rooms if observed[index].any()}
     if config is not None and looked_into:
-        rooms |= _again(scene, rooms, looked_into, prediction.rooms, doors, config)
+        rooms |= _again(scene, rooms, looked_into, doors, config)
     kept = tuple(rooms[index] for index in sorted(rooms))
+    found = {door for room in kept for door in room.doors}
+    failures = {door: why for door, why in failures.items() if door not in found}
     completed = inpaint(scene.now, [room.polygon for room in kept], [])
-    final = Prediction(completed, kept, failures, prediction.trace)
-    return replace(final, grid=_with_doorways(completed, scene))
+    return Prediction(_with_doorways(completed, scene, observed), kept, failures, prediction.trace)
 
 
 def overlay(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedDoor] = ()) -> OccupancyGrid:
@@ -113,28 +117,41 @@ def seen_share(prediction: Prediction, grid: OccupancyGrid) -> dict[str, float]:
 
 def _scene(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedDoor]) -> _Scene:
     frame = prediction.grid.frame.covering(*grid.frame.bounds)
-    masks = []
-    for room in prediction.rooms:
+    # A door whose room could not be predicted may turn out to have one.
+    predicted = {door for room in prediction.rooms for door in room.doors}
+    nothing = [Room(Polygon(), (door.id,)) for door in doors if door.id not in predicted]
+    rooms = [*prediction.rooms, *nothing]
+    masks, thresholds, doorways = [], [], []
+    for room in rooms:
         mask = np.zeros(frame.shape, dtype=np.bool_)
         fill_shape(room.polygon, frame, mask)
         masks.append(mask)
-    return _Scene(frame, prediction.grid.on(frame), grid.on(frame), masks, _doorways(doors, frame))
+        own = [door for door in doors if door.id in room.doors]
+        thresholds.append(_doorways(own, frame, beyond=THRESHOLD))
+        doorways.append(_doorways(own, frame))
+    all_doorways = _doorways(doors, frame)
+    before, now = prediction.grid.on(frame), grid.on(frame)
+    return _Scene(frame, before, now, rooms, masks, thresholds, doorways, all_doorways)
 
 
-def _doorways(doors: Sequence[ClosedDoor], frame: GridFrame) -> BoolArray:
-    """The cells of the doors' leaves and a little before and behind them."""
+def _doorways(doors: Sequence[ClosedDoor], frame: GridFrame, *, beyond: float = 0.0) -> BoolArray:
+    """The cells of the doors' leaves and a little before and behind them, and ``beyond`` that [m]."""
     mask = np.zeros(frame.shape, dtype=np.bool_)
     for door in doors:
         if door.segment is not None:
             line = shapely.LineString(door.segment)
-            fill_shape(line.buffer(DOORWAY_DEPTH, cap_style="flat"), frame, mask)
+            fill_shape(line.buffer(DOORWAY_DEPTH + beyond, cap_style="flat"), frame, mask)
     return mask
 
 
-def _with_doorways(completed: OccupancyGrid, scene: _Scene) -> OccupancyGrid:
-    """Doorways that the prediction had opened stay open, though the map still holds the leaf."""
+def _with_doorways(completed: OccupancyGrid, scene: _Scene, observed: list[BoolArray]) -> OccupancyGrid:
+    """Doorways that the prediction had opened, or behind which a room was seen, are open; the map may hold the leaf."""
     frame = completed.frame
-    opened = OccupancyGrid(scene.frame, np.where(scene.doorways & scene.before.free, FREE, 100).astype(np.int8))
+    mask = scene.doorways & scene.before.free
+    for region, doorway in zip(observed, scene.own_doorways, strict=True):
+        if region.any():
+            mask |= doorway
+    opened = OccupancyGrid(scene.frame, np.where(mask, FREE, OCCUPIED).astype(np.int8))
     cells = completed.cells.copy()
     cells[opened.on(frame).free] = FREE
     return OccupancyGrid(frame, cells)
@@ -150,13 +167,17 @@ def _observed(scene: _Scene) -> list[BoolArray]:
     fresh_image: Any = cv2.morphologyEx(fresh.astype(np.uint8), cv2.MORPH_OPEN, SQUARE)
     _, parts = cv2.connectedComponents(fresh_image, connectivity=4, ltype=cv2.CV_32S)
     parts = np.asarray(parts)
+    # Space that opens behind one door only belongs to it; space behind several, or none, to the nearest prediction.
+    behind = [set(np.unique(parts[mask & (parts > 0)]).tolist()) for mask in scene.thresholds]
     nearest, distance = _nearest_room(scene)
+    close = distance <= BELONGS / frame.resolution
     found = []
     for index, mask in enumerate(scene.masks):
-        touching = np.unique(parts[mask & (parts > 0)])
-        close = (nearest == index) & (distance <= BELONGS / frame.resolution)
-        region = np.isin(parts, touching) & (parts > 0) & (nearest == index)
-        region |= close & (parts > 0)
+        others = set().union(*(own for other, own in enumerate(behind) if other != index))
+        mine = np.isin(parts, sorted(behind[index] - others))
+        shared = (behind[index] & others) | (set(np.unique(parts[mask & (parts > 0)]).tolist()) - others)
+        shared |= set(np.unique(parts[close & (parts > 0)]).tolist()) - set().union(*behind)
+        region = mine | (np.isin(parts, sorted(shared - {0})) & (nearest == index) & (parts > 0))
         enough = region.sum() * frame.resolution**2 >= LOOKED_INTO
         found.append(region if enough else np.zeros(frame.shape, dtype=np.bool_))
     return found
@@ -178,13 +199,11 @@ def _nearest_room(scene: _Scene) -> tuple[IntArray, Any]:
 
 def _observed_room(scene: _Scene, region: BoolArray, index: int) -> BoolArray:
     """What is observed of a room, and the part of its prediction that goes on from there into the unknown."""
-    left = scene.masks[index] & scene.now.unknown
+    left = scene.masks[index] & ~scene.now.occupied
     left_image: Any = cv2.morphologyEx(left.astype(np.uint8), cv2.MORPH_OPEN, SQUARE)
     both = region | (left_image > 0)
     _, parts = cv2.connectedComponents(both.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
     joined: BoolArray = np.isin(np.asarray(parts), np.unique(np.asarray(parts)[region])) & both
-    if (joined & ~region).sum() < LEFT_SHARE * joined.sum():
-        return region
     return joined
 
 
@@ -205,12 +224,11 @@ def _again(
     scene: _Scene,
     rooms: dict[int, Room],
     looked_into: set[int],
-    predicted: Sequence[Room],
     doors: Sequence[ClosedDoor],
     config: PredictorConfig,
 ) -> dict[int, Room]:
     """The rooms that nobody has looked into, predicted on the map that is known now."""
-    open_ids = {door for index in looked_into for door in predicted[index].doors}
+    open_ids = {door for index in looked_into for door in scene.rooms[index].doors}
     remaining = [door for door in doors if door.id not in open_ids]
     if not remaining:
         return {}
@@ -218,7 +236,7 @@ def _again(
     fresh = predict(known, remaining, config, trace=False)
     by_door = {door: room for room in fresh.rooms for door in room.doors}
     revised = {}
-    for index, room in enumerate(predicted):
+    for index, room in enumerate(scene.rooms):
         match = next((by_door[door] for door in room.doors if door in by_door), None)
         if index not in looked_into and match is not None:
             revised[index] = match
