@@ -1,0 +1,325 @@
+"""Rectangles that a hidden room could fill, and the evidence for each of their sides (preset ``best``)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.predictor.best_frame import DoorFrame, count
+
+# Slack of a wall's thickness when known space is looked for behind it [cells].
+SLACK = 4
+# A strip of unknown cells narrower than this between a room and known space is no room of its own [cells], 1.8 m.
+SLIVER = 36
+# A wall face with nothing known for this far behind it belongs to the outline of the building [cells], 4 m.
+OUTER = 80
+# Alignment is looked for this far [cells], 20 m, and is half sure after 1.4 m of wall.
+REACH, SURE = 400, 60.0
+# A rectangle may reach over known space up to this share: the room is what remains.
+MAX_OVERLAP = 0.3
+
+FEATURES = (
+    "log area",
+    "log area squared",
+    "log proportion squared",
+    "overlap",
+    "door margin",
+    "side closed",
+    "side tight",
+    "side sliver",
+    "side aligned",
+    "side middle",
+    "side stub",
+    "side free",
+    "side outer",
+    "back closed",
+    "back tight",
+    "back sliver",
+    "back aligned",
+    "back free",
+    "back outer",
+    "near aligned",
+    "log depth squared",
+    "outside",
+    "passage end",
+    "width seen",
+    "depth seen",
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """Rectangles ``u0, v0, u1, v1`` [cells of the frame], shape (n, 4), and their evidence, shape (n, FEATURES)."""
+
+    boxes: IntArray
+    features: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """What a frame says about every possible position of a side, as tables over the raster.
+
+    Each is a running sum along the side, so that any stretch of it costs two look-ups: sums over v, shape
+    (rows + 1, cols + 1), for left and right; over u, shape (rows + 1, cols + 1), for the back.
+    """
+
+    closed: dict[str, IntArray]
+    sliver: dict[str, IntArray]
+    tight: dict[str, IntArray]
+    same: dict[str, IntArray]
+    outer: dict[str, IntArray]
+    seen: dict[str, FloatArray]
+
+
+def gather(frame: DoorFrame, thickness: int) -> Evidence:
+    """Tables for one frame.
+
+    Args:
+        frame: Seen from the doors.
+        thickness: Usual thickness of walls [cells].
+    """
+    closed, sliver, tight, same, outer = {}, {}, {}, {}, {}
+    for side, opposite in (("right", "left"), ("left", "right"), ("top", "bottom")):
+        known = _canonical(frame.known, side)
+        own, other = _canonical(frame.sharp[side], side), _canonical(frame.sharp[opposite], side)
+        near = _within(known, 0, thickness + SLACK)
+        wide = _within(known, 0, thickness + SLIVER) & ~near
+        outer[side] = _running(_blurred(own & ~_within(known, 4, OUTER), 2), side)
+        shifted = np.zeros_like(other)
+        shifted[:, : other.shape[1] - thickness] = other[:, thickness:]
+        closed[side], sliver[side] = _running(near, side), _running(wide, side)
+        tight[side] = _running(_blurred(shifted, 3), side)
+        same[side] = _running(_blurred(own, 2), side)
+    seen = {"width": _spans(frame.sharp, "left", "right"), "depth": _spans(frame.sharp, "bottom", "top")}
+    return Evidence(closed, sliver, tight, same, outer, seen)
+
+
+def _spans(faces: dict[str, BoolArray], start: str, end: str, *, longest: int = 500) -> FloatArray:
+    """How usual each length of free space between two facing walls is, by cells, 0 to 1.
+
+    Lengths are counted once for each row of cells, so that a long room counts more than a narrow one.
+    """
+    first, second = (faces[name] if start == "left" else faces[name].T for name in (start, end))
+    rows, cols = first.shape
+    edges = np.where(first, np.arange(cols), -1)
+    last = np.maximum.accumulate(edges, axis=1)
+    lengths = (np.arange(cols) - last)[second & (last >= 0)]
+    counts = np.bincount(lengths[(lengths >= 20) & (lengths < longest)], minlength=longest).astype(np.float64)
+    smooth = np.convolve(counts, np.array([1, 2, 3, 4, 5, 4, 3, 2, 1]) / 5.0, mode="same")
+    return np.asarray(smooth / (smooth + 0.5 * smooth.max(initial=0.0) + 1.0))
+
+
+def _canonical(mask: BoolArray, side: str) -> BoolArray:
+    """Turned so that the outside of the side lies towards larger columns."""
+    return mask if side == "right" else mask[:, ::-1] if side == "left" else mask.T
+
+
+def _within(known: BoolArray, low: int, high: int) -> BoolArray:
+    """Edges with a known cell between ``low`` and ``high`` cells behind them, shape (rows, cols + 1)."""
+    rows, cols = known.shape
+    total = np.zeros((rows, cols + 1 + high), dtype=np.int16)
+    np.cumsum(known, axis=1, dtype=np.int16, out=total[:, 1 : cols + 1])
+    total[:, cols + 1 :] = total[:, cols : cols + 1]
+    return np.asarray(total[:, high:] > total[:, low : low + cols + 1])
+
+
+def _blurred(edges: BoolArray, reach: int) -> BoolArray:
+    out = edges.copy()
+    for step in range(1, reach + 1):
+        out[:, step:] |= edges[:, :-step]
+        out[:, :-step] |= edges[:, step:]
+    return out
+
+
+def _running(edges: BoolArray, side: str) -> IntArray:
+    """Running sum along the side, indexed [along, position] in the frame's own orientation."""
+    table = np.zeros((edges.shape[0] + 1, edges.shape[1]), dtype=np.int16)
+    np.cumsum(edges, axis=0, dtype=np.int16, out=table[1:])
+    return np.asarray(table[:, ::-1] if side == "left" else table)
+
+
+def stretch(table: IntArray, position: IntArray, low: IntArray, high: IntArray) -> FloatArray:
+    """Cells set along a side at ``position`` from ``low`` to ``high``."""
+    last = table.shape[0] - 1
+    a, b = np.clip(low, 0, last), np.clip(high, 0, last)
+    at = np.clip(position, 0, table.shape[1] - 1)
+    upper, lower = table[np.maximum(a, b), at], table[a, at]
+    return np.asarray(upper.astype(np.float64) - lower)
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A door in its frame: where the room behind it begins.
+
+    Attributes:
+        u: Door along the wall [cells].
+        v0: Near face of the room [cells].
+        left: Doors of the same wall to the left and right: position along the wall [cells], ``None`` where none is.
+        right: See ``left``.
+        others: Points that belong to rooms of other doors, ``(u, v)`` [cells], shape (k, 2).
+    """
+
+    u: float
+    v0: int
+    left: float | None
+    right: float | None
+    others: FloatArray
+
+
+def propose(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int, limits: Sequence[float]) -> Candidates:
+    """All rectangles between plausible sides, with their evidence.
+
+    Args:
+        frame: The door's frame.
+        evidence: Its tables.
+        entry: The door.
+        thickness: Usual thickness of walls [cells].
+        limits: Smallest width, largest width, smallest depth, largest depth of a room [cells].
+    """
+    narrow, wide, shallow, deep = limits
+    v0, u = entry.v0, entry.u
+    right = _positions(frame, evidence, entry, thickness, "right", wide)
+    left = _positions(frame, evidence, entry, thickness, "left", wide)
+    back = _positions(frame, evidence, entry, thickness, "top", deep)
+    u0, u1, v1 = (grid.ravel() for grid in np.meshgrid(left, right, back, indexing="ij"))
+    fits = (u1 - u0 >= narrow) & (u1 - u0 <= wide) & (v1 - v0 >= shallow) & (v1 - v0 <= deep)
+    boxes = np.stack((u0, np.full_like(u0, v0), u1, v1), axis=-1)[fits]
+    taken = count(frame.taken_sum, boxes[:, 1], boxes[:, 0], boxes[:, 3], boxes[:, 2])
+    size = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1])
+    boxes = boxes[taken <= MAX_OVERLAP * size]
+    for pu, pv in entry.others:
+        inside = (boxes[:, 0] < pu) & (pu < boxes[:, 2]) & (boxes[:, 1] < pv) & (pv < boxes[:, 3])
+        boxes = boxes[~inside]
+    return Candidates(boxes, describe(frame, evidence, entry, thickness, boxes))
+
+
+def _positions(
+    frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int, side: str, reach: float, *, keep: int = 12
+) -> IntArray:
+    """Plausible positions of one side, at most about ``keep`` + a few, ascending."""
+    v0, u = entry.v0, entry.u
+    if side == "top":
+        low, high = v0 + 20, int(v0 + reach)
+        along = (int(u) - REACH, int(u) + REACH)
+        near = (int(u) - 60, int(u) + 60)
+    else:
+        low, high = (int(u) + 4, int(u + reach)) if side == "right" else (int(u - reach), int(u) - 4)
+        along = (v0 - REACH // 2, v0 + REACH // 2)
+        near = (v0 + 4, v0 + 60)
+    positions = np.arange(low, high + 1)
+
+    def total(table: IntArray, window: tuple[int, int]) -> FloatArray:
+        return stretch(table, positions, np.full_like(positions, window[0]), np.full_like(positions, window[1]))
+
+    strength = total(evidence.same[side], along) + total(evidence.tight[side], along)
+    strength += 2.0 * (total(evidence.same[side], near) + total(evidence.tight[side], near))
+    found = _peaks(positions, strength, keep)
+    extra: list[float] = []
+    # Where known space begins, less a wall.
+    share = total(evidence.closed[side], near) / max(near[1] - near[0], 1)
+    order = positions if side != "left" else positions[::-1]
+    shares = share if side != "left" else share[::-1]
+    hit = np.flatnonzero(shares > 0.5)
+    if hit.size:
+        # Rows count as closed when known space lies up to SLACK behind the wall.
+        first = order[hit[0]]
+        extra.append(float(first + SLACK if side != "left" else first - SLACK))
+    if side == "right":
+        if entry.right is not None:
+            extra += [(u + entry.right - thickness) / 2, entry.right - 12 - thickness, entry.right - 8]
+        extra += [u + 10, u + 40, u + 80]
+    elif side == "left":
+        if entry.left is not None:
+            extra += [(u + entry.left + thickness) / 2, entry.left + 12 + thickness, entry.left + 8]
+        extra += [u - 10, u - 40, u - 80]
+    else:
+        extra += [v0 + d for d in (50, 70, 90, 110, 130, 160, 200)]
+    merged = sorted({*(int(p) for p in found), *(round(e) for e in extra if low <= e <= high)})
+    return np.array(merged, dtype=np.int64)
+
+
+def _peaks(positions: IntArray, strength: FloatArray, keep: int, *, apart: int = 4, least: float = 8.0) -> list[int]:
+    """Strongest positions at least ``apart`` cells from each other."""
+    chosen: list[int] = []
+    centre = positions.mean() if positions.size else 0.0
+    for i in np.lexsort((positions, np.abs(positions - centre), -strength)):
+        if strength[i] < least or len(chosen) >= keep:
+            break
+        if all(abs(int(positions[i]) - p) >= apart for p in chosen):
+            chosen.append(int(positions[i]))
+    return chosen
+
+
+def describe(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int, boxes: IntArray) -> FloatArray:
+    """Evidence of each rectangle, shape (n, len(FEATURES))."""
+    u0, v0, u1, v1 = boxes.T
+    width, depth = (u1 - u0).astype(float), (v1 - v0).astype(float)
+    cell = frame.resolution
+    taken = count(frame.taken_sum, v0, u0, v1, u1)
+    area = np.maximum(width * depth - taken, 1.0) * cell * cell
+    columns: dict[str, FloatArray] = {}
+    columns["log area"] = np.log(area / 25.0)
+    columns["log area squared"] = columns["log area"] ** 2
+    columns["log proportion squared"] = np.log(width / depth) ** 2
+    columns["overlap"] = taken / (width * depth)
+    margin = np.minimum(entry.u - u0, u1 - entry.u) * cell
+    columns["door margin"] = np.maximum(0.6 - margin, 0.0)
+    names = ("closed", "tight", "sliver", "aligned", "stub", "free", "outer")
+    sides = {name: np.zeros(len(boxes)) for name in names}
+    stubs: dict[str, FloatArray] = {}
+    for side, position in (("right", u1), ("left", u0)):
+        found = _side(evidence, side, position, v0, v1, thickness)
+        stubs[side] = found["stub"]
+        for name in names:
+            sides[name] += found[name]
+    for name in names:
+        columns[f"side {name}"] = sides[name]
+    columns["side middle"] = _middle(entry, u0, u1, thickness)
+    back = _side(evidence, "top", v1, u0, u1, thickness)
+    for name in ("closed", "tight", "sliver", "aligned", "free", "outer"):
+        columns[f"back {name}"] = back[name]
+    # A back wall that a near room of the same row shows, at most 8 m to either side.
+    near = stretch(evidence.same["top"], v1, u0 - 160, u0) + stretch(evidence.same["top"], v1, u1, u1 + 160)
+    columns["near aligned"] = 1.0 - np.exp(-near / SURE)
+    columns["passage end"] = stubs["right"] * stubs["left"]
+    last = len(evidence.seen["width"]) - 1
+    columns["width seen"] = evidence.seen["width"][np.clip(u1 - u0, 0, last)]
+    columns["depth seen"] = evidence.seen["depth"][np.clip(v1 - v0, 0, last)]
+    columns["log depth squared"] = np.log(depth * cell / 6.0) ** 2
+    known = np.flatnonzero(frame.known.any(axis=1))
+    columns["outside"] = np.maximum(v1 - (known[-1] if known.size else 0), 0) / depth
+    return np.stack([columns[name] for name in FEATURES], axis=-1)
+
+
+def _side(
+    evidence: Evidence, side: str, position: IntArray, low: IntArray, high: IntArray, thickness: int
+) -> dict[str, FloatArray]:
+    """Evidence of one side of each rectangle, all between 0 and 1."""
+    length = np.maximum(high - low, 1).astype(float)
+    own = stretch(evidence.same[side], position, low, high)
+    outside = stretch(evidence.same[side], position, low - REACH, high + REACH) - own
+    beyond_own = stretch(evidence.tight[side], position, low, high)
+    closed = stretch(evidence.closed[side], position, low, high) / length
+    sliver = stretch(evidence.sliver[side], position, low, high) / length
+    stub = stretch(evidence.same[side], position, low - 60, low)
+    stub += stretch(evidence.tight[side], position, low - 60, low)
+    return {
+        "closed": closed,
+        "tight": beyond_own / length,
+        "sliver": sliver,
+        "aligned": 1.0 - np.exp(-outside / SURE),
+        "outer": 1.0 - np.exp(-(stretch(evidence.outer[side], position, low - REACH, high + REACH)) / SURE),
+        "stub": 1.0 - np.exp(-stub / 10.0),
+        "free": np.maximum(1.0 - closed - sliver, 0.0),
+    }
+
+
+def _middle(entry: Entry, u0: IntArray, u1: IntArray, thickness: int) -> FloatArray:
+    """How near the sides lie to the middle between this door and the next, 0 to 2."""
+    out = np.zeros(len(u0))
+    if entry.right is not None:
+        out += np.exp(-np.abs(u1 - (entry.u + entry.right - thickness) / 2) / 8.0)
+    if entry.left is not None:
+        out += np.exp(-np.abs(u0 - (entry.u + entry.left + thickness) / 2) / 8.0)
+    return out

@@ -1,0 +1,159 @@
+"""The map seen from a closed door: ``u`` along the wall to the right, ``v`` into the hidden room (preset ``best``)."""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.grid import OccupancyGrid
+
+# A face of a wall is free space with an occupied cell at most this far behind it [cells]: scan matching smears walls.
+FACE_DEPTH = 3
+
+
+def integral(mask: BoolArray) -> IntArray:
+    """Summed area table: ``table[v, u]`` counts the cells below ``v`` and left of ``u``; shape (rows + 1, cols + 1)."""
+    return np.asarray(cv2.integral(mask.astype(np.uint8)))
+
+
+def count(table: IntArray, v0: IntArray, u0: IntArray, v1: IntArray, u1: IntArray) -> IntArray:
+    """Cells set in windows ``[v0, v1) x [u0, u1)``, clipped to the table; empty where a window is reversed."""
+    rows, cols = table.shape
+    a, b = np.clip(v0, 0, rows - 1), np.clip(np.maximum(v1, v0), 0, rows - 1)
+    c, d = np.clip(u0, 0, cols - 1), np.clip(np.maximum(u1, u0), 0, cols - 1)
+    return np.asarray(table[b, d] - table[a, d] - table[b, c] + table[a, c], dtype=np.int64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DoorFrame:
+    """Raster of the map turned so that the doors of one side of one wall direction look along +v.
+
+    Positions are edges between cells: edge ``e`` lies between cells ``e - 1`` and ``e``.
+
+    Attributes:
+        angle: Direction of +u in the map frame [rad]; +v is 90 degrees to its left.
+        origin: Frame coordinates of the lower-left corner of cell (0, 0) [m], shape (2,).
+        resolution: Cell size [m].
+        free: Known free cells, indexed [v, u].
+        known: Known cells, free or occupied.
+        taken: Cells that a wall of the usual thickness around known space fills.
+        taken_sum: Summed area table of ``taken``.
+        sharp: Edges where a wall face was seen, by side: ``right`` has free space left of the edge and wall right of
+            it, ``left`` the reverse, ``top`` free space below, ``bottom`` above.
+    """
+
+    angle: float
+    origin: FloatArray
+    resolution: float
+    free: BoolArray
+    known: BoolArray
+    taken: BoolArray
+    taken_sum: IntArray
+    sharp: dict[str, BoolArray]
+
+    def to_frame(self, points: FloatArray) -> FloatArray:
+        """Map points [m], shape (..., 2), as continuous edges ``(u, v)`` [cells]."""
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        turned = np.asarray(points, dtype=np.float64) @ np.array([[c, -s], [s, c]])
+        return np.asarray((turned - self.origin) / self.resolution)
+
+    def to_map(self, edges: FloatArray) -> FloatArray:
+        """Continuous edges ``(u, v)`` [cells], shape (..., 2), as map points [m]."""
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        turned = np.asarray(edges, dtype=np.float64) * self.resolution + self.origin
+        return np.asarray(turned @ np.array([[c, s], [-s, c]]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TurnedMap:
+    """The map resampled along one wall direction.
+
+    Attributes:
+        angle: Direction in the map frame [rad], in (-pi/4, pi/4].
+        origin: Corner of cell (0, 0) in the turned frame [m].
+        resolution: Cell size [m].
+        free: Free cells.
+        known: Known cells.
+    """
+
+    angle: float
+    origin: FloatArray
+    resolution: float
+    free: BoolArray
+    known: BoolArray
+
+
+def turn_map(grid: OccupancyGrid, angle: float, *, margin: float) -> TurnedMap:
+    """Resample a map (nearest cell) along ``angle`` with ``margin`` [m] of unknown cells around it."""
+    frame, resolution = grid.frame, grid.frame.resolution
+    pad = round(margin / resolution)
+    if angle == 0.0:
+        origin = np.array([frame.origin_x, frame.origin_y]) - pad * resolution
+        return TurnedMap(0.0, origin, resolution, np.pad(grid.free, pad), np.pad(grid.known, pad))
+    x0, y0, x1, y1 = frame.bounds
+    c, s = math.cos(angle), math.sin(angle)
+    corners = np.array([[x0, y0], [x1, y0], [x0, y1], [x1, y1]]) @ np.array([[c, -s], [s, c]])
+    origin = corners.min(axis=0) - pad * resolution
+    cols, rows = np.ceil((corners.max(axis=0) - origin) / resolution).astype(int) + pad
+    # Centre of cell (col, row) of the turned raster in cells of the map: an affine map for cv2.
+    first = (origin + resolution / 2) @ np.array([[c, s], [-s, c]])
+    base = (first - np.array([x0, y0])) / resolution - 0.5
+    matrix = np.array([[c, -s, base[0]], [s, c, base[1]]])
+    flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+    values = grid.free.astype(np.uint8) + 2 * grid.known.astype(np.uint8)
+    turned = np.asarray(cv2.warpAffine(values, matrix, (int(cols), int(rows)), flags=flags, borderValue=0.0), np.uint8)
+    return TurnedMap(angle, origin, resolution, (turned & 1) > 0, (turned & 2) > 0)
+
+
+def door_frame(turned: TurnedMap, quarter: int, thickness: int) -> DoorFrame:
+    """The frame whose +v points 90 degrees x ``quarter`` left of the turned map's +y.
+
+    Args:
+        turned: Map along one of the wall directions.
+        quarter: 0 to 3.
+        thickness: Usual thickness of walls [cells].
+    """
+    free, known = (_quarter(mask, quarter) for mask in (turned.free, turned.known))
+    low = turned.origin
+    high = low + np.array(turned.free.shape[::-1]) * turned.resolution
+    origin = np.array([(low[0], low[1]), (low[1], -high[0]), (-high[0], -high[1]), (-high[1], low[0])][quarter])
+    kernel = np.ones((2 * thickness + 1, 2 * thickness + 1), np.uint8)
+    taken = cv2.dilate(free.astype(np.uint8), kernel) > 0
+    faces = {
+        "right": wall_faces(free, known & ~free),
+        "left": wall_faces(free[:, ::-1], (known & ~free)[:, ::-1])[:, ::-1],
+        "top": wall_faces(free.T, (known & ~free).T).T,
+        "bottom": wall_faces(free.T[:, ::-1], (known & ~free).T[:, ::-1])[:, ::-1].T,
+    }
+    return DoorFrame(
+        angle=turned.angle + quarter * math.pi / 2,
+        origin=origin,
+        resolution=turned.resolution,
+        free=free,
+        known=known,
+        taken=taken,
+        taken_sum=integral(taken),
+        sharp=faces,
+    )
+
+
+def _quarter(mask: BoolArray, quarter: int) -> BoolArray:
+    turned = (mask, mask.T[::-1], mask[::-1, ::-1], mask.T[:, ::-1])[quarter]
+    return np.ascontiguousarray(turned)
+
+
+def wall_faces(free: BoolArray, occupied: BoolArray) -> BoolArray:
+    """Edges with a free cell on their left and an occupied one at most FACE_DEPTH cells right.
+
+    Returns:
+        Shape (rows, cols + 1).
+    """
+    rows, cols = free.shape
+    wall = np.zeros((rows, cols + FACE_DEPTH), dtype=np.bool_)
+    for step in range(FACE_DEPTH):
+        wall[:, :cols] |= np.pad(occupied, ((0, 0), (0, step)))[:, step : step + cols]
+    edges = np.zeros((rows, cols + 1), dtype=np.bool_)
+    edges[:, 1:cols] = free[:, : cols - 1] & ~free[:, 1:cols] & wall[:, 1:cols]
+    return edges

@@ -1,0 +1,43 @@
+"""How thick the walls of a map are (preset ``best``)."""
+
+import numpy as np
+
+from closedrooms.core.arrays import BoolArray, IntArray
+from closedrooms.predictor.best_frame import TurnedMap, wall_faces
+
+# Walls thicker than this are no walls but shafts [cells], 0.95 m.
+THICKEST = 19
+# Both sides of a wall show this much free space across [cells], 0.4 m: less is a speck inside a smeared wall.
+CLEAR = 8
+# Thickness where too few walls were seen from both sides [cells], 0.2 m: usual for inner walls.
+DEFAULT, FEWEST = 4, 20
+
+
+def wall_thickness(turned: TurnedMap) -> int:
+    """Median thickness of the walls seen from both sides [cells], by their length."""
+    counts = np.zeros(THICKEST + 1, dtype=np.int64)
+    for free, known in ((turned.free, turned.known), (turned.free.T, turned.known.T)):
+        counts += _thicknesses(np.ascontiguousarray(free), np.ascontiguousarray(known))
+    if counts.sum() < FEWEST:
+        return DEFAULT
+    return max(int(np.searchsorted(np.cumsum(counts), counts.sum() / 2)), 2)
+
+
+def _thicknesses(free: BoolArray, known: BoolArray) -> IntArray:
+    """Cells of wall by thickness, across the columns."""
+    rows, cols = free.shape
+    occupied = known & ~free
+    right, left = wall_faces(free, occupied), wall_faces(free[:, ::-1], occupied[:, ::-1])[:, ::-1]
+    total = np.zeros((rows, cols + 1), dtype=np.int16)
+    np.cumsum(free, axis=1, dtype=np.int16, out=total[:, 1:])
+    before, after = np.zeros_like(right), np.zeros_like(left)
+    before[:, CLEAR:] = total[:, CLEAR:] - total[:, :-CLEAR] == CLEAR
+    after[:, :-CLEAR] = total[:, CLEAR:] - total[:, :-CLEAR] == CLEAR
+    right, left = right & before, left & after
+    counts = np.zeros(THICKEST + 1, dtype=np.int64)
+    row, col = np.nonzero(right)
+    for thick in range(1, THICKEST + 1):
+        inside = col + thick <= cols
+        r, c = row[inside], col[inside]
+        counts[thick] = (left[r, c + thick] & (total[r, c + thick] == total[r, c])).sum()
+    return counts

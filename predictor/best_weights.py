@@ -1,0 +1,50 @@
+"""What each kind of evidence counts in the preset ``best``: the few constants that it holds.
+
+Tuned by coordinate search on the maps in the folder of the authors' experiments; what a building left out of the
+tuning loses by it is measured there (leave one environment out). Features are shares between 0 and 1 or logarithms,
+so that the weights have no unit.
+"""
+
+from closedrooms.core.arrays import FloatArray
+
+SIDE_WEIGHTS: dict[str, float] = {
+    "log area": 3.2,
+    "log area squared": -0.8,
+    "log proportion squared": -1.5,
+    "overlap": -2.0,
+    "door margin": -8.0,
+    "side closed": 0.9,
+    "side tight": 0.84,
+    "side sliver": -1.8,
+    "side aligned": 0.78,
+    "side middle": 1.92,
+    "side stub": 2.72,
+    "back closed": 2.2,
+    "back tight": 2.4,
+    "back sliver": -1.5,
+    "back aligned": 2.0,
+    "log depth squared": -1.28,
+    "outside": -0.5,
+    "side free": -0.7,
+    "back free": -1.3,
+    "near aligned": 1.36,
+    "side outer": 1.6,
+    "back outer": 3.04,
+    "passage end": 3.0,
+    "width seen": 1.0,
+    "depth seen": 1.5,
+}
+
+PAIR_WEIGHTS: dict[str, float] = {
+    "overlap": -20,
+    "same depth": 3.2,
+    "shared wall": 0.324,
+    "strip between": -1,
+}
+
+
+def weights_of(table: dict[str, float], names: tuple[str, ...]) -> FloatArray:
+    """The weights of features in their order, shape (len(names),)."""
+    import numpy as np
+
+    return np.array([table[name] for name in names], dtype=np.float64)
