@@ -7,7 +7,6 @@ turns away from what is near; the same poses are then cast by every way, and the
 """
 
 import argparse
-import math
 import time
 from collections.abc import Callable
 
@@ -50,14 +49,19 @@ def comb(length: float) -> FloorPlan:
 
 def wander(sim: Simulation, count: int) -> list[Pose2]:
     """The poses of a robot that goes ahead and turns away from what is near, one every 0.1 s."""
-    angles = sim.observe().scan.angles
-    ahead = np.abs(angles) < 0.6
-    poses = []
-    for i in range(count):
+    ahead = np.abs(sim.observe().scan.angles) < 0.5
+    rng = np.random.default_rng(0)
+    poses: list[Pose2] = []
+    turn = 0.0
+    while len(poses) < count:
         pose = sim.world_T_robot
         poses.append(pose)
         free = sim.true_ranges(pose)[ahead].min()
-        sim.step(min(0.8, free - 0.4), 0.4 * math.sin(i / 20) if free > 0.8 else 1.2, 0.1)
+        if free < 0.7 and turn == 0.0:
+            turn = rng.choice([-1.2, 1.2])
+        elif free > rng.uniform(0.8, 3.0):
+            turn = 0.0
+        sim.step(0.0 if turn else 0.8, turn or rng.normal(0.0, 0.3), 0.1)
     return poses
 
 
