@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
+from shapely.strtree import STRtree
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import Point, Segment
@@ -125,16 +126,17 @@ def free_spans(edge: Edge, edges: Sequence[Edge], taken: Iterable[Segment], marg
         margin: Metres kept clear of corners, crossing walls and other passages.
     """
     blocked = [(-1e9, margin), (edge.length - margin, 1e9)]
-    meeting = np.array([other.segment for other in edges], dtype=np.float64)
+    # What meets a wall borders on one of its rooms.
+    near = [other.segment for other in edges if not {*edge.rooms}.isdisjoint(other.rooms)]
+    meeting = np.array(near, dtype=np.float64)
     along, aside = _coordinates(edge, meeting)
     touches = (aside < 0.05) & (along > -0.05) & (along < edge.length + 0.05)
     # An edge in line with this one is not in the way, one that only touches it is.
     crossing = touches.any(axis=1) & (aside.max(axis=1) > STRAIGHT)
     blocked += [(at - margin, at + margin) for at in along[crossing][touches[crossing]].tolist()]
-    for segment in taken:
-        ends, off = _coordinates(edge, np.array(segment, dtype=np.float64))
-        if off.max() < 0.3:
-            blocked.append((float(ends.min()) - margin, float(ends.max()) + margin))
+    ends, off = _coordinates(edge, np.array(list(taken), dtype=np.float64).reshape(-1, 2, 2))
+    in_line = ends[off.max(axis=1, initial=0.0) < 0.3] if len(ends) else ends
+    blocked += [(float(pair.min()) - margin, float(pair.max()) + margin) for pair in in_line]
     blocked.sort()
     spans, at = [], -1e9
     for low, high in blocked:
@@ -183,12 +185,16 @@ def without_gaps(
     narrow = [part for part in shapely.get_parts(areal(closed.difference(union))) if _is_narrow(part, width)]
     gaps = [piece for part in narrow for piece in (_branches(part, width) if branches else [part])]
     rooms = list(polygons)
+    tree = STRtree(rooms)
     filled = []
     for gap in gaps:
-        shared = [room.boundary.intersection(gap.boundary).length for room in rooms]
-        best = max(range(fixed, len(rooms)), key=lambda i: shared[i])
+        near = np.sort(tree.query(gap, predicate="dwithin", distance=width)).tolist()
+        shared = {i: rooms[i].boundary.intersection(gap.boundary).length for i in near}
+        best = max((i for i in near if i >= fixed), key=lambda i: shared[i], default=None)
+        if best is None:
+            continue
         grown = areal(rooms[best].union(gap))
-        if sum(length > 0.05 for length in shared) >= 2 and isinstance(grown, Polygon):
+        if sum(length > 0.05 for length in shared.values()) >= 2 and isinstance(grown, Polygon):
             rooms[best] = grown
             filled.append(gap)
     return rooms, filled

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable
 import numpy as np
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.worlds.parts import connected_parts
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start import start_room
 
@@ -148,17 +149,5 @@ def _doors_by_room(plan: FloorPlan) -> dict[str, tuple[str, ...]]:
 
 def _reached(plan: FloorPlan, start: str, closed: Collection[str]) -> set[str]:
     """Rooms connected to ``start`` by openings and by doors that are not closed."""
-    shut = set(closed)
-    neighbours: defaultdict[str, list[str]] = defaultdict(list)
-    for passage in plan.passages:
-        a, b = passage.rooms
-        if a is not None and b is not None and passage.id not in shut:
-            neighbours[a].append(b)
-            neighbours[b].append(a)
-    reached, waiting = {start}, [start]
-    while waiting:
-        for room in neighbours[waiting.pop()]:
-            if room not in reached:
-                reached.add(room)
-                waiting.append(room)
-    return reached
+    sides = [passage.rooms for passage in plan.passages if passage.id not in closed]
+    return connected_parts([start], sides)[0]

@@ -10,6 +10,7 @@ import shapely
 from closedrooms.core.door import Point, Segment
 from closedrooms.worlds.assembly import Edge, free_spans, shared_edges, walls_along
 from closedrooms.worlds.geometry import distance_along
+from closedrooms.worlds.parts import connected_parts
 from closedrooms.worlds.passages import hung, is_circulation
 from closedrooms.worlds.plan import DoorKind, FloorPlan, Opening, PlanDoor, PlanRoom
 
@@ -183,12 +184,7 @@ def _nearest(
 
 
 def _unreached(rooms: tuple[PlanRoom, ...], doors: list[PlanDoor], openings: list[Opening]) -> list[str]:
-    import networkx as nx
-
-    graph: nx.Graph[str] = nx.Graph()
-    graph.add_nodes_from(room.id for room in rooms)
     sides = [door.rooms for door in doors] + [opening.rooms for opening in openings]
-    graph.add_edges_from((a, b) for a, b in sides if a is not None and b is not None)
-    parts = sorted(nx.connected_components(graph), key=lambda part: (-len(part), min(part)))
+    parts = sorted(connected_parts([room.id for room in rooms], sides), key=lambda part: (-len(part), min(part)))
     apart = [room for part in parts[1:] for room in sorted(part)]
     return [f"{len(apart)} rooms are not connected to the rest: {', '.join(apart)}"] if apart else []

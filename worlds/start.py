@@ -10,6 +10,7 @@ from shapely.geometry import Polygon
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
 from closedrooms.worlds.geometry import room_interior
+from closedrooms.worlds.parts import connected_parts
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
 
 CIRCULATION = ("corridor", "hallway", "lobby", "entrance", "hall", "atrium", "foyer", "passage")
@@ -81,11 +82,6 @@ def _main_room(plan: FloorPlan) -> PlanRoom:
 
 def _largest_part(plan: FloorPlan) -> set[str]:
     """The connected part of the building with the largest area, every door open."""
-    import networkx as nx
-
-    graph: nx.Graph[str] = nx.Graph()
-    graph.add_nodes_from(room.id for room in plan.rooms)
-    graph.add_edges_from((a, b) for a, b in (p.rooms for p in plan.passages) if a is not None and b is not None)
     area = {room.id: room.polygon.area for room in plan.rooms}
-    parts = [set(part) for part in nx.connected_components(graph)]
+    parts = connected_parts([room.id for room in plan.rooms], [passage.rooms for passage in plan.passages])
     return max(parts, key=lambda part: (sum(area[room] for room in sorted(part)), min(part)))
