@@ -19,6 +19,8 @@ def predict(
 ) -> Prediction:
     """Predict the rooms behind closed doors and complete the map with them.
 
+    The steps below are the preset ``paper``; ``best`` goes its own way (:mod:`closedrooms.predictor.best`).
+
     Trouble with one door is its own: it is named in ``failures`` and the other doors are predicted. On a map without
     any wall line (all unknown, all free, noise), every door fails with the reason and the map stays as it is.
 
@@ -31,6 +33,10 @@ def predict(
     Returns:
         The completed map on the lattice of the input, the rooms in the order of the doors, failures by door id.
     """
+    if config.preset == "best":
+        from closedrooms.predictor.best import predict_best
+
+        return predict_best(grid, doors, config, trace)
     wanted = config.keep_trace if trace is None else trace
     # 3.1, 3.2: lines, faces, and the face behind each door.
     start, failures = start_rooms(grid, doors, config)
