@@ -76,16 +76,24 @@ def _start_vertex(draft: GraphDraft, start: Point | None) -> int:
     return next((v for v in order if is_clear(draft.space.passable, point, draft.points[v])), order[0])
 
 
+def _nearest_part(space: FreeSpace, start: Point) -> tuple[int, float]:
+    """The part that holds ``start``, or the nearest one, and how far away it is [m]."""
+    cell = space.frame.to_cells(np.array(start))
+    if space.frame.contains(cell) and space.mask[cell[0], cell[1]]:
+        return int(space.parts[cell[0], cell[1]]), 0.0
+    cells = np.argwhere(space.mask)
+    squared = ((cells + 0.5 - space.frame.to_corners(np.array(start))[::-1]) ** 2).sum(axis=1)
+    nearest = int(np.argmin(squared))
+    distance = float(np.sqrt(squared[nearest])) * space.frame.resolution
+    return int(space.parts[cells[nearest, 0], cells[nearest, 1]]), distance
+
+
 def _chosen_parts(space: FreeSpace, config: CoverageConfig, start: Point | None) -> tuple[FreeSpace, list[str]]:
     """The part with the robot, or all; and a note when there are several."""
     notes = []
     chosen = 1
     if start is not None:
-        cells = np.argwhere(space.mask)
-        squared = ((cells + 0.5 - space.frame.to_corners(np.array(start))[::-1]) ** 2).sum(axis=1)
-        nearest = int(np.argmin(squared))
-        chosen = int(space.parts[cells[nearest, 0], cells[nearest, 1]])
-        distance = float(np.sqrt(squared[nearest])) * space.frame.resolution
+        chosen, distance = _nearest_part(space, start)
         if distance > FAR_START:
             notes.append(f"the start ({start[0]:.2f}, {start[1]:.2f}) lies {distance:.1f} m from free space")
     count = len(space.areas) - 1
