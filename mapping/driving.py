@@ -21,6 +21,8 @@ RECOVERY_TURN = 0.8
 PROGRESS_STEP = 0.05
 # A robot that is held up this close to the end of its path has arrived [m].
 CLOSE_ENOUGH = 0.6
+# A robot slower than this on an arc is held up by it [m/s]; then it looks only so far ahead [m].
+CRAWL, SHORT_LOOKAHEAD = 0.08, 0.25
 
 
 class Driver:
@@ -96,12 +98,16 @@ class Driver:
             self._back_until, self._started_at = pose, stamp
             return (0.0, 0.0)
         self.state = "driving"
-        return (done.v, done.w)
+        turn = None
+        if wish.v > 0.0 and done.v < CRAWL:
+            # The arc does not fit: turn towards the path close by first, and go straight then.
+            turn = self.face(pose, self._track.at(self._progress + SHORT_LOOKAHEAD), tolerance=0.1)
+        return turn or (done.v, done.w)
 
-    def face(self, pose: Pose2, place: tuple[float, float]) -> tuple[float, float] | None:
-        """Turn towards a place in the map; ``None`` when the robot faces it."""
+    def face(self, pose: Pose2, place: tuple[float, float], *, tolerance: float = 0.25) -> tuple[float, float] | None:
+        """Turn towards a place in the map; ``None`` when the robot faces it to within ``tolerance`` [rad]."""
         error = wrap_angle(math.atan2(place[1] - pose.y, place[0] - pose.x) - pose.theta)
-        return None if abs(error) < 0.25 else (0.0, turn_rate(error, self.config))
+        return None if abs(error) < tolerance else (0.0, turn_rate(error, self.config))
 
     def _turning_time(self, wish: Steering) -> float:
         """A turn in place is allowed the time of half a turn on top."""
