@@ -12,7 +12,7 @@ coordinates = st.floats(0.0, 12.0, allow_nan=False).map(lambda v: round(v, 3))
 
 
 @given(a=st.tuples(coordinates, coordinates), b=st.tuples(coordinates, coordinates))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_crossed_cells_are_those_whose_inside_the_segment_meets(a, b):
     found = set(map(tuple, cells_between(np.array(a), np.array(b)).tolist()))
     line = LineString([a, b]) if a != b else None

@@ -30,7 +30,7 @@ def _components(count, edges):
 
 
 @given(seed=st.integers(0, 10_000), discs=st.integers(1, 12))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_the_graph_has_as_many_parts_and_loops_as_the_skeleton(seed, discs):
     skeleton = thin(_blobs(seed, discs))
     graph = trace_skeleton(skeleton)
@@ -44,7 +44,7 @@ def test_the_graph_has_as_many_parts_and_loops_as_the_skeleton(seed, discs):
 
 
 @given(seed=st.integers(0, 10_000), discs=st.integers(1, 12))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_chains_walk_the_skeleton_cell_by_cell_and_cover_it(seed, discs):
     skeleton = thin(_blobs(seed, discs))
     graph = trace_skeleton(skeleton)

@@ -128,8 +128,8 @@ def test_blocks_give_the_tour_of_the_whole():
 
 
 def test_the_default_and_tabu_search_are_repeatable():
-    graph = _random_graph(5, 60, 40)
-    for config in (TourConfig(), TourConfig(method="ortools", solution_limit=50)):
+    graph = _random_graph(5, 40, 25)
+    for config in (TourConfig(), TourConfig(method="ortools", solution_limit=10)):
         one, other = solve_tour(graph, config), solve_tour(graph, config)
         assert one.order.tolist() == other.order.tolist()
         assert one.path.tobytes() == other.path.tobytes()
@@ -137,7 +137,7 @@ def test_the_default_and_tabu_search_are_repeatable():
 
 
 @pytest.mark.parametrize(
-    "config", [TourConfig(method="ortools", solution_limit=100), TourConfig(method="paper", convergence=30)]
+    "config", [TourConfig(method="ortools", solution_limit=20), TourConfig(method="paper", convergence=20)]
 )
 def test_tabu_search_by_or_tools_is_near_the_default(config):
     graph = _random_graph(8, 30, 15)
