@@ -29,8 +29,8 @@ from closedrooms.predictor.window import at_resolution, known_window
 
 # Cells that the evidence is counted in [m], that of the maps tuned on.
 RESOLUTION = 0.05
-# Rooms may leave the known map by this much [m].
-MARGIN = 12.0
+# Unknown cells around a turned map [m]: what lies further out reads as its edge.
+MARGIN = 1.0
 # Narrowest and widest, shallowest and deepest room [cells]: 0.8 m to 18 m.
 LIMITS = (16, 360, 16, 360)
 

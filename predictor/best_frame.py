@@ -150,10 +150,7 @@ def wall_faces(free: BoolArray, occupied: BoolArray) -> BoolArray:
     Returns:
         Shape (rows, cols + 1).
     """
-    rows, cols = free.shape
-    wall = np.zeros((rows, cols + FACE_DEPTH), dtype=np.bool_)
-    for step in range(FACE_DEPTH):
-        wall[:, :cols] |= np.pad(occupied, ((0, 0), (0, step)))[:, step : step + cols]
-    edges = np.zeros((rows, cols + 1), dtype=np.bool_)
-    edges[:, 1:cols] = free[:, : cols - 1] & ~free[:, 1:cols] & wall[:, 1:cols]
+    wall = cv2.dilate(np.ascontiguousarray(occupied).view(np.uint8), np.ones((1, FACE_DEPTH), np.uint8), anchor=(0, 0))
+    edges = np.zeros((free.shape[0], free.shape[1] + 1), dtype=np.bool_)
+    edges[:, 1:-1] = free[:, :-1] & ~free[:, 1:] & (wall[:, 1:] > 0)
     return edges

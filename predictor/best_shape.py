@@ -33,11 +33,13 @@ def room_shape(turned: TurnedMap, corners: FloatArray, thickness: int, facing: F
     x0, y0 = np.round(cells.min(axis=0)).astype(int)
     x1, y1 = np.round(cells.max(axis=0)).astype(int)
     pad = thickness + 1
-    window = turned.free[max(y0 - pad, 0) : y1 + pad, max(x0 - pad, 0) : x1 + pad]
-    kernel = np.ones((2 * thickness + 1,) * 2, np.uint8)
-    taken = cv2.dilate(window.astype(np.uint8), kernel) > 0
-    top, left = y0 - max(y0 - pad, 0), x0 - max(x0 - pad, 0)
-    open_ = ~taken[top : top + y1 - y0, left : left + x1 - x0]
+    rows, cols = turned.free.shape
+    window = np.zeros((y1 - y0 + 2 * pad, x1 - x0 + 2 * pad), dtype=np.uint8)
+    r0, r1, c0, c1 = max(y0 - pad, 0), min(y1 + pad, rows), max(x0 - pad, 0), min(x1 + pad, cols)
+    if r1 > r0 and c1 > c0:
+        window[r0 - y0 + pad : r1 - y0 + pad, c0 - x0 + pad : c1 - x0 + pad] = turned.free[r0:r1, c0:c1]
+    taken = cv2.dilate(window, np.ones((2 * thickness + 1,) * 2, np.uint8)) > 0
+    open_ = ~taken[pad:-pad, pad:-pad]
     if open_.mean() > 1.0 - CLEAN:
         return Polygon(corners)
     smooth = cv2.morphologyEx(

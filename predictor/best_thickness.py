@@ -28,8 +28,8 @@ def _thicknesses(free: BoolArray, known: BoolArray) -> IntArray:
     rows, cols = free.shape
     occupied = known & ~free
     right, left = wall_faces(free, occupied), wall_faces(free[:, ::-1], occupied[:, ::-1])[:, ::-1]
-    total = np.zeros((rows, cols + 1), dtype=np.int16)
-    np.cumsum(free, axis=1, dtype=np.int16, out=total[:, 1:])
+    total = np.zeros((rows, cols + 1), dtype=np.int32)
+    np.cumsum(free, axis=1, out=total[:, 1:])
     before, after = np.zeros_like(right), np.zeros_like(left)
     before[:, CLEAR:] = total[:, CLEAR:] - total[:, :-CLEAR] == CLEAR
     after[:, :-CLEAR] = total[:, CLEAR:] - total[:, :-CLEAR] == CLEAR
