@@ -78,7 +78,15 @@ def _building(layout: Layout) -> rrb.Container:
     view = rrb.Spatial3DView(
         origin="/",
         name="Building",
-        contents=["+ /building/**", "+ /map/grid", "+ /map/scan", "+ /map/path/truth", "+ /rooms/predicted/**"],
+        contents=[
+            "+ /building/**",
+            "+ /map/grid",
+            "+ /map/scan",
+            "+ /map/path/truth",
+            "+ /rooms/predicted/**",
+            # Two grids in one plane would hide what is drawn between them.
+            "- /rooms/predicted/grid",
+        ],
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,
             position=(cx, cy - 0.6 * reach, 0.8 * reach),
@@ -171,7 +179,15 @@ def _driving(layout: Layout) -> rrb.Container:
     view = _from_above(
         layout,
         "Driven",
-        ["+ /map/grid", "+ /map/scan", "+ /map/robot/**", "+ /map/path/**", "+ /driving/**"],
+        [
+            "+ /map/grid",
+            "+ /map/scan",
+            "+ /map/robot/**",
+            "+ /map/path/estimate",
+            "+ /map/path/truth",
+            "+ /driving/**",
+            "- /driving/predicted/grid",
+        ],
         aspect=1.3,
     )
     side = rrb.Vertical(

@@ -245,7 +245,7 @@ class Recorder:
         for gone in sorted(self._driven - names):
             self._stream.log(f"driving/predicted/rooms/{gone}", rr.Clear(recursive=True))
         self._driven = names
-        self._stream.log("driving/tour", drawables.strips([np.asarray(tour)], colours.TOURS["predicted"]))
+        self._stream.log("driving/tour", drawables.strips([np.asarray(tour)], colours.GOAL))
 
     def note(self, text: str, stamp: float | None = None) -> None:
         """One line of the log."""

@@ -255,6 +255,27 @@ def test_a_log_of_a_real_robot_needs_no_truth(tmp_path: Path) -> None:
     assert "/metrics/position_error/estimate" not in entities(path)
 
 
+def test_a_reference_that_comes_afterwards_gives_errors(tmp_path: Path) -> None:
+    path = tmp_path / "log.rrd"
+    stamps = np.arange(10.0)
+    with Recorder(path, name="log", layout=Layout(building=False, prediction=False, coverage=False)) as recorder:
+        for stamp in stamps:
+            recorder.scan(a_scan(stamp), Pose2(stamp, 0.0), Pose2(stamp, 0.1))
+        recorder.reference(stamps, np.column_stack((stamps, np.zeros((10, 2)))))
+    errors = [row["Scalars:scalars"][0] for row in rows(path, "/metrics/position_error/estimate") if "sim_time" in row]
+    assert errors == pytest.approx([0.1] * 10)
+
+
+def test_a_room_that_is_no_longer_predicted_vanishes(tmp_path: Path) -> None:
+    path = tmp_path / "drive.rrd"
+    nothing_left = Prediction(a_map(), (), {}, None)
+    with Recorder(path, name="drive", layout=Layout(building=False, driving=True)) as recorder:
+        recorder.revision(a_prediction(), np.zeros((2, 2)), 1.0)
+        recorder.revision(nothing_left, np.zeros((2, 2)), 2.0)
+    cleared = [row for row in rows(path, "/driving/predicted/rooms/d01") if row.get("Clear:is_recursive")]
+    assert [row["stage"] for row in cleared] == [Stage.DRIVING]
+
+
 def test_messages_of_the_library_reach_the_recording_and_the_handler_goes(tmp_path: Path) -> None:
     path = tmp_path / "log.rrd"
     logger = logging.getLogger("closedrooms")
