@@ -1,6 +1,6 @@
 """Tables of results for people."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from closedrooms.pipeline.run import RunResult
@@ -26,6 +26,7 @@ def run_rows(result: "RunResult") -> Rows:
         rows.append(("IoU mean", f"{metrics['room_iou_mean']:.3f}"))
     rows += [(f"not predicted: {door}", reason) for door, reason in result.failures.items()]
     rows += tour_rows(metrics["tour"])
+    rows += drive_rows(metrics.get("drive"))
     rows += [(f"time: {stage}", f"{seconds:.2f} s") for stage, seconds in result.durations.items()]
     return rows
 
@@ -36,3 +37,21 @@ def tour_rows(tour: dict[str, dict[str, float]]) -> Rows:
     rows = [(f"tour on the {text}", f"{tour[name]['length_m']:.1f} m") for name, text in names.items() if name in tour]
     errors = tour.get("errors_percent", {})
     return rows + [(f"tour error, {name}", f"{error:.1f} %") for name, error in errors.items()]
+
+
+def drive_rows(drive: dict[str, Any] | None) -> Rows:
+    """How the driven tour went."""
+    if drive is None:
+        return []
+    rows: Rows = [
+        ("drive", f"{drive['status']}, {drive['replans']} new tours, {drive['vertices_unreachable']} places given up"),
+        ("drive: planned length", f"{drive['planned_length_m']:.1f} m"),
+        ("drive: driven length", f"{drive['driven_length_m']:.1f} m"),
+        ("drive: free area seen at the end", f"{100 * drive['area_covered']:.1f} %"),
+    ]
+    for revision in drive["revisions"]:
+        for door, before in revision["iou_before"].items():
+            rows.append((f"IoU behind {door} when looked into", f"{before:.3f} to {revision['iou_after'][door]:.3f}"))
+    if drive["room_iou_mean_end"] is not None:
+        rows.append(("IoU mean after the drive", f"{drive['room_iou_mean_end']:.3f}"))
+    return rows

@@ -24,6 +24,8 @@ from closedrooms.coverage.tour import CoverageTour
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import ate
 from closedrooms.pipeline.config import RunConfig, predictor_config, sim_config
+from closedrooms.pipeline.drive import DriveResult, drive
+from closedrooms.pipeline.drive_report import draw_drive, drive_features, drive_metrics
 from closedrooms.pipeline.explore import ExplorationResult, explore
 from closedrooms.pipeline.manifest import resolved, versions
 from closedrooms.pipeline.metrics import area_mapped, mean, room_iou, rooms_seen
@@ -150,6 +152,12 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
             observer.tours(tours)
         manifest["exploration"] = _exploration(survey.exploration)
         manifest["metrics"] = _metrics(plan, closed, map_T_world, survey, prediction, truth, tours)
+        driven: DriveResult | None = None
+        if config.drive and "predicted" in tours:
+            with watch.stage("drive"):
+                progress.stage("drive")
+                driven, figures = _drive(witness, mapper, config, closed, survey, prediction, truth, tours, observer)
+            manifest["metrics"]["drive"] = figures
         manifest["doors"] = {
             "seen": [door.id for door in survey.doors],
             "not_seen": sorted(set(closed) - {door.id for door in survey.doors}),
@@ -158,9 +166,9 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
         manifest["notes"] = notes
         with watch.stage("write"):
             progress.stage("write")
-            _write(staging, survey, prediction, truth, tours)
+            _write(staging, survey, prediction, truth, tours, driven)
             if config.keep_scans:
-                witness.write_scans(staging / "scans.npz", survey.estimate)
+                witness.write_scans(staging / "scans.npz", mapper.trajectory()[1])
         manifest["durations"] = watch.seconds()
         result = RunResult(
             folder,
@@ -253,6 +261,28 @@ def plan_tours(
     return tours, notes
 
 
+def _drive(
+    witness: Witness,
+    mapper: Mapper,
+    config: RunConfig,
+    closed: Sequence[str],
+    survey: Survey,
+    prediction: Prediction,
+    truth: Truth,
+    tours: dict[str, CoverageTour],
+    observer: Observer,
+) -> tuple[DriveResult, dict[str, Any]]:
+    """Open the doors, drive the tour of the predicted map, and judge it."""
+    driven = drive(
+        witness, mapper, prediction, tours["predicted"], survey.doors, config.navigation,
+        closed=closed, predictor=predictor_config(config), coverage=config.coverage, observer=observer,
+    )  # fmt: skip
+    seen, sim = mapper.grid(), witness.sim
+    start = sim.world_T_map
+    cells = reachable(sim.plan, (), seen.frame, start.inverse(), (start.x, start.y))
+    return driven, drive_metrics(driven, truth.rooms, seen, cells, tours.get("truth"))
+
+
 def _exploration(exploration: ExplorationResult) -> dict[str, Any]:
     return {
         "status": exploration.status,
@@ -310,7 +340,14 @@ def _metrics(
     return metrics
 
 
-def _write(folder: Path, survey: Survey, prediction: Prediction, truth: Truth, tours: dict[str, CoverageTour]) -> None:
+def _write(
+    folder: Path,
+    survey: Survey,
+    prediction: Prediction,
+    truth: Truth,
+    tours: dict[str, CoverageTour],
+    driven: DriveResult | None,
+) -> None:
     """Every data file of the run directory, then the picture."""
     from closedrooms.pipeline.picture import draw_summary
 
@@ -322,7 +359,10 @@ def _write(folder: Path, survey: Survey, prediction: Prediction, truth: Truth, t
     write_rooms(folder / "truth_rooms.geojson", truth.rooms)
     write_trajectory(folder / "trajectory.tum", survey.stamps, survey.estimate)
     write_trajectory(folder / "trajectory_truth.tum", survey.stamps, survey.truth)
-    write_features(folder / "tour.geojson", [f for name, tour in tours.items() for f in tour_features(tour, name)])
+    features = [f for name, tour in tours.items() for f in tour_features(tour, name)]
+    write_features(folder / "tour.geojson", features + ([] if driven is None else drive_features(driven)))
+    if driven is not None:
+        draw_drive(folder / "drive.png", driven, truth.rooms)
     draw_summary(
         folder / "summary.png",
         survey.grid,

@@ -95,7 +95,8 @@ class TourGuide:
 
         Args:
             prediction: The completed map that the tour was planned on.
-            vertices: Vertices of the tour in order, the first is where it ends too, map frame, shape (n, 2) [m].
+            vertices: Vertices of the closed tour in order, map frame, shape (n, 2) [m]. It begins and ends at the one
+                nearest to the robot.
             doors: The doors of the predicted rooms, open by now.
             config: Planning and driving.
             predictor: For rooms that are predicted anew.
@@ -123,6 +124,7 @@ class TourGuide:
         self._looked_into: set[str] = set()
         self._surprise = (0.0, -math.inf)
         self._last_looks = 0
+        self._begun = False
 
     def command(self, pose: Pose2, scan: LaserScan, grid: Callable[[], OccupancyGrid]) -> tuple[float, float]:
         """Speed [m/s] and turn rate [rad/s] for now; (0, 0) once ``status`` is set.
@@ -176,9 +178,26 @@ class TourGuide:
             self.status = "complete"
         self._goal, self._attempts = None, 0
 
+    def _begin(self, pose: Pose2, grid: OccupancyGrid) -> None:
+        """A closed tour may begin anywhere: at the vertex that is nearest to the robot."""
+        self._begun = True
+        self._map.update(overlay(self.prediction, grid, self._doors))
+        costmap = self._map.costmap
+        goals = np.zeros(costmap.frame.shape, dtype=np.bool_)
+        cells = costmap.frame.to_cells(self.left)
+        cells = cells[costmap.frame.contains(cells)]
+        goals[cells[:, 0], cells[:, 1]] = True
+        path = plan_path(costmap, (pose.x, pose.y), goals, self.config)
+        place = np.array([pose.x, pose.y]) if path is None else path.points[-1]
+        first = int(np.argmin(np.hypot(*(self.left - place).T)))
+        self.left = np.roll(self.left, -first, axis=0)
+        self._home = (float(self.left[0, 0]), float(self.left[0, 1]))
+
     def _next(self, pose: Pose2, grid: OccupancyGrid, now: float) -> bool:
         """Plan the way to the next vertex, or home; vertices that cannot be reached are given up."""
         revised = False
+        if not self._begun:
+            self._begin(pose, grid)
         if len(self.left) == 0 and self._last_looks < MAX_LAST_LOOKS:
             # Before going home: whatever was discovered on the way and is in no tour yet.
             self._last_looks += 1

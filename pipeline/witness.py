@@ -43,6 +43,19 @@ class Witness:
         self._sim.step(v, w, duration)
 
     @property
+    def sim(self) -> Simulation:
+        """What is watched."""
+        return self._sim
+
+    def open_door(self, door_id: str) -> None:
+        """Let a closed door open."""
+        self._sim.open_door(door_id)
+
+    def door_states(self) -> dict[str, float]:
+        """How far each door is open, 0 to 1."""
+        return self._sim.door_states()
+
+    @property
     def stamps(self) -> FloatArray:
         """Times of the observations [s], shape (n,)."""
         return np.array(self._stamps)
