@@ -31,9 +31,9 @@ from closedrooms.predictor.update import overlay, seen_share, update
 
 # A vertex of the tour counts as visited when the robot comes so close [m]: it stands for what is seen from there.
 VISITED = 0.5
-# Of a tour that is solved again, vertices this close to the way already driven are left out [m]; less than the way
-# around the end of a wall.
-DRIVEN = 0.6
+# Of a tour that is solved again, vertices that were in sight this close to the way already driven are left out [m]; the
+# vertices of a revised map never lie just where the old ones did. At the end only what is farther off is worth the way.
+DRIVEN, DRIVEN_AT_LAST = 1.2, 2.5
 # A room is looked into when so much of its prediction is known, or so little for so long [s] without a change.
 LOOKED_INTO, GLIMPSED, SETTLED = 0.6, 0.15, 3.0
 # Difference of prediction and observation, in free area, that calls for a revision or for another tour [m2].
@@ -202,7 +202,7 @@ class TourGuide:
             # Before going home: whatever was discovered on the way and is in no tour yet.
             self._last_looks += 1
             self._revise((), pose, grid, now)
-            self._solve_again(pose)
+            self._solve_again(pose, driven=DRIVEN_AT_LAST)
         while True:
             goal = self._home if len(self.left) == 0 else (float(self.left[0, 0]), float(self.left[0, 1]))
             self._map.update(overlay(self.prediction, grid, self._doors))
@@ -271,7 +271,7 @@ class TourGuide:
             self.revisions.append(Revision(doors, now, before.rooms, self.prediction.rooms, replanned))
         return replanned
 
-    def _solve_again(self, pose: Pose2) -> bool:
+    def _solve_again(self, pose: Pose2, *, driven: float = DRIVEN) -> bool:
         """The tour over what is left of the revised map; ``False`` where the map has no graph."""
         try:
             built = build_graph(self.prediction.grid, (), self._coverage, start=(pose.x, pose.y))
@@ -280,7 +280,7 @@ class TourGuide:
         graph = built.graph
         vertices = graph.vertices
         done = np.array(self._track + self.unreachable).reshape(-1, 2)
-        near = np.hypot(*(vertices[:, None, :] - done[None, :, :]).transpose(2, 0, 1)).min(axis=1) <= DRIVEN
+        near = np.array([_was_near(vertex, done, driven, self.prediction.grid) for vertex in vertices])
         members = np.flatnonzero(graph.parts == graph.parts[built.start]).tolist()
         home = int(np.argmin(np.hypot(*(vertices[members] - np.array(self._home)).T)))
         ends = [built.start, members[home]]
@@ -293,6 +293,19 @@ class TourGuide:
         self.replans += 1
         self._goal, self._attempts = None, 0
         return True
+
+
+def _was_near(vertex: FloatArray, track: FloatArray, distance: float, grid: OccupancyGrid) -> bool:
+    """Whether the nearest place of a track, shape (n, 2) [m], lies within a distance [m] of a vertex, in free sight."""
+    away = np.hypot(*(track - vertex).T)
+    nearest = int(np.argmin(away))
+    if away[nearest] > distance:
+        return False
+    steps = max(2, math.ceil(float(away[nearest]) / grid.frame.resolution))
+    line = vertex + np.linspace(0.0, 1.0, steps + 1)[:, None] * (track[nearest] - vertex)
+    cells = grid.frame.to_cells(line)
+    cells = cells[grid.frame.contains(cells)]
+    return not bool(grid.occupied[cells[:, 0], cells[:, 1]].any())
 
 
 def _open_tour(distances: FloatArray, config: CoverageConfig) -> list[int]:
