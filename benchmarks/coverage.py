@@ -153,7 +153,7 @@ def solvers(name: str, graph: TopologicalGraph) -> None:
     rows: list[tuple[str, float, float]] = []
     seconds, ours = measured(lambda: solve_tour(graph))
     rows.append((f"ours ({ours.search})", seconds, ours.length))
-    for limit in (30, 300):
+    for limit in (30, 100):
         tabu = TourConfig(method="ortools", solution_limit=limit)
         seconds, tour = measured(lambda tabu=tabu: solve_tour(graph, tabu), 1)
         rows.append((f"OR-Tools tabu, {limit} solutions", seconds, tour.length))
