@@ -34,7 +34,7 @@ class MatcherConfig:
     iterations: int = 8
     """Most Gauss-Newton steps of a refinement."""
 
-    prior_weight: float = 0.02
+    prior_weight: float = 0.005
     """Weight of the odometry against the likelihood of one point at one sigma."""
 
     min_score: float = 0.45

@@ -11,6 +11,8 @@ from closedrooms.mapping.likelihood import LikelihoodField
 
 STEP_DONE = 1e-3
 """Step [m and rad, the latter halved] below which a refinement has converged: a fiftieth of a cell."""
+MEMORY = 0.4
+"""Share of a step's curvature that the next one remembers."""
 LONGEST_STEP = 0.2
 """Longest step [m]: beyond the reach of the field its slope says nothing."""
 
@@ -22,7 +24,8 @@ class Refined:
     Attributes:
         pose: ``map_T_robot``.
         score: Mean likelihood of the points at the pose before the last step [0..1].
-        hessian: Gauss-Newton approximation of the curvature of the field alone, shape (3, 3).
+        hessian: Gauss-Newton approximation of the curvature of the field alone, averaged over the last steps, shape
+            (3, 3).
     """
 
     pose: Pose2
@@ -59,7 +62,7 @@ def refine(
     x, y, theta = guess.as_tuple()
     anchor = guess if prior is None else prior
     jacobian = np.empty((3, len(points)))
-    hessian, score = np.zeros((3, 3)), 0.0
+    stiffness, score = np.zeros((3, 3)), 0.0
     for _ in range(iterations):
         c, s = math.cos(theta), math.sin(theta)
         qx, qy = c * px - s * py, s * px + c * py
@@ -89,7 +92,10 @@ def refine(
         hessian[:2, 2] *= inverse
         gradient[:2] *= inverse
         score = 1.0 - float(residual.mean())
-        total = hessian
+        # On the crest of a wall the slope vanishes, and with it this curvature: remember what the way up showed, or the
+        # prior alone would pull the pose back down.
+        stiffness = hessian + MEMORY * stiffness
+        total = stiffness
         if prior_information is not None:
             error = np.array([anchor.x - x, anchor.y - y, math.remainder(anchor.theta - theta, 2.0 * math.pi)])
             total = total + prior_information
@@ -101,7 +107,7 @@ def refine(
         x, y, theta = x + dx, y + dy, theta + turn
         if length < STEP_DONE and abs(turn) < STEP_DONE / 2:
             break
-    return Refined(Pose2(x, y, theta), score, hessian)
+    return Refined(Pose2(x, y, theta), score, (1.0 - MEMORY) * stiffness)
 
 
 def _solve(h: list[list[float]], g: list[float]) -> tuple[float, float, float]:
