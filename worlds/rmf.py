@@ -24,8 +24,8 @@ from closedrooms.worlds.yamlfile import parse_yaml
 WHAT = "an RMF building (building.yaml)"
 # Thickness that the RMF tools give walls [m].
 WALL = 0.1
-# Ends of walls that miss another wall by less than this are meant to meet it [m].
-LOOSE_END = 0.4
+# Ends of walls that miss another wall by less than this are meant to meet it: no door is that narrow [m].
+LOOSE_END = 0.5
 # Faces between walls that are smaller than this, or narrower, are no rooms [square metres, m].
 SMALLEST, NARROWEST = 1.0, 0.35
 # On each side of a door its room is looked for this far away [m].

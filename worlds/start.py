@@ -6,6 +6,7 @@ from collections import Counter
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
@@ -51,10 +52,20 @@ def start_pose(plan: FloorPlan) -> Pose2:
     interior = room_interior(plan, room.id)
     blocked = [thing.polygon for thing in plan.furniture if thing.polygon.intersects(interior)]
     free = shapely.difference(interior, shapely.union_all(blocked)) if blocked else interior
-    largest = max(shapely.get_parts(free), key=lambda part: part.area)
+    largest = _widest_part(free)
     circle = shapely.maximum_inscribed_circle(largest, tolerance=0.05)
     centre = shapely.get_coordinates(circle)[0]
     return Pose2(round(float(centre[0]), 3), round(float(centre[1]), 3), round(_long_side(largest), 4))
+
+
+def _widest_part(free: BaseGeometry) -> Polygon:
+    """The largest part of a free area that a robot can drive through, passages too narrow for it cut."""
+    cores = [part for part in shapely.get_parts(free.buffer(-CLEARANCE)) if isinstance(part, Polygon)]
+    parts = [part for part in shapely.get_parts(free) if isinstance(part, Polygon)]
+    if len(cores) > 1:
+        core = max(cores, key=lambda part: part.area)
+        parts = [part for part in shapely.get_parts(free & core.buffer(CLEARANCE)) if isinstance(part, Polygon)]
+    return max(parts, key=lambda part: part.area)
 
 
 def _long_side(area: Polygon) -> float:

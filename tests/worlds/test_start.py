@@ -7,7 +7,7 @@ from shapely.geometry import box
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.worlds.geometry import wall_area
 from closedrooms.worlds.library import bundled_names, load_world
-from closedrooms.worlds.plan import FloorPlan, Furniture
+from closedrooms.worlds.plan import FloorPlan, Furniture, PlanRoom, Wall
 from closedrooms.worlds.start import start_pose, start_room
 
 
@@ -45,3 +45,17 @@ def test_bundled_worlds_start_well_clear_of_walls(name: str) -> None:
     plan = load_world(name)
     pose = start_pose(plan)
     assert wall_area(plan).distance(shapely.Point(pose.x, pose.y)) > 0.6
+
+
+def test_a_part_behind_a_gap_too_narrow_for_a_robot_is_not_started_in(small: FloorPlan) -> None:
+    hall = PlanRoom("r0", "hall", box(0, 0, 12, 5))
+    wall = Wall("w9", ((7.0, 0.0), (7.0, 4.6)), 0.2)
+    plan = replace(small, rooms=(hall,), walls=(*small.walls[:4], wall), doors=(), openings=(), start=None)
+    pose = start_pose(plan)
+    assert pose.x < 7.0
+    wide = replace(
+        plan,
+        rooms=(replace(hall, polygon=box(0, 0, 12, 5)),),
+        walls=(*small.walls[:4], Wall("w9", ((7.0, 0.0), (7.0, 3.0)), 0.2)),
+    )
+    assert start_room(wide) == "r0"
