@@ -76,6 +76,7 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Cover
         progress.stage("cover")
         tour = plan_coverage(grid, doors, config.coverage)
     missed = {door.id: "no free space to reach it from" for door in doors if door.id not in tour.graph.door_vertices}
+    missed |= dict.fromkeys(tour.unreached_doors, "no free space to reach it from")
     with output_folder(config.out, manifest) as folder:
         progress.stage("write")
         write_map(folder / "map", grid)

@@ -90,6 +90,21 @@ def draw_cover(path: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor], tou
     _write(path, [_tour_panel(_bounds([grid]), grid, tour, "Coverage tour", doors=doors)])
 
 
+def draw_map(path: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor], trajectory: FloatArray) -> None:
+    """Write one picture of a map with the way that the robot took.
+
+    Args:
+        path: The PNG.
+        grid: The map.
+        doors: Closed doors in the map.
+        trajectory: ``(x, y, theta)``, shape (n, 3), map frame.
+
+    Raises:
+        OutputError: The folder cannot be written.
+    """
+    _write(path, [_map_panel(_bounds([grid]), grid, doors, trajectory)])
+
+
 def _map_panel(
     bounds: "Bounds", grid: OccupancyGrid, doors: Sequence[ClosedDoor], trajectory: FloatArray | None
 ) -> Panel:

@@ -168,7 +168,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
             progress.stage("write")
             _write(staging, survey, prediction, truth, tours, driven)
             if config.keep_scans:
-                witness.write_scans(staging / "scans.npz", mapper.trajectory()[1])
+                write_scans(staging / "scans.npz", witness.recorded(), estimate=mapper.trajectory()[1])
         manifest["durations"] = watch.seconds()
         result = RunResult(
             folder,

@@ -1,13 +1,10 @@
 """Keeps what happened beside the map: true poses, odometry and, on demand, the scans."""
 
-import io
-from collections.abc import Sequence
-from pathlib import Path
-
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray
-from closedrooms.core.files import write_bytes
+from closedrooms.core.scan import LaserScan
+from closedrooms.mapping.recorded import RecordedRun
 from closedrooms.pipeline.terminal import Progress
 from closedrooms.sim.observation import Observation
 from closedrooms.sim.simulation import Simulation
@@ -23,8 +20,7 @@ class Witness:
         self._stamps: list[float] = []
         self._truth: list[tuple[float, float, float]] = []
         self._odometry: list[tuple[float, float, float]] = []
-        self._scans: list[FloatArray] = []
-        self._last: Observation | None = None
+        self._scans: list[LaserScan] = []
 
     def observe(self) -> Observation:
         """What the robot senses now; noted."""
@@ -33,8 +29,7 @@ class Witness:
         self._truth.append(observation.map_T_robot_true.as_tuple())
         self._odometry.append(observation.odometry.as_tuple())
         if self._keep_scans:
-            self._scans.append(observation.scan.ranges)
-        self._last = observation
+            self._scans.append(observation.scan)
         self._progress.advance(observation.stamp, f"{observation.stamp:.0f} s simulated, {len(self._stamps)} scans")
         return observation
 
@@ -65,25 +60,6 @@ class Witness:
         """True poses ``(x, y, theta)`` in the map frame, shape (n, 3)."""
         return np.array(self._truth).reshape(-1, 3)
 
-    def write_scans(self, path: Path, estimate: Sequence[Sequence[float]] | FloatArray) -> None:
-        """Write every scan as ``scans.npz`` (arrays as DESIGN says); needs ``keep_scans``.
-
-        Raises:
-            OutputError: The file cannot be written.
-        """
-        if self._last is None:
-            return
-        scan = self._last.scan
-        data = io.BytesIO()
-        np.savez_compressed(
-            data,
-            stamps=self.stamps,
-            ranges=np.array(self._scans, dtype=np.float32),
-            odometry=np.array(self._odometry),
-            estimate=np.asarray(estimate),
-            truth=self.truth,
-            angle_min=scan.angle_min,
-            angle_increment=scan.angle_increment,
-            range_max=scan.range_max,
-        )
-        write_bytes(path, data.getvalue())
+    def recorded(self) -> RecordedRun:
+        """Every scan with odometry and true pose, for ``scans.npz``; needs ``keep_scans``."""
+        return RecordedRun(tuple(self._scans), np.array(self._odometry), self.truth)
