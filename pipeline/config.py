@@ -75,9 +75,7 @@ class RunConfig:
     navigation: NavigationConfig = field(default_factory=NavigationConfig)
     """Exploration and driving."""
 
-    predictor: tyro.conf.OmitArgPrefixes[Annotated[PredictorConfig, tyro.conf.Suppress]] = field(
-        default_factory=PredictorConfig
-    )
+    predictor: Annotated[PredictorConfig, tyro.conf.Suppress] = field(default_factory=PredictorConfig)
     """The predictor, for use as a library; ``preset``, ``structure`` and ``phi`` above are laid over it."""
 
     coverage: CoverageConfig = field(default_factory=CoverageConfig)
@@ -117,9 +115,7 @@ class PredictConfig:
     record: bool = False
     """Write the recording ``run.rrd`` for the rerun viewer."""
 
-    predictor: tyro.conf.OmitArgPrefixes[Annotated[PredictorConfig, tyro.conf.Suppress]] = field(
-        default_factory=PredictorConfig
-    )
+    predictor: Annotated[PredictorConfig, tyro.conf.Suppress] = field(default_factory=PredictorConfig)
     """All settings, for use as a library; the three above are laid over it."""
 
 
@@ -149,7 +145,7 @@ class CoverConfig:
     doors: Path | None = None
     """Closed doors whose positions the tour shall visit too: GeoJSON in the map frame, metres."""
 
-    coverage: tyro.conf.OmitArgPrefixes[CoverageConfig] = field(default_factory=CoverageConfig)
+    coverage: CoverageConfig = field(default_factory=CoverageConfig)
     """Graph and tour."""
 
 
@@ -172,7 +168,7 @@ class MapConfig:
     odometry_topic: str | None = None
     """Topic of the odometry, where a bag holds several."""
 
-    mapper: tyro.conf.OmitArgPrefixes[MapperConfig] = field(default_factory=MapperConfig)
+    mapper: MapperConfig = field(default_factory=MapperConfig)
     """The mapper."""
 
 

@@ -22,6 +22,7 @@ from closedrooms.coverage.estimates import coverage_errors
 from closedrooms.coverage.features import tour_features
 from closedrooms.coverage.tour import CoverageTour
 from closedrooms.mapping.mapper import Mapper
+from closedrooms.mapping.scanfile import write_scans
 from closedrooms.mapping.trajectory import ate
 from closedrooms.pipeline.config import RunConfig, predictor_config, sim_config
 from closedrooms.pipeline.drive import DriveResult, drive
