@@ -1,0 +1,61 @@
+"""Exploration side by side: known area, simulated time and the share of each step, on any worlds.
+
+Usage: python benchmarks/exploration.py office-07 school-03 [--noise medium] [--close 5] [--seed 0]
+
+Prints one row a world: status, simulated seconds, way, plans, share of the reachable free cells that is known at the
+end, trajectory error, doors seen, and milliseconds a scan for sensing, mapping and navigating.
+"""
+
+import argparse
+
+from closedrooms.core.random import stream
+from closedrooms.mapping.config import MapperConfig, NavigationConfig
+from closedrooms.mapping.mapper import Mapper
+from closedrooms.mapping.trajectory import ate
+from closedrooms.pipeline.explore import explore
+from closedrooms.pipeline.metrics import area_mapped
+from closedrooms.pipeline.terminal import Silent
+from closedrooms.pipeline.witness import Witness
+from closedrooms.sim.config import SimConfig, noise_level
+from closedrooms.sim.simulation import Simulation
+from closedrooms.worlds.closing import closable_rooms, draw_closed
+from closedrooms.worlds.library import load_world
+from closedrooms.worlds.truth import reachable, truth_bounds
+
+
+def measure(world: str, *, noise: str, close: int, seed: int) -> str:
+    plan = load_world(world)
+    closed = draw_closed(plan, min(close, len(closable_rooms(plan))), stream(seed, "closed doors"))
+    with Simulation(plan, closed, SimConfig(noise=noise_level(noise)), seed) as sim:
+        witness, mapper = Witness(sim, Silent(), keep_scans=False), Mapper(MapperConfig())
+        result = explore(witness, mapper, NavigationConfig())
+        mapper.finish()
+        start = sim.world_T_map
+    map_T_world = start.inverse()
+    x_min, y_min, x_max, y_max = truth_bounds(plan, map_T_world)
+    grid = mapper.grid()
+    grid = grid.on(grid.frame.covering(x_min, y_min, x_max, y_max))
+    cells = reachable(plan, closed, grid.frame, map_T_world, (start.x, start.y))
+    error, _ = ate(mapper.trajectory()[1], witness.truth)
+    each = {step: 1e3 * seconds / result.scans for step, seconds in result.wall_seconds.items()}
+    return (
+        f"{plan.name[:24]:<24} {x_max - x_min:4.0f} x {y_max - y_min:3.0f} m  {result.status:<9}"
+        f"{result.seconds:6.0f} s {result.distance:6.0f} m {result.plans:5d} plans  "
+        f"known {100 * area_mapped(grid, cells):6.2f} %  ate {error:.3f} m  doors {len(mapper.doors())}/{len(closed)}  "
+        f"sense {each['sense']:.2f}  map {each['map']:.2f}  navigate {each['navigate']:.2f} ms/scan"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("worlds", nargs="+")
+    parser.add_argument("--noise", default="medium")
+    parser.add_argument("--close", type=int, default=5)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    for world in options.worlds:
+        print(measure(world, noise=options.noise, close=options.close, seed=options.seed), flush=True)
+
+
+if __name__ == "__main__":
+    main()
