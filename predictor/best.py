@@ -31,8 +31,8 @@ from closedrooms.predictor.window import at_resolution, known_window
 RESOLUTION = 0.05
 # Unknown cells around a turned map [m]: what lies further out reads as its edge.
 MARGIN = 1.0
-# Narrowest and widest, shallowest and deepest room [cells]: 0.8 m to 18 m.
-LIMITS = (16, 360, 16, 360)
+# Narrowest and widest, shallowest and deepest room [cells]: 0.8 m to 24 m.
+LIMITS = (16, 480, 16, 480)
 
 
 def predict_best(

@@ -14,6 +14,8 @@ from closedrooms.predictor.best_frame import DoorFrame, count
 SLACK = 4
 # A strip of unknown cells narrower than this between a room and known space is no room of its own [cells], 1.8 m.
 SLIVER = 36
+# Unknown space up to this wide between a room and known space would need a door of its own [cells], 5 m.
+GAP = 100
 # A wall face with nothing known for this far behind it belongs to the outline of the building [cells], 4 m.
 OUTER = 80
 # Alignment is looked for this far [cells], 20 m, and is half sure after 1.4 m of wall.
@@ -30,6 +32,7 @@ FEATURES = (
     "side closed",
     "side tight",
     "side sliver",
+    "side gap",
     "side aligned",
     "side middle",
     "side stub",
@@ -38,12 +41,14 @@ FEATURES = (
     "back closed",
     "back tight",
     "back sliver",
+    "back gap",
     "back aligned",
     "back free",
     "back outer",
     "near aligned",
     "log depth squared",
     "outside",
+    "outside area",
     "passage end",
     "width seen",
     "depth seen",
@@ -71,6 +76,7 @@ class Evidence:
 
     closed: dict[str, IntArray]
     sliver: dict[str, IntArray]
+    gap: dict[str, IntArray]
     tight: dict[str, IntArray]
     same: dict[str, IntArray]
     outer: dict[str, IntArray]
@@ -84,12 +90,14 @@ def gather(frame: DoorFrame, thickness: int) -> Evidence:
         frame: Seen from the doors.
         thickness: Usual thickness of walls [cells].
     """
-    closed, sliver, tight, same, outer = {}, {}, {}, {}, {}
+    closed, sliver, gap, tight, same, outer = {}, {}, {}, {}, {}, {}
     for side, opposite in (("right", "left"), ("left", "right"), ("top", "bottom")):
         known = _canonical(frame.known, side)
         own, other = _canonical(frame.sharp[side], side), _canonical(frame.sharp[opposite], side)
         near = _within(known, thickness + SLACK)
-        wide = _within(known, thickness + SLIVER) & ~near
+        wide = _within(known, thickness + SLIVER)
+        gap[side] = _running(_within(known, thickness + GAP) & ~wide, side)
+        wide &= ~near
         outer[side] = _running(_blurred(own & ~_beyond(known), 2), side)
         shifted = np.zeros_like(other)
         shifted[:, : other.shape[1] - thickness] = other[:, thickness:]
@@ -97,7 +105,7 @@ def gather(frame: DoorFrame, thickness: int) -> Evidence:
         tight[side] = _running(_blurred(shifted, 3), side)
         same[side] = _running(_blurred(own, 2), side)
     seen = {"width": _spans(frame.sharp, "left", "right"), "depth": _spans(frame.sharp, "bottom", "top")}
-    return Evidence(closed, sliver, tight, same, outer, seen)
+    return Evidence(closed, sliver, gap, tight, same, outer, seen)
 
 
 def _spans(faces: dict[str, BoolArray], start: str, end: str, *, longest: int = 500) -> FloatArray:
@@ -278,7 +286,7 @@ def describe(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int,
     columns["overlap"] = taken / (width * depth)
     margin = np.minimum(entry.u - u0, u1 - entry.u) * cell
     columns["door margin"] = np.maximum(0.6 - margin, 0.0)
-    names = ("closed", "tight", "sliver", "aligned", "stub", "free", "outer")
+    names = ("closed", "tight", "sliver", "gap", "aligned", "stub", "free", "outer")
     sides = {name: np.zeros(len(boxes)) for name in names}
     stubs: dict[str, FloatArray] = {}
     for side, position in (("right", u1), ("left", u0)):
@@ -290,7 +298,7 @@ def describe(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int,
         columns[f"side {name}"] = sides[name]
     columns["side middle"] = _middle(entry, u0, u1, thickness)
     back = _side(evidence, "top", v1, u0, u1)
-    for name in ("closed", "tight", "sliver", "aligned", "free", "outer"):
+    for name in ("closed", "tight", "sliver", "gap", "aligned", "free", "outer"):
         columns[f"back {name}"] = back[name]
     # A back wall that a near room of the same row shows, at most 8 m to either side.
     near = stretch(evidence.same["top"], v1, u0 - 160, u0) + stretch(evidence.same["top"], v1, u1, u1 + 160)
@@ -300,9 +308,20 @@ def describe(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int,
     columns["width seen"] = evidence.seen["width"][np.clip(u1 - u0, 0, last)]
     columns["depth seen"] = evidence.seen["depth"][np.clip(v1 - v0, 0, last)]
     columns["log depth squared"] = np.log(depth * cell / 6.0) ** 2
-    known = np.flatnonzero(frame.known.any(axis=1))
-    columns["outside"] = np.maximum(v1 - (known[-1] if known.size else 0), 0) / depth
+    columns["outside"] = _outside(frame, boxes)
+    columns["outside area"] = columns["outside"] * np.maximum(np.log(area / 4.0), 0.0)
     return np.stack([columns[name] for name in FEATURES], axis=-1)
+
+
+def _outside(frame: DoorFrame, boxes: IntArray) -> FloatArray:
+    """Share of each rectangle beyond the bounding box of what is known; rows of single cells are noise."""
+    u0, v0, u1, v1 = boxes.T
+    inside = np.ones(len(boxes))
+    for axis, low, high in ((0, u0, u1), (1, v0, v1)):
+        known = np.flatnonzero(np.count_nonzero(frame.known, axis=axis) >= 5)
+        first, last = (int(known[0]), int(known[-1]) + 1) if known.size else (0, 0)
+        inside *= np.maximum(np.minimum(high, last) - np.maximum(low, first), 0) / (high - low)
+    return 1.0 - inside
 
 
 def _side(evidence: Evidence, side: str, position: IntArray, low: IntArray, high: IntArray) -> dict[str, FloatArray]:
@@ -319,6 +338,7 @@ def _side(evidence: Evidence, side: str, position: IntArray, low: IntArray, high
         "closed": closed,
         "tight": beyond_own / length,
         "sliver": sliver,
+        "gap": stretch(evidence.gap[side], position, low, high) / length,
         "aligned": 1.0 - np.exp(-outside / SURE),
         "outer": 1.0 - np.exp(-(stretch(evidence.outer[side], position, low - REACH, high + REACH)) / SURE),
         "stub": 1.0 - np.exp(-stub / 10.0),

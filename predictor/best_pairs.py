@@ -4,11 +4,13 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
 
-PAIR_FEATURES = ("overlap", "same depth", "shared wall", "strip between")
+PAIR_FEATURES = ("overlap", "same depth", "shared wall", "strip between", "gap between")
 # Slack of the thickness of the wall between two rooms [cells].
 SLACK = 6
 # A strip narrower than this between two rooms is no room of its own [cells], 1.8 m.
 STRIP = 36
+# Unknown space up to this wide between two rooms would need a door of its own [cells], 5 m.
+GAP = 100
 
 
 def pair_features(a: IntArray, b: IntArray, back: tuple[int, int] | None, thickness: int) -> FloatArray:
@@ -33,12 +35,14 @@ def pair_features(a: IntArray, b: IntArray, back: tuple[int, int] | None, thickn
     overlap = grown.prod(axis=-1) / np.minimum(areas[0], areas[1])
     wall = np.zeros(overlap.shape)
     strip = np.zeros(overlap.shape)
+    wide = np.zeros(overlap.shape)
     for axis in (0, 1):
         gap, along = -shared[..., axis], np.maximum(shared[..., 1 - axis], 0.0)
         share = along / sizes[0][..., 1 - axis] + along / sizes[1][..., 1 - axis]
         wall += np.where((gap >= -2) & (gap <= thickness + SLACK), share, 0.0)
         strip += np.where((gap > thickness + SLACK) & (gap <= thickness + STRIP), share, 0.0)
+        wide += np.where((gap > thickness + STRIP) & (gap <= thickness + GAP), share, 0.0)
     depth = np.zeros(overlap.shape)
     if back is not None:
         depth = np.exp(-np.abs(a_[..., back[0]] - b_[..., back[1]]) / 4.0)
-    return np.stack((overlap + 0.2 * (overlap > 0.03), depth, wall, strip), axis=-1)
+    return np.stack((overlap + 0.2 * (overlap > 0.03), depth, wall, strip, wide), axis=-1)

@@ -16,15 +16,18 @@ SIDE_WEIGHTS: dict[str, float] = {
     "side closed": 0.9,
     "side tight": 0.84,
     "side sliver": -1.8,
+    "side gap": -0.5,
     "side aligned": 0.78,
     "side middle": 1.92,
     "side stub": 2.72,
     "back closed": 2.2,
     "back tight": 2.4,
     "back sliver": -1.5,
+    "back gap": -0.5,
     "back aligned": 2.0,
     "log depth squared": -1.28,
     "outside": -0.5,
+    "outside area": -1.5,
     "side free": -0.7,
     "back free": -1.3,
     "near aligned": 1.36,
@@ -36,10 +39,11 @@ SIDE_WEIGHTS: dict[str, float] = {
 }
 
 PAIR_WEIGHTS: dict[str, float] = {
-    "overlap": -20,
+    "overlap": -20.0,
     "same depth": 3.2,
     "shared wall": 0.324,
-    "strip between": -1,
+    "strip between": -1.0,
+    "gap between": -0.3,
 }
 
 
