@@ -38,8 +38,8 @@ DRIVEN, DRIVEN_AT_LAST = 1.2, 2.5
 LOOKED_INTO, GLIMPSED, SETTLED = 0.6, 0.15, 3.0
 # Difference of prediction and observation, in free area, that calls for a revision or for another tour [m2].
 SURPRISE = 1.0
-# How often the prediction is compared with the map [s].
-COMPARE_INTERVAL = 1.0
+# How often the path is held against the map, and the prediction against the map [s].
+CHECK_INTERVAL, COMPARE_INTERVAL = 1.0, 2.0
 # The path is checked this far ahead [m].
 CHECK_AHEAD = 3.0
 # How far from a vertex the robot may end up where it does not fit on the vertex itself [m].
@@ -140,7 +140,7 @@ class TourGuide:
         self._note_place(pose)
         if driver.state in {"stuck", "recovering"}:
             return driver.command(pose, scan, now)
-        if now - self._checked_at >= self.config.check_interval - 1e-9:
+        if now - self._checked_at >= CHECK_INTERVAL - 1e-9:
             self._check(pose, grid(), now)
         if self._goal is None and not self._next(pose, grid(), now):
             return (0.0, 0.0)
