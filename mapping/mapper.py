@@ -62,6 +62,11 @@ class Mapper:
         """The scans that make the map, oldest first."""
         return self._keyframes
 
+    @property
+    def edges(self) -> Sequence[Edge]:
+        """The measurements that tie the keyframes together."""
+        return self._graph.edges
+
     def process(self, scan: LaserScan, odometry: Pose2, sightings: Sequence[DoorSighting] = ()) -> Pose2:
         """Take in one scan.
 
