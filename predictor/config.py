@@ -37,8 +37,8 @@ class StructureConfig:
     min_segment: float = 0.15
     """Shortest segment kept [m]."""
 
-    max_gap: float = 0.0
-    """Longest gap inside one segment [m]."""
+    max_gap: float = 0.10
+    """Longest gap inside one segment [m]. The authors ran none, on upright maps: slanted walls then fall to pieces."""
 
     angle_bandwidth: float = math.radians(12.0)
     """Half width of the mean shift kernel over wall directions [rad]."""
@@ -51,6 +51,9 @@ class StructureConfig:
 
     min_direction_share: float = 0.03
     """A direction needs this share of the wall of the strongest direction."""
+
+    min_concentration: float = 0.40
+    """A direction needs this share of its longer segments within 3 degrees; noise spreads evenly, to about 0.25."""
 
     collinear_distance: float = 0.35
     """Segments of one direction closer than this belong to one wall [m]."""

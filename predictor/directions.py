@@ -8,6 +8,9 @@ from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.config import StructureConfig
 from closedrooms.predictor.segments import angles_of, lengths_of
 
+# What lies in a direction [rad]: three steps of the Hough transform.
+NARROW = np.radians(3.0)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Directions:
@@ -52,12 +55,16 @@ def find_directions(segments: FloatArray, config: StructureConfig) -> Directions
     needed = max(config.min_direction_length, config.min_direction_share * float(carried.max(initial=0.0)))
     strengths = np.zeros(modes.size)
     np.add.at(strengths, nearest[member], lengths[member])
-    kept = [int(i) for i in np.lexsort((modes, -strengths)) if carried[i] >= needed]
+    aligned = np.zeros(modes.size)
+    centres = np.array([_refine(angles, weights, float(mode)) for mode in modes])
+    close = long & (np.abs(angle_between(angles, centres[nearest])) <= NARROW)
+    np.add.at(aligned, nearest[close], lengths[close])
+    straight = aligned >= config.min_concentration * carried
+    kept = [int(i) for i in np.lexsort((modes, -strengths)) if carried[i] >= needed and straight[i]]
     labels = np.full(len(segments), -1, dtype=np.int64)
     for cluster, mode in enumerate(kept):
         labels[member & (nearest == mode)] = cluster
-    refined = np.array([_refine(angles, weights, modes[i]) for i in kept])
-    return Directions(refined % np.pi, strengths[kept], labels)
+    return Directions(centres[kept] % np.pi, strengths[kept], labels)
 
 
 def _modes(angles: FloatArray, weights: FloatArray, bandwidth: float) -> FloatArray:
@@ -82,14 +89,11 @@ def _modes(angles: FloatArray, weights: FloatArray, bandwidth: float) -> FloatAr
     return np.array(modes)
 
 
-def _refine(angles: FloatArray, weights: FloatArray, mode: float, *, width: float = np.radians(3.0)) -> float:
-    """The weighted mean direction within ``width`` of a mode: coarse directions of short segments left out.
-
-    The width is three steps of the Hough transform.
-    """
+def _refine(angles: FloatArray, weights: FloatArray, mode: float) -> float:
+    """The weighted mean direction within ``NARROW`` of a mode: coarse directions of short segments left out."""
     for _ in range(5):
         offset = angle_between(angles, mode)
-        near = np.abs(offset) <= width
+        near = np.abs(offset) <= NARROW
         if not near.any():
             break
         mode += float((weights[near] * offset[near]).sum() / weights[near].sum())

@@ -61,6 +61,23 @@ def test_directions_near_zero_and_pi_are_one():
     assert abs(float(angle_between(found.angles[0], 0.0))) < 1e-9
 
 
+@pytest.mark.parametrize("slant", [15.0, 20.0, 35.0])
+def test_a_slanted_wing_has_directions_of_its_own(slant):
+    main, wing = math.radians(-8.0), math.radians(-8.0 + slant)
+    segments = [_segment(a, 2.0 * i, 0.0, 5.0) for a in (main, main + math.pi / 2) for i in range(6)]
+    segments += [_segment(a, 2.0 * i, 9.0, 12.0) for a in (wing, wing + math.pi / 2) for i in range(3)]
+    found = find_directions(np.array(segments), CONFIG)
+    assert found.angles.size == 4
+    for wanted in (main, wing, main + math.pi / 2, wing + math.pi / 2):
+        assert np.abs(angle_between(found.angles, wanted)).min() < 0.02
+
+
+def test_segments_in_all_directions_make_none():
+    angles = np.random.default_rng(0).uniform(0.0, math.pi, 300)
+    segments = np.array([_segment(a, float(i), 0.0, 1.0) for i, a in enumerate(angles)])
+    assert find_directions(segments, CONFIG).angles.size == 0
+
+
 def test_short_segments_alone_make_no_direction():
     segments = np.array([_segment(0.8, 0.1 * i, 0.0, 0.3) for i in range(40)])
     assert find_directions(segments, CONFIG).angles.size == 0
