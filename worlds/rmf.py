@@ -188,7 +188,7 @@ def _closers(level: _Level, repairs: list[str]) -> list[Segment]:
         bare = level.floor.boundary.difference(shapely.union_all(lines).buffer(LOOSE_END))
         for line in shapely.get_parts(shapely.line_merge(bare) if bare.geom_type == "MultiLineString" else bare):
             if line.length > LOOSE_END:
-                points = [(round(x, 4), round(y, 4)) for x, y in shapely.get_coordinates(line)]
+                points = [(round(x, 4), round(y, 4)) for x, y in shapely.get_coordinates(line).tolist()]
                 edges += [(a, b) for a, b in itertools.pairwise(points) if math.dist(a, b) > 0.01]
     if loose:
         repairs.append(f"{len(loose)} loose ends of walls closed, up to {LOOSE_END} m")
@@ -205,23 +205,27 @@ def _loose_ends(lines: Sequence[LineString], reach: float = LOOSE_END) -> list[S
     tree = STRtree(lines)
     pieces = []
     for number, line in enumerate(lines):
-        for end in (line.coords[0], line.coords[-1]):
+        first, last = np.array(line.coords[0]), np.array(line.coords[-1])
+        for end, outward in ((first, first - last), (last, last - first)):
             point = shapely.Point(end)
             near = [i for i in np.sort(tree.query(point, predicate="dwithin", distance=reach)) if i != number]
-            distances = [lines[i].distance(point) for i in near]
-            if near and min(distances) > 1e-6:
-                other = lines[near[int(np.argmin(distances))]]
-                foot = other.interpolate(other.project(point))
-                piece = ((round(end[0], 4), round(end[1], 4)), (round(foot.x, 4), round(foot.y, 4)))
-                if math.dist(*piece) > 1e-3:
-                    pieces.append(piece)
+            feet = [np.array(lines[i].interpolate(lines[i].project(point)).coords[0]) for i in near]
+            if any(np.hypot(*(foot - end)) < 1e-6 for foot in feet):
+                continue
+            # What the other end stands on lies behind.
+            ahead = [foot for foot in feet if (foot - end) @ outward >= -1e-6]
+            if ahead:
+                foot = min(ahead, key=lambda foot: float(np.hypot(*(foot - end))))
+                (x0, y0), (x1, y1) = ((round(float(x), 4), round(float(y), 4)) for x, y in (end, foot))
+                if math.dist((x0, y0), (x1, y1)) > 1e-3:
+                    pieces.append(((x0, y0), (x1, y1)))
     return pieces
 
 
 def _rooms(lines: Sequence[BaseGeometry], level: _Level, repairs: list[str]) -> tuple[PlanRoom, ...]:
     """The faces between walls and doors, named after the waypoints in them."""
-    # On a grid of 1 mm, so that feet of loose ends lie on their wall.
-    noded = shapely.union_all(np.array(lines, dtype=object), grid_size=1e-3)
+    # On a grid of 1 cm, so that feet of loose ends and edges of floors lie on their wall.
+    noded = shapely.union_all(np.array(lines, dtype=object), grid_size=0.01)
     faces = [f for f in shapely.get_parts(shapely.polygonize([noded])) if isinstance(f, Polygon)]
     shapes = [f for g in faces for f in shapely.get_parts(g) if isinstance(f, Polygon)]
     named = [(shapely.Point(v), name) for v, name in zip(level.vertices, level.names, strict=True) if name]
