@@ -55,16 +55,22 @@ def find_directions(segments: FloatArray, config: StructureConfig) -> Directions
     needed = max(config.min_direction_length, config.min_direction_share * float(carried.max(initial=0.0)))
     strengths = np.zeros(modes.size)
     np.add.at(strengths, nearest[member], lengths[member])
-    aligned = np.zeros(modes.size)
     centres = np.array([_refine(angles, weights, float(mode)) for mode in modes])
-    close = long & (np.abs(angle_between(angles, centres[nearest])) <= NARROW)
-    np.add.at(aligned, nearest[close], lengths[close])
-    straight = aligned >= config.min_concentration * carried
+    straight = _concentration(angles, lengths, centres, config) >= config.min_concentration
     kept = [int(i) for i in np.lexsort((modes, -strengths)) if carried[i] >= needed and straight[i]]
     labels = np.full(len(segments), -1, dtype=np.int64)
     for cluster, mode in enumerate(kept):
         labels[member & (nearest == mode)] = cluster
     return Directions(centres[kept] % np.pi, strengths[kept], labels)
+
+
+def _concentration(angles: FloatArray, lengths: FloatArray, centres: FloatArray, config: StructureConfig) -> FloatArray:
+    """Share of the longer segments around each direction that lies in it, shape (k,)."""
+    long = lengths >= config.direction_segment
+    apart = np.abs(angle_between(angles[long][:, None], centres[None, :]))  # (long, k)
+    within = lengths[long] @ (apart <= NARROW)
+    around = lengths[long] @ (apart <= config.angle_bandwidth)
+    return np.asarray(within / np.maximum(around, 1e-12), dtype=np.float64)
 
 
 def _modes(angles: FloatArray, weights: FloatArray, bandwidth: float) -> FloatArray:
