@@ -25,7 +25,8 @@ def main() -> None:
     parser.add_argument("worlds", nargs="*", default=WORLDS)
     parser.add_argument("--record", action="store_true", help="with the recording")
     options = parser.parse_args()
-    print(f"{'world':<24}{'size':>12}{'scans':>7}" + "".join(f"{stage:>12}" for stage in STAGES) + f"{'x real time':>13}")
+    heads = "".join(f"{stage:>12}" for stage in STAGES)
+    print(f"{'world':<24}{'size':>12}{'scans':>7}{heads}{'x real time':>13}")
     for name in options.worlds:
         x_min, y_min, x_max, y_max = wall_area(load_world(name)).bounds
         with tempfile.TemporaryDirectory() as folder:

@@ -187,6 +187,9 @@ class ShowWorld:
     out: Path
     """Picture to write (PNG)."""
 
+    level: str | None = None
+    """Which level of a file with several."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class GenerateWorld:
@@ -201,6 +204,9 @@ class GenerateWorld:
     seed: int = 0
     """Same kind, seed and generator version: the same building."""
 
+    furniture: bool = False
+    """Put furniture into the rooms."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ConvertWorld:
@@ -213,7 +219,10 @@ class ConvertWorld:
     """File to write."""
 
     to: str
-    """Format to write."""
+    """Format to write: json, rosmap, sdf or stage."""
+
+    level: str | None = None
+    """Which level of a file with several."""
 
 
 WORLD_ACTIONS: dict[str, tuple[str, type[ListWorlds | ShowWorld | GenerateWorld | ConvertWorld]]] = {

@@ -18,10 +18,10 @@ def act(config: ListWorlds | ShowWorld | GenerateWorld | ConvertWorld) -> Iterab
         case ListWorlds():
             return list_worlds()
         case ShowWorld():
-            show_world(config.world, config.out)
+            show_world(config.world, config.out, level=config.level)
         case GenerateWorld():
-            generate_world(config.kind, config.seed, config.out)
+            generate_world(config.kind, config.seed, config.out, furniture=config.furniture)
         case ConvertWorld():
-            convert_world(config.source, config.destination, config.to)
+            convert_world(config.source, config.destination, config.to, level=config.level)
             return [f"written to {config.destination}"]
     return [f"written to {config.out}"]

@@ -1,0 +1,96 @@
+"""Whole simulated runs, on the smallest bundled world."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from closedrooms.core.geojson import read_doors, read_features, read_rooms
+from closedrooms.core.rosmap import read_map
+from closedrooms.core.tum import read_trajectory
+from closedrooms.mapping.recorded import read_run
+from closedrooms.pipeline.commands import main
+from closedrooms.pipeline.config import RunConfig, sim_config
+from closedrooms.pipeline.run import choose_closed
+from closedrooms.sim.config import NOISE_LEVELS, LidarConfig, NoiseConfig, SimConfig
+from closedrooms.worlds.library import DEFAULT_WORLD, load_world
+
+FILES = {
+    "run.json", "map.yaml", "map.png", "predicted.yaml", "predicted.png", "truth.yaml", "truth.png", "doors.geojson",
+    "rooms.geojson", "truth_rooms.geojson", "trajectory.tum", "trajectory_truth.tum", "tour.geojson", "summary.png",
+}  # fmt: skip
+
+
+def test_runs_the_default_world_of_the_library() -> None:
+    assert RunConfig().world == DEFAULT_WORLD
+
+
+def test_names_set_noise_and_lidar_and_single_numbers_win() -> None:
+    assert sim_config(RunConfig(noise="high")).noise == NOISE_LEVELS["high"]
+    own = NoiseConfig(range_sd=0.2)
+    assert sim_config(RunConfig(noise="high", sim=SimConfig(noise=own))).noise == own
+    assert sim_config(RunConfig(lidar="sick-lms111")).lidar.beams == 541
+    assert sim_config(RunConfig(lidar="sick-lms111", sim=SimConfig(lidar=LidarConfig(beams=90)))).lidar.beams == 90
+
+
+def test_the_seed_draws_the_rooms_to_close() -> None:
+    plan = load_world("office-07")
+    first, again, other = (choose_closed(plan, RunConfig(seed=seed)) for seed in (1, 1, 2))
+    assert len(first) == 5
+    assert first == again
+    assert first != other
+    assert choose_closed(plan, RunConfig(close=0)) == ()
+    assert choose_closed(plan, RunConfig(close_doors=" , ".join(first))) == first
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    base = tmp_path_factory.mktemp("runs")
+    for name in ("a", "b"):
+        words = ["run", "office-01", "--close", "2", "--seed", "1", "--keep-scans", "--out", str(base / name)]
+        assert main(words) == 0
+    return base / "a", base / "b"
+
+
+@pytest.mark.slow
+def test_a_run_leaves_every_file_in_one_frame_with_usable_figures(runs: tuple[Path, Path]) -> None:
+    folder, _ = runs
+    assert {path.name for path in folder.iterdir()} == FILES | {"run.rrd", "scans.npz"}
+    grids = [read_map(folder / f"{name}.yaml") for name in ("map", "predicted", "truth")]
+    assert len({grid.frame for grid in grids}) == 1
+    record = json.loads((folder / "run.json").read_text())
+    metrics = record["metrics"]
+    assert metrics["area_mapped"] > 0.97
+    assert metrics["ate_m"] < 0.10
+    doors, rooms = read_doors(folder / "doors.geojson"), read_rooms(folder / "rooms.geojson")
+    assert sorted(door.id for door in doors) == record["closed"]
+    assert sorted(metrics["room_iou"]) == record["closed"]
+    assert {door for room in rooms for door in room.doors} <= set(record["closed"])
+    assert {properties["map"] for _, properties in read_features(folder / "tour.geojson")} == {
+        "closed", "predicted", "truth",
+    }  # fmt: skip
+    stamps, poses = read_trajectory(folder / "trajectory.tum")
+    assert len(stamps) == len(poses) == len(read_run(folder / "scans.npz").scans)
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_files(runs: tuple[Path, Path]) -> None:
+    a, b = runs
+    for name in sorted((FILES | {"scans.npz"}) - {"run.json"}):
+        assert (a / name).read_bytes() == (b / name).read_bytes(), name
+    records = [json.loads((folder / "run.json").read_text()) for folder in runs]
+    for record in records:
+        record.pop("durations")
+    assert records[0] == records[1]
+    rerun = Path(sys.executable).parent / "rerun"
+    subprocess.run([rerun, "rrd", "compare", a / "run.rrd", b / "run.rrd"], check=True, capture_output=True)
+
+
+@pytest.mark.slow
+def test_a_run_without_closed_doors_says_so_and_completes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "office-01", "--close", "0", "--no-record", "--out", str(tmp_path / "out")]) == 0
+    assert "no door was closed" in capsys.readouterr().out
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["metrics"]["room_iou_mean"] is None
+    assert not (tmp_path / "out" / "run.rrd").exists()
