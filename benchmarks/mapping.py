@@ -230,9 +230,7 @@ def main() -> None:
         print(f"\n### Parts, on {options.logs[0].name}")
         bench_parts(read_run(options.logs[0]))
     if options.worlds:
-        print(
-            "\n| world | noise | status | scans | odometry | ATE without loops | with | loops | known | with | scans/s |"
-        )
+        print("\n| world | noise | status | scans | odometry | no loops | loops | closed | known | with | scans/s |")
         print("| --- " * 11 + "|")
     for noise in options.noise:
         for world in options.worlds:
