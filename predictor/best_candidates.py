@@ -18,7 +18,8 @@ SLIVER = 36
 GAP = 100
 # A wall face with nothing known for this far behind it belongs to the outline of the building [cells], 4 m.
 OUTER = 80
-# Alignment is looked for this far [cells], 20 m, and is half sure after 1.4 m of wall.
+# Alignment is looked for this far along a side [cells], 20 m, twice as far along a back wall, which a whole row of
+# rooms may share; 3 m of wall make it sure by 1 - 1/e.
 REACH, SURE = 400, 60.0
 # A rectangle may reach over known space up to this share: the room is what remains.
 MAX_OVERLAP = 0.3
@@ -49,6 +50,7 @@ FEATURES = (
     "log depth squared",
     "outside",
     "outside area",
+    "lone outside",
     "passage end",
     "width seen",
     "depth seen",
@@ -222,7 +224,7 @@ def _positions(
     v0, u = entry.v0, entry.u
     if side == "top":
         low, high = v0 + 20, int(v0 + reach)
-        along = (int(u) - REACH, int(u) + REACH)
+        along = (int(u) - 2 * REACH, int(u) + 2 * REACH)
         near = (int(u) - 60, int(u) + 60)
     else:
         low, high = (int(u) + 4, int(u + reach)) if side == "right" else (int(u - reach), int(u) - 4)
@@ -309,6 +311,9 @@ def describe(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int,
     columns["depth seen"] = evidence.seen["depth"][np.clip(v1 - v0, 0, last)]
     columns["log depth squared"] = np.log(depth * cell / 6.0) ** 2
     columns["outside"] = _outside(frame, boxes)
+    # A row of doors announces a row of rooms; a lone door in the outline leads to a porch, stairs or a closet.
+    lone = entry.left is None and entry.right is None
+    columns["lone outside"] = columns["outside"] * np.log(area / 4.0) * lone
     columns["outside area"] = columns["outside"] * np.maximum(np.log(area / 4.0), 0.0)
     return np.stack([columns[name] for name in FEATURES], axis=-1)
 
@@ -327,8 +332,9 @@ def _outside(frame: DoorFrame, boxes: IntArray) -> FloatArray:
 def _side(evidence: Evidence, side: str, position: IntArray, low: IntArray, high: IntArray) -> dict[str, FloatArray]:
     """Evidence of one side of each rectangle, all between 0 and 1."""
     length = np.maximum(high - low, 1).astype(float)
+    reach = 2 * REACH if side == "top" else REACH
     own = stretch(evidence.same[side], position, low, high)
-    outside = stretch(evidence.same[side], position, low - REACH, high + REACH) - own
+    outside = stretch(evidence.same[side], position, low - reach, high + reach) - own
     beyond_own = stretch(evidence.tight[side], position, low, high)
     closed = stretch(evidence.closed[side], position, low, high) / length
     sliver = stretch(evidence.sliver[side], position, low, high) / length
@@ -340,7 +346,7 @@ def _side(evidence: Evidence, side: str, position: IntArray, low: IntArray, high
         "sliver": sliver,
         "gap": stretch(evidence.gap[side], position, low, high) / length,
         "aligned": 1.0 - np.exp(-outside / SURE),
-        "outer": 1.0 - np.exp(-(stretch(evidence.outer[side], position, low - REACH, high + REACH)) / SURE),
+        "outer": 1.0 - np.exp(-(stretch(evidence.outer[side], position, low - reach, high + reach)) / SURE),
         "stub": 1.0 - np.exp(-stub / 10.0),
         "free": np.maximum(1.0 - closed - sliver, 0.0),
     }

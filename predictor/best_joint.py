@@ -14,7 +14,7 @@ from closedrooms.predictor.best_weights import PAIR_WEIGHTS, weights_of
 SHORTLIST = 60
 # Rounds of the search, which stopped after 3 to 5 on every map.
 ROUNDS = 20
-# Doors further apart than this share their depth by a factor 1/e less [cells], 10 m.
+# Doors further apart than this share depth and width by a factor 1/e less [cells], 10 m.
 DEPTH_REACH = 200.0
 
 
@@ -133,7 +133,8 @@ def _pair(a: Suspect, b: Suspect, thickness: int, same_wall: float) -> FloatArra
         back = (column, column)
     features = pair_features(a.boxes, b.boxes, back, thickness)
     if back is not None:
-        features[..., 1] *= np.exp(-abs(a.u - b.u) / DEPTH_REACH)
+        for column in (PAIR_FEATURES.index("same depth"), PAIR_FEATURES.index("same width")):
+            features[..., column] *= np.exp(-abs(a.u - b.u) / DEPTH_REACH)
     return np.asarray(features @ weights)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
 
-PAIR_FEATURES = ("overlap", "same depth", "shared wall", "strip between", "gap between")
+PAIR_FEATURES = ("overlap", "same depth", "shared wall", "strip between", "gap between", "same width")
 # Slack of the thickness of the wall between two rooms [cells].
 SLACK = 6
 # A strip narrower than this between two rooms is no room of its own [cells], 1.8 m.
@@ -42,7 +42,9 @@ def pair_features(a: IntArray, b: IntArray, back: tuple[int, int] | None, thickn
         wall += np.where((gap >= -2) & (gap <= thickness + SLACK), share, 0.0)
         strip += np.where((gap > thickness + SLACK) & (gap <= thickness + STRIP), share, 0.0)
         wide += np.where((gap > thickness + STRIP) & (gap <= thickness + GAP), share, 0.0)
-    depth = np.zeros(overlap.shape)
+    depth, width = np.zeros(overlap.shape), np.zeros(overlap.shape)
     if back is not None:
         depth = np.exp(-np.abs(a_[..., back[0]] - b_[..., back[1]]) / 4.0)
-    return np.stack((overlap + 0.2 * (overlap > 0.03), depth, wall, strip, wide), axis=-1)
+        axis = 1 - back[0] % 2
+        width = np.exp(-np.abs(sizes[0][..., axis] - sizes[1][..., axis]) / 8.0)
+    return np.stack((overlap + 0.2 * (overlap > 0.03), depth, wall, strip, wide, width), axis=-1)
