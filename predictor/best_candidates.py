@@ -21,8 +21,8 @@ OUTER = 80
 # Alignment is looked for this far along a side [cells], 20 m, twice as far along a back wall, which a whole row of
 # rooms may share; 3 m of wall make it sure by 1 - 1/e.
 REACH, SURE = 400, 60.0
-# Rectangles that known space takes more of than this are no rooms. Of 0.1, 0.15, 0.2 and 0.3, this one lost nothing on a
-# third of the authors' maps and gained most on the bundled worlds: larger ones reach round the corner of known rooms.
+# A rectangle may reach over known space up to this share: the room is what remains. Of 0.1, 0.15, 0.2 and 0.3 this one
+# lost nothing on a third of the authors' maps and gained most on the bundled worlds: larger ones reach round corners.
 MAX_OVERLAP = 0.15
 
 FEATURES = (
