@@ -8,12 +8,34 @@ import os
 import sys
 from argparse import ArgumentError, ArgumentParser
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from closedrooms.core.errors import ClosedroomsError
 
 if TYPE_CHECKING:
     from closedrooms.pipeline.config import RunConfig
+    from closedrooms.pipeline.terminal import Terminal
+
+
+class Result(Protocol):
+    """What every command that writes a folder returns."""
+
+    @property
+    def folder(self) -> Path:
+        """What was written."""
+
+    @property
+    def title(self) -> str:
+        """Head of the table."""
+
+    @property
+    def failures(self) -> dict[str, str]:
+        """What failed and why."""
+
+    def table(self) -> Sequence[Sequence[str]]:
+        """Rows; the first is the head."""
+
 
 DONE, BAD_INPUT, WRONG_USAGE, PARTLY_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -115,18 +137,24 @@ def _named_presets(words: Sequence[str]) -> "RunConfig":
     return RunConfig(sim=replace(RunConfig().sim, noise=noise, lidar=lidar))
 
 
+def _report(work: "Callable[[Terminal], Result]") -> int:
+    """Do the work with progress on the terminal, then print its table and where it was written."""
+    from closedrooms.pipeline.terminal import Terminal
+
+    with Terminal() as terminal:
+        result = work(terminal)
+    terminal.table(result.title, result.table())
+    terminal.say(f"written to {result.folder}")
+    return PARTLY_FAILED if result.failures else DONE
+
+
 def _run(words: Sequence[str]) -> int:
     from closedrooms.pipeline.config import RunConfig
 
     config = _parse(RunConfig, "run", words, COMMANDS["run"][0], default=_named_presets(words))
     from closedrooms.pipeline.run import run
-    from closedrooms.pipeline.terminal import Terminal
 
-    with Terminal() as terminal:
-        result = run(config, progress=terminal)
-    terminal.table(result.title, result.table())
-    terminal.say(f"written to {result.folder}")
-    return PARTLY_FAILED if result.failures else DONE
+    return _report(lambda terminal: run(config, progress=terminal))
 
 
 def _predict(words: Sequence[str]) -> int:
@@ -134,13 +162,8 @@ def _predict(words: Sequence[str]) -> int:
 
     config = _parse(PredictConfig, "predict", words, COMMANDS["predict"][0])
     from closedrooms.pipeline.predict_map import predict_map
-    from closedrooms.pipeline.terminal import Terminal
 
-    with Terminal() as terminal:
-        result = predict_map(config, progress=terminal)
-    terminal.table(result.title, result.table())
-    terminal.say(f"written to {result.folder}")
-    return PARTLY_FAILED if result.failures else DONE
+    return _report(lambda terminal: predict_map(config, progress=terminal))
 
 
 def _cover(words: Sequence[str]) -> int:
@@ -148,13 +171,8 @@ def _cover(words: Sequence[str]) -> int:
 
     config = _parse(CoverConfig, "cover", words, COMMANDS["cover"][0])
     from closedrooms.pipeline.cover_map import cover_map
-    from closedrooms.pipeline.terminal import Terminal
 
-    with Terminal() as terminal:
-        result = cover_map(config, progress=terminal)
-    terminal.table(result.title, result.table())
-    terminal.say(f"written to {result.folder}")
-    return PARTLY_FAILED if result.failures else DONE
+    return _report(lambda terminal: cover_map(config, progress=terminal))
 
 
 def _map(words: Sequence[str]) -> int:
@@ -162,13 +180,8 @@ def _map(words: Sequence[str]) -> int:
 
     config = _parse(MapConfig, "map", words, COMMANDS["map"][0])
     from closedrooms.pipeline.map_log import map_log
-    from closedrooms.pipeline.terminal import Terminal
 
-    with Terminal() as terminal:
-        result = map_log(config, progress=terminal)
-    terminal.table(result.title, result.table())
-    terminal.say(f"written to {result.folder}")
-    return PARTLY_FAILED if result.failures else DONE
+    return _report(lambda terminal: map_log(config, progress=terminal))
 
 
 def _worlds(words: Sequence[str]) -> int:
@@ -196,13 +209,8 @@ def _evaluate(words: Sequence[str]) -> int:
 
     config = _parse(EvaluateConfig, "evaluate", words, COMMANDS["evaluate"][0])
     from closedrooms.pipeline.evaluate import evaluate
-    from closedrooms.pipeline.terminal import Terminal
 
-    with Terminal() as terminal:
-        result = evaluate(config, progress=terminal)
-    terminal.table(result.title, result.table())
-    terminal.say(f"written to {result.folder}")
-    return PARTLY_FAILED if result.failures else DONE
+    return _report(lambda terminal: evaluate(config, progress=terminal))
 
 
 COMMANDS: dict[str, tuple[str, Callable[[Sequence[str]], int]]] = {
