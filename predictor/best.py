@@ -25,6 +25,7 @@ from closedrooms.predictor.best_weights import SIDE_WEIGHTS, weights_of
 from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.inpaint import inpaint, passage
 from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
+from closedrooms.predictor.start import duplicates
 from closedrooms.predictor.window import at_resolution, known_window
 
 # Cells that the evidence is counted in [m], that of the maps tuned on.
@@ -106,7 +107,7 @@ def _face_all(
     """Maps turned along each direction in use, the doors in them, and the doors that face nothing."""
     turned = {float(directions.angles[0]): turn_map(grid, float(directions.angles[0]), margin=MARGIN)}
     facings: list[Facing] = []
-    failures = _same_place(doors, config.same_door)
+    failures = duplicates(doors, config.same_door)
     for door in doors:
         if door.id in failures:
             continue
@@ -119,19 +120,6 @@ def _face_all(
         else:
             failures[door.id] = found
     return turned, facings, failures
-
-
-def _same_place(doors: Sequence[ClosedDoor], distance: float) -> dict[str, str]:
-    """Doors at the place of another one, of which that with the smallest id stays."""
-    failures: dict[str, str] = {}
-    kept: list[ClosedDoor] = []
-    for door in sorted(doors, key=lambda d: (d.id, d.midpoint)):
-        same = [k.id for k in kept if np.hypot(*np.subtract(k.midpoint, door.midpoint)) < distance]
-        if same:
-            failures[door.id] = f"at the same place as door {same[0]}"
-        else:
-            kept.append(door)
-    return failures
 
 
 def _suspect_all(turned: dict[float, TurnedMap], facings: list[Facing], thickness: int) -> dict[str, Suspect]:

@@ -61,7 +61,7 @@ def start_rooms(
     structure = find_structure(working, config)
     if structure is None:
         return None, {door.id: "the map holds no wall line" for door in doors}
-    failures = _duplicates(doors, config.same_door)
+    failures = duplicates(doors, config.same_door)
     waiting = [door for door in doors if door.id not in failures]
     arrangement, unknown, found = _split_until_apart(working, structure, waiting, config)
     failures |= {door: reason for door, reason in found.items() if isinstance(reason, str)}
@@ -91,8 +91,13 @@ def _split_until_apart(
         lines += splits
 
 
-def _duplicates(doors: Sequence[ClosedDoor], distance: float) -> dict[str, str]:
-    """Doors at the place of another one, of which that with the smallest id stays."""
+def duplicates(doors: Sequence[ClosedDoor], distance: float) -> dict[str, str]:
+    """Doors at the place of another one, of which that with the smallest id stays: the reason by door id.
+
+    Args:
+        doors: Closed doors in any order.
+        distance: Doors closer than this are the same door [m].
+    """
     failures: dict[str, str] = {}
     kept: list[ClosedDoor] = []
     for door in sorted(doors, key=lambda d: (d.id, d.midpoint)):
