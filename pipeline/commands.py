@@ -205,10 +205,10 @@ def _worlds(words: Sequence[str]) -> int:
 
 
 def _evaluate(words: Sequence[str]) -> int:
-    from closedrooms.pipeline.evaluate_config import EvaluateConfig
+    from closedrooms.pipeline.evaluation.config import EvaluateConfig
 
     config = _parse(EvaluateConfig, "evaluate", words, COMMANDS["evaluate"][0])
-    from closedrooms.pipeline.evaluate import evaluate
+    from closedrooms.pipeline.evaluation.evaluate import evaluate
 
     return _report(lambda terminal: evaluate(config, progress=terminal))
 

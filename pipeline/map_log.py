@@ -136,8 +136,8 @@ def _recording(config: MapConfig, run: RecordedRun, path: Path) -> Iterator[Obse
     if not config.record:
         yield NoObserver()
         return
-    from closedrooms.pipeline.blueprint import Layout
-    from closedrooms.pipeline.record import Recorder
+    from closedrooms.pipeline.recording.blueprint import Layout
+    from closedrooms.pipeline.recording.recorder import Recorder
 
     layout = Layout(building=False, prediction=False, coverage=False, reference=run.reference is not None)
     with Recorder(path, name=config.log.name.split(".")[0], layout=layout) as recorder:

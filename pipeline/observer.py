@@ -1,6 +1,6 @@
 """Who may watch a run: the calls that a stage makes, and the observer that does nothing.
 
-The algorithms call these methods and know nothing of drawing; :mod:`closedrooms.pipeline.record` is the one
+The algorithms call these methods and know nothing of drawing; :mod:`closedrooms.pipeline.recording.recorder` is the one
 implementation that writes a file. Nothing heavy is imported here.
 """
 

@@ -105,8 +105,8 @@ def _recording(config: PredictConfig, grid: OccupancyGrid, path: Path) -> Iterat
     if not config.record:
         yield NoObserver()
         return
-    from closedrooms.pipeline.blueprint import Layout
-    from closedrooms.pipeline.record import Recorder
+    from closedrooms.pipeline.recording.blueprint import Layout
+    from closedrooms.pipeline.recording.recorder import Recorder
 
     row, col, rows, cols = grid.known_bounds() or (0, 0, *grid.frame.shape)
     bounds = grid.frame.cropped(row, col, rows, cols).bounds

@@ -206,8 +206,8 @@ def recording(config: RunConfig, plan: FloorPlan, path: Path) -> Iterator[Observ
     if not config.record:
         yield NoObserver()
         return
-    from closedrooms.pipeline.blueprint import Layout
-    from closedrooms.pipeline.record import Recorder
+    from closedrooms.pipeline.recording.blueprint import Layout
+    from closedrooms.pipeline.recording.recorder import Recorder
 
     x_min, y_min, x_max, y_max = truth_bounds(plan, Pose2())
     reach = max(x_max - x_min, y_max - y_min) / 2

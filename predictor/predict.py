@@ -34,7 +34,7 @@ def predict(
         The completed map on the lattice of the input, the rooms in the order of the doors, failures by door id.
     """
     if config.preset == "best":
-        from closedrooms.predictor.best import predict_best
+        from closedrooms.predictor.best.solve import predict_best
 
         return predict_best(grid, doors, config, trace)
     wanted = config.keep_trace if trace is None else trace

@@ -15,10 +15,10 @@ from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyG
 from closedrooms.core.room import Room
 from closedrooms.core.rosmap import write_map
 from closedrooms.pipeline.commands import main
-from closedrooms.pipeline.evaluate import evaluate
-from closedrooms.pipeline.evaluate_config import EvaluateConfig
-from closedrooms.pipeline.evaluation_report import bootstrap
-from closedrooms.pipeline.samples import find_samples
+from closedrooms.pipeline.evaluation.config import EvaluateConfig
+from closedrooms.pipeline.evaluation.evaluate import evaluate
+from closedrooms.pipeline.evaluation.report import bootstrap
+from closedrooms.pipeline.evaluation.samples import find_samples
 
 
 def write_sample(folder: Path, *, width: int = 100) -> None:

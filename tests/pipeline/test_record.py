@@ -19,11 +19,12 @@ from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyG
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.core.scan import LaserScan
-from closedrooms.pipeline import colours, drawables
-from closedrooms.pipeline.blueprint import Layout
+from closedrooms.pipeline import colours
 from closedrooms.pipeline.observer import NoObserver, Observer
-from closedrooms.pipeline.record import Recorder
-from closedrooms.pipeline.recording_stream import Stage
+from closedrooms.pipeline.recording import drawables
+from closedrooms.pipeline.recording.blueprint import Layout
+from closedrooms.pipeline.recording.recorder import Recorder
+from closedrooms.pipeline.recording.stream import Stage
 from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom, Wall
 

@@ -6,7 +6,7 @@ from shapely.geometry import box
 
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.pipeline.scores import added_rooms, hidden_area, hidden_rooms, iou, matched_iou, room_masks
+from closedrooms.pipeline.evaluation.scores import added_rooms, hidden_area, hidden_rooms, iou, matched_iou, room_masks
 
 FRAME = GridFrame(0.05, 0.0, 0.0, 120, 240)
 

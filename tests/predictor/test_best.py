@@ -10,7 +10,7 @@ from shapely.geometry import Polygon, box
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
-from closedrooms.predictor.best import predict_best
+from closedrooms.predictor.best.solve import predict_best
 from closedrooms.predictor.config import preset
 
 CONFIG = preset("best")

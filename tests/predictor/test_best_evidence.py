@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.predictor.best_candidates import stretch
-from closedrooms.predictor.best_directions import find_wall_directions
-from closedrooms.predictor.best_frame import count, door_frame, integral, turn_map, wall_faces
-from closedrooms.predictor.best_joint import Suspect, choose
-from closedrooms.predictor.best_pairs import PAIR_FEATURES, pair_features
-from closedrooms.predictor.best_thickness import DEFAULT, wall_thickness
+from closedrooms.predictor.best.candidates import stretch
+from closedrooms.predictor.best.directions import find_wall_directions
+from closedrooms.predictor.best.frame import count, door_frame, integral, turn_map, wall_faces
+from closedrooms.predictor.best.joint import Suspect, choose
+from closedrooms.predictor.best.pairs import PAIR_FEATURES, pair_features
+from closedrooms.predictor.best.thickness import DEFAULT, wall_thickness
 
 MASKS = hnp.arrays(np.bool_, st.tuples(st.integers(3, 12), st.integers(3, 12)))
 EDGES = st.integers(-3, 15)

@@ -8,8 +8,8 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
-from closedrooms.predictor.best_candidates import Entry
-from closedrooms.predictor.best_frame import DoorFrame, TurnedMap
+from closedrooms.predictor.best.candidates import Entry
+from closedrooms.predictor.best.frame import DoorFrame, TurnedMap
 
 # Doors whose walls are closer than this belong to one wall [cells], 1.5 m.
 SAME_WALL = 30

@@ -11,9 +11,10 @@ from shapely.geometry.base import BaseGeometry
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.pipeline import colours, drawables
+from closedrooms.pipeline import colours
 from closedrooms.pipeline.colours import Colour
-from closedrooms.pipeline.recording_stream import RecordingStream, Stage
+from closedrooms.pipeline.recording import drawables
+from closedrooms.pipeline.recording.stream import RecordingStream, Stage
 
 if TYPE_CHECKING:
     from closedrooms.coverage.tour import CoverageTour

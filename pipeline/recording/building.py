@@ -9,8 +9,9 @@ from shapely.geometry import MultiPolygon, Polygon
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.pose import Pose2
-from closedrooms.pipeline import colours, drawables
-from closedrooms.pipeline.recording_stream import RecordingStream
+from closedrooms.pipeline import colours
+from closedrooms.pipeline.recording import drawables
+from closedrooms.pipeline.recording.stream import RecordingStream
 from closedrooms.sim.building import DOOR_HEIGHT, FURNITURE_HEIGHT
 from closedrooms.sim.config import SimConfig
 from closedrooms.sim.leaves import Leaf, door_leaves

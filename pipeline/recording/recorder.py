@@ -16,14 +16,15 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.core.scan import LaserScan
-from closedrooms.pipeline import colours, drawables
-from closedrooms.pipeline.blueprint import Bounds, Layout
-from closedrooms.pipeline.recording_prediction import draw_doors, draw_input, draw_rooms, draw_tours, draw_trace
-from closedrooms.pipeline.recording_stream import RecordingStream, Stage
+from closedrooms.pipeline import colours
+from closedrooms.pipeline.recording import drawables
+from closedrooms.pipeline.recording.blueprint import Bounds, Layout
+from closedrooms.pipeline.recording.prediction import draw_doors, draw_input, draw_rooms, draw_tours, draw_trace
+from closedrooms.pipeline.recording.stream import RecordingStream, Stage
 
 if TYPE_CHECKING:
     from closedrooms.coverage.tour import CoverageTour
-    from closedrooms.pipeline.recording_building import RecordedBuilding
+    from closedrooms.pipeline.recording.building import RecordedBuilding
     from closedrooms.predictor.prediction import Prediction
     from closedrooms.sim.observation import Observation
     from closedrooms.worlds.plan import FloorPlan
@@ -51,7 +52,7 @@ class Recorder:
     """Writes one ``.rrd``; a context manager, see :class:`closedrooms.pipeline.observer.Observer` for its calls.
 
     Timelines: ``sim_time``, a duration [s] by the simulation's or the log's clock, and ``stage``, a sequence over
-    :class:`closedrooms.pipeline.recording_stream.Stage`.
+    :class:`closedrooms.pipeline.recording.stream.Stage`.
     """
 
     def __init__(self, path: Path, *, name: str, layout: Layout, robot_radius: float = 0.2) -> None:
@@ -105,7 +106,7 @@ class Recorder:
 
     def building(self, plan: "FloorPlan", map_T_world: Pose2, closed: Collection[str]) -> None:
         """Walls, floors and doors in three dimensions."""
-        from closedrooms.pipeline.recording_building import RecordedBuilding
+        from closedrooms.pipeline.recording.building import RecordedBuilding
         from closedrooms.worlds.truth import truth_bounds
 
         self._palette = colours.room_colours(closed)

@@ -10,10 +10,10 @@ from typing import Any
 
 from closedrooms.core.errors import OutputError
 from closedrooms.core.files import MANIFEST, PROGRAM, write_json
-from closedrooms.pipeline.evaluate_config import EvaluateConfig
-from closedrooms.pipeline.evaluate_sample import AUTHORS, Scores, evaluate_sample
+from closedrooms.pipeline.evaluation.config import EvaluateConfig
+from closedrooms.pipeline.evaluation.sample import AUTHORS, Scores, evaluate_sample
+from closedrooms.pipeline.evaluation.samples import SamplePath, find_samples
 from closedrooms.pipeline.manifest import resolved, versions
-from closedrooms.pipeline.samples import SamplePath, find_samples
 from closedrooms.pipeline.terminal import Progress, Silent
 
 Job = tuple[SamplePath, str]
@@ -74,7 +74,7 @@ def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Eva
             scores.append(outcome)
         progress.advance(number, f"{number} of {len(jobs)}")
     scores.sort(key=lambda score: (score["method"], score["sample"]))
-    from closedrooms.pipeline.evaluation_report import write_report
+    from closedrooms.pipeline.evaluation.report import write_report
 
     progress.stage("report")
     summary = write_report(config.out, scores, samples, config)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, IntArray
-from closedrooms.predictor.best_frame import TurnedMap, wall_faces
+from closedrooms.predictor.best.frame import TurnedMap, wall_faces
 
 # Walls thicker than this are no walls but shafts [cells], 0.95 m.
 THICKEST = 19

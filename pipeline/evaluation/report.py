@@ -13,8 +13,8 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import write_bytes
 from closedrooms.core.random import stream
-from closedrooms.pipeline.evaluate_config import EvaluateConfig
-from closedrooms.pipeline.samples import SamplePath, read_sample
+from closedrooms.pipeline.evaluation.config import EvaluateConfig
+from closedrooms.pipeline.evaluation.samples import SamplePath, read_sample
 
 Scores = dict[str, Any]
 COLUMNS = ("method", "sample", "closed_doors", "measure", "room", "iou")
@@ -190,7 +190,7 @@ def _draw_case(axes: Any, rooms_path: Path, folder: Path) -> None:
     from shapely.geometry import Polygon
 
     from closedrooms.core.geojson import read_rooms
-    from closedrooms.pipeline.scores import hidden_area
+    from closedrooms.pipeline.evaluation.scores import hidden_area
 
     try:
         sample, rooms = read_sample(folder), read_rooms(rooms_path)

@@ -12,7 +12,7 @@ import rerun as rr
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import OutputError
-from closedrooms.pipeline.blueprint import Layout, arrange
+from closedrooms.pipeline.recording.blueprint import Layout, arrange
 
 APPLICATION = "closedrooms"
 # Chunks are cut by size alone: a cut by wall-clock time would differ from one run to the next.

@@ -14,14 +14,14 @@ from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room, RoomKind
-from closedrooms.predictor.best_candidates import FEATURES, gather, propose
-from closedrooms.predictor.best_directions import WallDirections, find_wall_directions
-from closedrooms.predictor.best_entry import SAME_WALL, Facing, enter, face_door
-from closedrooms.predictor.best_frame import DoorFrame, TurnedMap, door_frame, turn_map
-from closedrooms.predictor.best_joint import SHORTLIST, Suspect, choose
-from closedrooms.predictor.best_shape import room_shape
-from closedrooms.predictor.best_thickness import wall_thickness
-from closedrooms.predictor.best_weights import SIDE_WEIGHTS, weights_of
+from closedrooms.predictor.best.candidates import FEATURES, gather, propose
+from closedrooms.predictor.best.directions import WallDirections, find_wall_directions
+from closedrooms.predictor.best.entry import SAME_WALL, Facing, enter, face_door
+from closedrooms.predictor.best.frame import DoorFrame, TurnedMap, door_frame, turn_map
+from closedrooms.predictor.best.joint import SHORTLIST, Suspect, choose
+from closedrooms.predictor.best.shape import room_shape
+from closedrooms.predictor.best.thickness import wall_thickness
+from closedrooms.predictor.best.weights import SIDE_WEIGHTS, weights_of
 from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.inpaint import inpaint, passage
 from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace

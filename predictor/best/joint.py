@@ -7,8 +7,8 @@ import numpy as np
 import shapely
 
 from closedrooms.core.arrays import FloatArray, IntArray
-from closedrooms.predictor.best_pairs import PAIR_FEATURES, pair_features
-from closedrooms.predictor.best_weights import PAIR_WEIGHTS, weights_of
+from closedrooms.predictor.best.pairs import PAIR_FEATURES, pair_features
+from closedrooms.predictor.best.weights import PAIR_WEIGHTS, weights_of
 
 # Rectangles a door keeps for the joint choice; more changed nothing on the maps tuned on.
 SHORTLIST = 60

@@ -7,8 +7,8 @@ import numpy as np
 from shapely.geometry import Polygon
 
 from closedrooms.core.arrays import BoolArray, FloatArray
-from closedrooms.predictor.best_entry import Facing
-from closedrooms.predictor.best_frame import TurnedMap
+from closedrooms.predictor.best.entry import Facing
+from closedrooms.predictor.best.frame import TurnedMap
 
 # A rectangle that known space takes less of than this stays a rectangle.
 CLEAN = 0.01

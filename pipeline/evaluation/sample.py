@@ -12,10 +12,18 @@ from closedrooms.core.arrays import BoolArray
 from closedrooms.core.errors import ClosedroomsError, OutputError
 from closedrooms.core.files import write_json
 from closedrooms.core.geojson import write_rooms
+from closedrooms.pipeline.evaluation.samples import Sample, SamplePath, read_sample
+from closedrooms.pipeline.evaluation.scores import (
+    added_rooms,
+    hidden_area,
+    hidden_rooms,
+    iou,
+    matched_iou,
+    room_masks,
+    union_of,
+)
 from closedrooms.pipeline.manifest import versions
 from closedrooms.pipeline.metrics import room_iou
-from closedrooms.pipeline.samples import Sample, SamplePath, read_sample
-from closedrooms.pipeline.scores import added_rooms, hidden_area, hidden_rooms, iou, matched_iou, room_masks, union_of
 from closedrooms.predictor.prediction import Prediction
 
 AUTHORS = "authors"
@@ -54,8 +62,12 @@ def evaluate_sample(sample: SamplePath, method: str, out: Path) -> Scores | str:
 def _fingerprint(folder: Path, method: str) -> str:
     """Changes with the input, the method, the versions of libraries and the code that predicts and scores."""
     digest = hashlib.sha256(f"{method} {json.dumps(versions())}".encode())
-    root = Path(__file__).parents[1]
-    code = [*(root / "predictor").rglob("*.py"), *(root / "core").rglob("*.py"), *(root / "pipeline").glob("*s*.py")]
+    root = Path(__file__).parents[2]
+    code = [
+        *(root / "predictor").rglob("*.py"),
+        *(root / "core").rglob("*.py"),
+        *(root / "pipeline" / "evaluation").glob("*.py"),
+    ]
     given = [path for path in folder.glob("*") if path.is_file() and path.suffix in INPUTS]
     for path in [*sorted(code), *sorted(given)]:
         digest.update(path.name.encode() + hashlib.sha256(path.read_bytes()).digest())

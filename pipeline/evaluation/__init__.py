@@ -1,0 +1,1 @@
+"""Methods against the truth on samples of a dataset: scores, tables, pictures."""
