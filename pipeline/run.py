@@ -6,15 +6,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from closedrooms.core.arrays import FloatArray
-from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
 from closedrooms.core.geojson import write_doors, write_features, write_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
-from closedrooms.core.room import Room
 from closedrooms.core.rosmap import write_map
 from closedrooms.core.tum import write_trajectory
 from closedrooms.coverage.cover import plan_coverage
@@ -27,11 +24,12 @@ from closedrooms.mapping.trajectory import ate
 from closedrooms.pipeline.config import RunConfig, predictor_config, sim_config
 from closedrooms.pipeline.drive import DriveResult, drive
 from closedrooms.pipeline.drive_report import draw_drive, drive_features, drive_metrics
-from closedrooms.pipeline.explore import ExplorationResult, explore
+from closedrooms.pipeline.explore import ExplorationResult
 from closedrooms.pipeline.manifest import resolved, versions
 from closedrooms.pipeline.metrics import area_mapped, mean, room_iou, rooms_seen
 from closedrooms.pipeline.observer import NoObserver, Observer
 from closedrooms.pipeline.stopwatch import Stopwatch
+from closedrooms.pipeline.survey import Survey, Truth, survey_building, true_building
 from closedrooms.pipeline.terminal import Progress, Silent
 from closedrooms.pipeline.witness import Witness
 from closedrooms.predictor.predict import predict
@@ -40,30 +38,10 @@ from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.closing import check_closed, closable_rooms, draw_closed
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan
-from closedrooms.worlds.truth import rasterise, reachable, true_rooms, truth_bounds
+from closedrooms.worlds.truth import reachable, truth_bounds
 
 DEFAULT_CLOSED = 5
 START = (0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Survey:
-    """What the robot brought home."""
-
-    grid: OccupancyGrid
-    doors: list[ClosedDoor]
-    exploration: ExplorationResult
-    stamps: FloatArray
-    estimate: FloatArray
-    truth: FloatArray
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Truth:
-    """The building in the map frame, on the frame that holds map, prediction and truth."""
-
-    grid: OccupancyGrid
-    rooms: list[Room]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,12 +114,15 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
         observer.building(plan, map_T_world, closed)
         witness = Witness(sim, progress, keep_scans=config.keep_scans)
         mapper = Mapper(config.mapper)
-        survey = _survey(witness, mapper, config, observer, progress, watch)
+        survey = survey_building(
+            witness, mapper, config.navigation, period=1.0 / config.sim.lidar.rate,
+            observer=observer, progress=progress, watch=watch,
+        )  # fmt: skip
         with watch.stage("predict"):
             progress.stage("predict")
             settings = predictor_config(config)
             prediction = predict(survey.grid, survey.doors, settings, trace=config.record)
-            truth = _truth(plan, closed, prediction, map_T_world)
+            truth = true_building(plan, closed, prediction.grid.frame, map_T_world)
             observer.prediction(survey.grid, survey.doors, prediction)
             observer.truth(truth.grid, truth.rooms)
         frame = truth.grid.frame
@@ -214,32 +195,6 @@ def recording(config: RunConfig, plan: FloorPlan, path: Path) -> Iterator[Observ
     layout = Layout((-reach, -reach, reach, reach), driving=config.drive)
     with Recorder(path, name=f"{plan.name}-{config.seed}", layout=layout) as recorder:
         yield recorder
-
-
-def _survey(
-    witness: Witness, mapper: Mapper, config: RunConfig, observer: Observer, progress: Progress, watch: Stopwatch
-) -> Survey:
-    """Explore and map."""
-    progress.stage("explore")
-    exploration = explore(witness, mapper, config.navigation, observer, period=1.0 / config.sim.lidar.rate)
-    for name, seconds in exploration.wall_seconds.items():
-        watch.add(name, seconds)
-    with watch.stage("finish map"):
-        progress.stage("finish map")
-        mapper.finish()
-        stamps, poses = mapper.trajectory()
-        grid, doors = mapper.grid(), mapper.doors()
-        end = float(stamps[-1])
-        observer.loops(mapper.loops, end)
-        observer.trajectory(stamps, poses)
-        observer.map(grid, end, final=True)
-        observer.doors(doors, end)
-    return Survey(grid, doors, exploration, stamps, poses, witness.truth)
-
-
-def _truth(plan: FloorPlan, closed: Sequence[str], prediction: Prediction, map_T_world: Pose2) -> Truth:
-    frame = prediction.grid.frame.covering(*truth_bounds(plan, map_T_world))
-    return Truth(rasterise(plan, frame, map_T_world), true_rooms(plan, closed, map_T_world))
 
 
 def plan_tours(
