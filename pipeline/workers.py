@@ -1,0 +1,171 @@
+"""The same work for one process, several, or a cluster, behind the executor interface of concurrent.futures."""
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from closedrooms.core.errors import InvalidInputError
+
+Job = TypeVar("Job")
+Outcome = TypeVar("Outcome")
+
+# How often a job is handed out before it is given up: its worker may have been killed for another one's sake.
+TRIES = 3
+# How long a scheduler may take to answer [s].
+PATIENCE = 10.0
+# How often a worker looks whether its parent still lives [s].
+HEARTBEAT = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """In place of an outcome: every worker that was given the job died of it."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Crew(Generic[Job, Outcome]):
+    """Who does the work.
+
+    Attributes:
+        workers: Local processes; 1 works in this process.
+        scheduler: Address of a Dask scheduler, ``tcp://host:port``, or ``None`` for local processes.
+    """
+
+    workers: int = 1
+    scheduler: str | None = None
+
+    def do(self, function: Callable[[Job], Outcome], jobs: Sequence[Job]) -> Iterator[tuple[Job, Outcome | Lost]]:
+        """Outcomes as they come, in no certain order.
+
+        A worker that dies is replaced, and what it was doing is handed out again, at most ``TRIES`` times. On any
+        error, Ctrl-C included, work that has not begun is not begun, and local workers are ended.
+
+        Args:
+            function: What to do; a function of a module, so that it can be sent.
+            jobs: What to do it to; small, since they are sent.
+
+        Raises:
+            InvalidInputError: The scheduler cannot be reached, or Dask is not installed.
+        """
+        if not jobs:
+            return
+        if self.scheduler is not None:
+            with _cluster(self.scheduler) as executor:
+                yield from _outcomes(executor, function, jobs)
+        elif self.workers == 1:
+            for job in jobs:
+                yield job, function(job)
+        else:
+            yield from self._locally(function, jobs)
+
+    def _locally(self, function: Callable[[Job], Outcome], jobs: Sequence[Job]) -> Iterator[tuple[Job, Outcome | Lost]]:
+        tries = dict.fromkeys(range(len(jobs)), 0)
+        while tries:
+            # Jobs that were under way when a worker died are tried one at a time, so that the guilty one is known.
+            suspects = [number for number, count in tries.items() if count > 0]
+            batch = suspects[:1] or list(tries)
+            begun: set[int] = set()
+            try:
+                for number, outcome in self._batch(function, jobs, batch, begun):
+                    del tries[number]
+                    yield jobs[number], outcome
+            except BrokenProcessPool:
+                for number in begun & tries.keys():
+                    tries[number] += 1
+                    if tries[number] >= TRIES:
+                        del tries[number]
+                        yield jobs[number], Lost(f"{TRIES} workers died while they worked on it")
+
+    def _batch(
+        self, function: Callable[[Job], Outcome], jobs: Sequence[Job], batch: Sequence[int], begun: set[int]
+    ) -> Iterator[tuple[int, Outcome]]:
+        """Hand out a batch, no more at a time than can be worked on, so that ``begun`` names what a death hits."""
+        pool = ProcessPoolExecutor(
+            min(self.workers, len(batch)),
+            mp_context=multiprocessing.get_context("spawn"),
+            initializer=_begin,
+            initargs=(os.getpid(),),
+        )
+        under_way: dict[Future[Outcome], int] = {}
+        left = list(reversed(batch))
+        try:
+            while left or under_way:
+                while left and len(under_way) < self.workers:
+                    number = left.pop()
+                    begun.add(number)
+                    under_way[pool.submit(function, jobs[number])] = number
+                done, _ = wait(under_way, return_when=FIRST_COMPLETED)
+                for future in done:
+                    outcome = future.result()
+                    yield under_way.pop(future), outcome
+            pool.shutdown()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for child in multiprocessing.active_children():
+                child.terminate()
+            raise
+
+
+def _begin(parent: int) -> None:
+    """Prepare a local worker: one thread, no part in the parent's Ctrl-C, and no life after the parent's."""
+    import cv2
+
+    cv2.setNumThreads(1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def follow() -> None:
+        while os.getppid() == parent:
+            time.sleep(HEARTBEAT)
+        os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
+
+
+@contextlib.contextmanager
+def _cluster(address: str) -> Iterator[Executor]:
+    """The executor of a Dask cluster."""
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise InvalidInputError(
+            "Dask is not installed", expected="pip install 'closedrooms[cluster]'", where=address
+        ) from error
+    try:
+        client = Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TimeoutError, RuntimeError) as error:
+        raise InvalidInputError(
+            "no scheduler answers", expected="the address of a Dask scheduler, tcp://host:port", where=address
+        ) from error
+    with client:
+        yield client.get_executor(pure=False, retries=TRIES - 1)
+
+
+def _outcomes(
+    executor: Executor, function: Callable[[Job], Outcome], jobs: Sequence[Job]
+) -> Iterator[tuple[Job, Outcome | Lost]]:
+    from distributed import KilledWorker
+
+    waiting = {executor.submit(function, job): job for job in jobs}
+    try:
+        while waiting:
+            done, _ = wait(waiting, return_when=FIRST_COMPLETED)
+            for future in done:
+                job = waiting.pop(future)
+                try:
+                    yield job, future.result()
+                except KilledWorker as error:
+                    yield job, Lost(" ".join(str(error).split()))
+    except BaseException:
+        for future in waiting:
+            future.cancel()
+        raise
