@@ -48,19 +48,20 @@ def coverage_errors(
     methods = {tour.method for tour in (closed, predicted, truth)}
     if len(methods) > 1:
         raise InvalidInputError(f"tours by {', '.join(sorted(methods))}", expected="the same method for all three")
-    if truth.length <= 0.0:
+    return errors_of_lengths(closed.length, predicted.length, truth.length, n_rooms=n_rooms, n_doors=n_doors)
+
+
+def errors_of_lengths(closed: float, predicted: float, truth: float, *, n_rooms: int, n_doors: int) -> CoverageErrors:
+    """The estimates and errors of :func:`coverage_errors` from the lengths of the three tours [m].
+
+    Raises:
+        InvalidInputError: A true tour of length 0.
+    """
+    if truth <= 0.0:
         raise InvalidInputError("a true tour of length 0", expected="a building with more than one place to visit")
-    baseline = closed.length + closed.length / max(n_rooms, 1) * n_doors
+    baseline = closed + closed / max(n_rooms, 1) * n_doors
 
     def error(estimate: float) -> float:
-        return abs(truth.length - estimate) / truth.length * 100.0
+        return abs(truth - estimate) / truth * 100.0
 
-    return CoverageErrors(
-        closed.length,
-        baseline,
-        predicted.length,
-        truth.length,
-        error(closed.length),
-        error(baseline),
-        error(predicted.length),
-    )
+    return CoverageErrors(closed, baseline, predicted, truth, error(closed), error(baseline), error(predicted))
