@@ -184,6 +184,15 @@ def _map(words: Sequence[str]) -> int:
     return _report(lambda terminal: map_log(config, progress=terminal))
 
 
+def _dataset(words: Sequence[str]) -> int:
+    from closedrooms.pipeline.dataset.config import DatasetConfig
+
+    config = _parse(DatasetConfig, "dataset", words, COMMANDS["dataset"][0])
+    from closedrooms.pipeline.dataset.dataset import dataset
+
+    return _report(lambda terminal: dataset(config, progress=terminal))
+
+
 def _worlds(words: Sequence[str]) -> int:
     from closedrooms.pipeline.config import WORLD_ACTIONS
 
@@ -219,5 +228,6 @@ COMMANDS: dict[str, tuple[str, Callable[[Sequence[str]], int]]] = {
     "cover": ("Plan a coverage tour on a ROS map.", _cover),
     "map": ("Build the map of a recorded run.", _map),
     "worlds": ("List, show, generate and convert floor plans.", _worlds),
+    "dataset": ("Make maps of many buildings with closed doors, and what is really behind them.", _dataset),
     "evaluate": ("Compare predictions with the truth over a dataset.", _evaluate),
 }

@@ -121,10 +121,14 @@ class PredictConfig:
 
 def sim_config(config: RunConfig) -> SimConfig:
     """Settings of the simulation: noise level and lidar by name, where their numbers were not set one by one."""
-    sim = config.sim
-    noise = noise_level(config.noise) if sim.noise == NoiseConfig() else sim.noise
+    sim = named_noise(config.sim, config.noise)
     lidar = lidar_preset(config.lidar) if sim.lidar == LidarConfig() else sim.lidar
-    return replace(sim, noise=noise, lidar=lidar)
+    return replace(sim, lidar=lidar)
+
+
+def named_noise(sim: SimConfig, noise: NoiseName) -> SimConfig:
+    """The noise level laid over settings of the simulation whose noise was not set one by one."""
+    return replace(sim, noise=noise_level(noise)) if sim.noise == NoiseConfig() else sim
 
 
 def predictor_config(config: RunConfig | PredictConfig) -> PredictorConfig:

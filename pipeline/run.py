@@ -1,7 +1,6 @@
 """The main job: simulate, map, predict, plan, compare with the truth, write the run directory."""
 
-import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +26,8 @@ from closedrooms.pipeline.drive_report import draw_drive, drive_features, drive_
 from closedrooms.pipeline.explore import ExplorationResult
 from closedrooms.pipeline.manifest import resolved, versions
 from closedrooms.pipeline.metrics import area_mapped, mean, room_iou, rooms_seen
-from closedrooms.pipeline.observer import NoObserver, Observer
+from closedrooms.pipeline.observer import Observer
+from closedrooms.pipeline.recording.opening import open_recording
 from closedrooms.pipeline.stopwatch import Stopwatch
 from closedrooms.pipeline.survey import Survey, Truth, survey_building, true_building
 from closedrooms.pipeline.terminal import Progress, Silent
@@ -38,7 +38,7 @@ from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.closing import check_closed, closable_rooms, draw_closed
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan
-from closedrooms.worlds.truth import reachable, truth_bounds
+from closedrooms.worlds.truth import reachable
 
 DEFAULT_CLOSED = 5
 START = (0.0, 0.0)
@@ -106,7 +106,12 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
     }
     with (
         output_folder(folder, manifest) as staging,
-        recording(config, plan, staging / "run.rrd") as observer,
+        open_recording(
+            staging / "run.rrd" if config.record else None,
+            plan,
+            name=f"{plan.name}-{config.seed}",
+            driving=config.drive,
+        ) as observer,
         Simulation(plan, closed, config.sim, config.seed) as sim,
     ):
         map_T_world = sim.world_T_map.inverse()
@@ -179,22 +184,6 @@ def choose_closed(plan: FloorPlan, config: RunConfig) -> tuple[str, ...]:
     if count is None:
         count = min(DEFAULT_CLOSED, len(closable_rooms(plan, several_doors=config.several_doors)))
     return draw_closed(plan, count, stream(config.seed, "closed doors"), several_doors=config.several_doors)
-
-
-@contextlib.contextmanager
-def recording(config: RunConfig, plan: FloorPlan, path: Path) -> Iterator[Observer]:
-    """The recorder of this run, or an observer that does nothing."""
-    if not config.record:
-        yield NoObserver()
-        return
-    from closedrooms.pipeline.recording.blueprint import Layout
-    from closedrooms.pipeline.recording.recorder import Recorder
-
-    x_min, y_min, x_max, y_max = truth_bounds(plan, Pose2())
-    reach = max(x_max - x_min, y_max - y_min) / 2
-    layout = Layout((-reach, -reach, reach, reach), driving=config.drive)
-    with Recorder(path, name=f"{plan.name}-{config.seed}", layout=layout) as recorder:
-        yield recorder
 
 
 def plan_tours(

@@ -44,14 +44,12 @@ class ErasedMap:
         doors: Closed doors as seen, map frame.
         keyframes: Which keyframes of the survey are left, indices.
         scans: They, as they are with the doors closed.
-        rows: Which of all the survey's scans are left, indices into ``stamps``, ``estimate`` and ``truth``.
     """
 
     grid: OccupancyGrid
     doors: list[ClosedDoor]
     keyframes: IntArray
     scans: tuple[LaserScan, ...]
-    rows: IntArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,10 +62,14 @@ class _Crossings:
 
 
 class Eraser:
-    """Redraws maps of one survey; keeps what does not depend on which doors are closed."""
+    """Redraws maps of one survey; keeps what does not depend on which doors are closed.
+
+    Attributes:
+        survey: What the maps are drawn from.
+    """
 
     def __init__(self, survey: OpenSurvey) -> None:
-        self._survey = survey
+        self.survey = survey
         plan, config = survey.plan, survey.sim
         furniture = areal(shapely.union_all([thing.polygon for thing in plan.furniture]))
         solids = areal(shapely.union_all([building_solids(plan), furniture]))
@@ -96,7 +98,7 @@ class Eraser:
         Raises:
             InvalidInputError: Doors that do not exist or close no room.
         """
-        survey = self._survey
+        survey = self.survey
         closed = check_closed(survey.plan, closed)
         kept = self._outside(closed, survey.true_poses)
         ranges, owner = self._cut(closed)
@@ -115,32 +117,30 @@ class Eraser:
             grid.add(beams, pose)
             keyframes.append(keyframe)
             scans.append(scan)
-        return ErasedMap(
-            grid.grid(), fuse_doors(keyframes), kept, tuple(scans), self._outside(closed, survey.truth)
-        )  # fmt: skip
+        return ErasedMap(grid.grid(), fuse_doors(keyframes), kept, tuple(scans))
 
     def _outside(self, closed: Collection[str], poses_map: FloatArray) -> IntArray:
         """Indices of the true poses, shape (n, 3), map frame, that are not behind a closed door."""
-        plan = self._survey.plan
+        plan = self.survey.plan
         rooms = {room.id: room.polygon for room in plan.rooms}
         names = [name for part, _ in hidden_rooms(plan, closed) for name in part]
         hidden = shapely.union_all([rooms[name] for name in names])
-        points = self._survey.world_T_map.transform(poses_map[:, :2])
+        points = self.survey.world_T_map.transform(poses_map[:, :2])
         return np.flatnonzero(~shapely.contains_xy(hidden, points[:, 0], points[:, 1]))
 
     def _scan(self, number: int) -> LaserScan:
-        return self._survey.keyframes.scans[number]
+        return self.survey.keyframes.scans[number]
 
     def _beams_of(self, number: int) -> Beams:
         """A scan that no closed door changes, cleaned once."""
         if number not in self._beams:
-            self._beams[number] = clean(self._scan(number), max_range=self._survey.mapper.max_range)
+            self._beams[number] = clean(self._scan(number), max_range=self.survey.mapper.max_range)
         return self._beams[number]
 
     def _cut(self, closed: tuple[str, ...]) -> tuple[FloatArray, IntArray]:
         """Ranges with the doors closed, shape (k, beams) [m], and by which door (its index) each was cut, else -1."""
         ranges = self._ranges.copy()
-        config = self._survey.sim.lidar
+        config = self.survey.sim.lidar
         self._cast_anew(closed, ranges)
         limit = np.full(ranges.shape, np.inf)
         owner = np.full(ranges.shape, -1)
@@ -160,7 +160,7 @@ class Eraser:
 
     def _cast_anew(self, closed: tuple[str, ...], ranges: FloatArray) -> None:
         """Replace, in place, what measured a closed door's leaf where it stood open."""
-        survey, lidar = self._survey, self._survey.sim.lidar
+        survey, lidar = self.survey, self.survey.sim.lidar
         ended = []
         for name in closed:
             met = self._crossings(name, opened=True)
@@ -198,7 +198,7 @@ class Eraser:
         half = np.where(distance > radius, np.arcsin(np.minimum(radius / np.maximum(distance, 1e-9), 1.0)), np.pi)
         bearing = np.arctan2(offset[:, 1], offset[:, 0])
         turned = np.abs(np.mod(self._angles - bearing[:, None] + np.pi, 2.0 * np.pi) - np.pi)
-        within = distance - radius <= self._survey.sim.lidar.range_max
+        within = distance - radius <= self.survey.sim.lidar.range_max
         scan, beam = np.nonzero((turned <= half[:, None] + 1e-9) & within[:, None])
         angles = self._angles[scan, beam]
         edges = np.concatenate([np.array(leaf_edges(leaf)) for leaf in corners])
@@ -208,8 +208,8 @@ class Eraser:
 
     def _sighting(self, name: str, number: int) -> DoorSighting:
         """A closed door as seen from the true pose of a keyframe, robot frame, as the simulation tells it."""
-        door = next(door for door in self._survey.plan.doors if door.id == name)
-        robot_T_world = (self._survey.world_T_map @ Pose2(*self._survey.true_poses[number])).inverse()
+        door = next(door for door in self.survey.plan.doors if door.id == name)
+        robot_T_world = (self.survey.world_T_map @ Pose2(*self.survey.true_poses[number])).inverse()
         (ax, ay), (bx, by) = robot_T_world.transform(np.array(door.segment))
         stamp = float(self._scan(number).stamp)
         return DoorSighting(name, ((float(ax), float(ay)), (float(bx), float(by))), stamp)
