@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import cv2
@@ -18,6 +19,10 @@ from closedrooms.pipeline.colours import Colour
 
 Pixels = npt.NDArray[np.uint8]
 Bounds = tuple[float, float, float, float]
+# A way starts in the first colour and ends in the last: the eye can follow it.
+COURSE_START, COURSE_END = np.array([48, 18, 140]), np.array([250, 150, 20])
+# Pieces of one colour in which a way is drawn.
+COURSE_PIECES = 240
 # OpenCV takes coordinates as fixed-point numbers with this many bits behind the point.
 SHIFT = 4
 
@@ -80,6 +85,18 @@ class Canvas:
             cv2.polylines(
                 self.pixels, [self._fixed(points)], False, colour, thickness=width, lineType=cv2.LINE_AA, shift=SHIFT
             )
+
+    def course(self, points: FloatArray, *, width: int = 2) -> None:
+        """Draw a way, shape (k, 2), from blue at its start to orange at its end; rows of NaN interrupt it."""
+        points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+        pieces = min(len(points) - 1, COURSE_PIECES)
+        cuts = np.linspace(0, len(points) - 1, pieces + 1).astype(int).tolist() if pieces > 0 else []
+        for number, (first, last) in enumerate(pairwise(cuts)):
+            piece = points[first : last + 1]
+            mixed = COURSE_START + number / max(pieces - 1, 1) * (COURSE_END - COURSE_START)
+            red, green, blue = (int(value) for value in mixed)
+            for part in np.split(piece, np.flatnonzero(np.isnan(piece[:, 0]))):
+                self.line(part[~np.isnan(part[:, 0])], (red, green, blue), width=width)
 
     def dots(self, points: FloatArray, colour: Colour, *, radius: float = 3.0) -> None:
         """Draw filled circles, shape (n, 2); ``radius`` in pixels."""

@@ -8,12 +8,14 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
+from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.tour import CoverageTour
-from closedrooms.mapping.navigation_config import NavigationConfig
-from closedrooms.pipeline.explore import MapMaker, StepWatch, World
+from closedrooms.mapping.config import MapperConfig, NavigationConfig
+from closedrooms.pipeline.explore import StepWatch, World
 from closedrooms.pipeline.observer import NoObserver, Observer
+from closedrooms.pipeline.reopened import KeyframeMap, ReopenedMap
 from closedrooms.pipeline.tour_guide import Revision, TourGuide
 from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.prediction import Prediction
@@ -49,6 +51,7 @@ class DriveResult:
         replans: Times the tour was solved again.
         revisions: What was learnt, in order.
         prediction: As it stands at the end.
+        grid: The map at the end, without the leaves of opened doors.
         path: Way driven, map frame, shape (n, 2) [m].
         stamps: Time of each of its points [s], shape (n,).
         wall_seconds: Wall-clock time by step: ``sense``, ``map``, ``navigate``, ``move``, ``observe``.
@@ -63,6 +66,7 @@ class DriveResult:
     replans: int
     revisions: tuple[Revision, ...]
     prediction: Prediction
+    grid: OccupancyGrid
     path: FloatArray
     stamps: FloatArray
     wall_seconds: dict[str, float] = field(default_factory=dict)
@@ -70,7 +74,7 @@ class DriveResult:
 
 def drive(
     sim: WorldWithDoors,
-    mapper: MapMaker,
+    mapper: KeyframeMap,
     prediction: Prediction,
     tour: CoverageTour,
     doors: Sequence[ClosedDoor],
@@ -79,6 +83,7 @@ def drive(
     closed: Collection[str],
     predictor: PredictorConfig,
     coverage: CoverageConfig,
+    mapping: MapperConfig | None = None,
     observer: Observer | None = None,
     period: float = 0.1,
 ) -> DriveResult:
@@ -94,6 +99,7 @@ def drive(
         closed: Ids of the doors to open.
         predictor: For rooms that are predicted anew.
         coverage: For tours that are solved again.
+        mapping: As the mapper has it.
         observer: Told of every scan and revision.
         period: Time between scans [s].
 
@@ -103,6 +109,7 @@ def drive(
     observer = observer or NoObserver()
     for door in sorted(closed):
         sim.open_door(door)
+    reopened = ReopenedMap(mapper, [door for door in doors if door.id in closed], mapping)
     guide = TourGuide(prediction, tour.graph.vertices[tour.order], doors, config, predictor, coverage)
     watch = StepWatch()
     status: DriveStatus = "limit"
@@ -118,13 +125,13 @@ def drive(
         stamps.append(scan.stamp)
         poses.append(pose)
         waiting = scan.stamp - stamps[0] < DOOR_WAIT
-        v, w = (0.0, 0.0) if waiting else guide.command(pose, scan, mapper.grid)
+        v, w = (0.0, 0.0) if waiting else guide.command(pose, scan, reopened.grid)
         watch.lap("navigate")
         observer.observation(observation, pose)
         if waiting:
             observer.door_states(sim.door_states(), scan.stamp)
         if observer.wants_map(scan.stamp):
-            observer.map(mapper.grid(), scan.stamp)
+            observer.map(reopened.grid(), scan.stamp)
         if len(guide.revisions) != told or (told == 0 and len(stamps) == 1):
             for revision in guide.revisions[told:]:
                 names = ", ".join(revision.doors) or "the walls"
@@ -152,6 +159,7 @@ def drive(
         guide.replans,
         tuple(guide.revisions),
         guide.prediction,
+        reopened.grid(),
         path,
         np.array(stamps),
         watch.seconds,

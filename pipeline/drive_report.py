@@ -34,13 +34,15 @@ def drive_metrics(
     revisions = []
     for revision in drive.revisions:
         before, after = room_iou(revision.before, truth_rooms), room_iou(revision.after, truth_rooms)
+        told = sorted({*revision.doors, *revision.changed} & before.keys())
         revisions.append(
             {
                 "stamp_s": round(revision.stamp, 3),
                 "doors": list(revision.doors),
+                "changed": list(revision.changed),
                 "replanned": revision.replanned,
-                "iou_before": {door: round(before[door], 5) for door in revision.doors if door in before},
-                "iou_after": {door: round(after[door], 5) for door in revision.doors if door in after},
+                "iou_before": {door: round(before[door], 5) for door in told},
+                "iou_after": {door: round(after[door], 5) for door in told},
                 "iou_mean_before": _rounded(mean(before)),
                 "iou_mean_after": _rounded(mean(after)),
             }
@@ -98,12 +100,13 @@ def draw_drive(path: Path, drive: DriveResult, truth_rooms: Sequence[Room]) -> N
         canvas.fill(room.polygon, palette.get(room.doors[0], colours.INK), opacity=0.3)
     for room in truth_rooms:
         canvas.outline(room.polygon, colours.TOURS["truth"], width=2)
-    canvas.line(drive.path, colours.TOURS["driven"], width=2)
-    canvas.dots(drive.path[:1], colours.TOURS["driven"], radius=7)
+    canvas.course(drive.path, width=2)
+    canvas.dots(drive.path[:1], colours.TOURS["truth"], radius=7)
     canvas.dots(drive.unreachable, colours.DOOR_CLOSED, radius=6)
     canvas.text(
         (bounds[0] + (bounds[2] - bounds[0]) / 2, bounds[3] - 12 / canvas.scale),
-        f"driven {drive.driven_length:.0f} m, planned {drive.planned_length:.0f} m, {drive.replans} new tours",
+        f"driven {drive.driven_length:.0f} m (blue to orange, from the green dot), "
+        f"planned {drive.planned_length:.0f} m, {drive.replans} new tours",
     )
     import cv2
 

@@ -1,7 +1,6 @@
 """``summary.png``: one look at a run, a prediction or a tour."""
 
 import io
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -29,8 +28,6 @@ PANEL, TITLE, GAP = 900, 40, 14
 TWO_LINES = 44
 # Free space around what is known [m].
 MARGIN = 1.0
-# A tour starts in the first colour and ends in the last: the eye can follow it.
-TOUR_START, TOUR_END = np.array([48, 18, 140]), np.array([250, 150, 20])
 
 Panel = tuple[str, "Pixels"]
 
@@ -161,10 +158,7 @@ def _tour_panel(
     graph, path = tour.graph, np.asarray(tour.path, dtype=np.float64).reshape(-1, 2)
     for edge in np.asarray(graph.edges).reshape(-1, 2):
         canvas.line(np.asarray(graph.vertices)[edge], (175, 175, 185), width=1)
-    for number, piece in enumerate(itertools.pairwise(path)):
-        share = number / max(len(path) - 2, 1)
-        colour = TOUR_START + share * (TOUR_END - TOUR_START)
-        canvas.line(np.array(piece), (int(colour[0]), int(colour[1]), int(colour[2])), width=2)
+    canvas.course(path, width=2)
     canvas.dots(graph.vertices, colours.INK, radius=2.5)
     canvas.dots(path[:1], colours.TOURS["truth"], radius=7)
     _draw_doors(canvas, doors, named=True)

@@ -7,6 +7,8 @@ from typing import Any, Literal
 
 import cv2
 import numpy as np
+import shapely
+from shapely.geometry import Polygon
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor, Point
@@ -34,10 +36,15 @@ VISITED = 0.5
 # Of a tour that is solved again, vertices that were in sight this close to the way already driven are left out [m]; the
 # vertices of a revised map never lie just where the old ones did. At the end only what is farther off is worth the way.
 DRIVEN, DRIVEN_AT_LAST = 1.2, 2.5
-# A room is looked into when so much of its prediction is known, or so little for so long [s] without a change.
-LOOKED_INTO, GLIMPSED, SETTLED = 0.6, 0.15, 3.0
+# A room is looked into when so much of its prediction has become known, or so little after the robot was this close to
+# its door [m]: seen from afar through the door it is none.
+LOOKED_INTO, GLIMPSED, AT_DOOR = 0.6, 0.15, 1.5
+# What is seen counts once it has not changed for so long [s]: half a room is no room of another shape.
+SETTLED = 2.0
 # Difference of prediction and observation, in free area, that calls for a revision or for another tour [m2].
 SURPRISE = 1.0
+# A room's shape has changed when so much of it came or went [m2]: more than the raggedness of a map's edge.
+CHANGED = 0.5
 # How often the path is held against the map, and the prediction against the map [s].
 CHECK_INTERVAL, COMPARE_INTERVAL = 1.0, 2.0
 # The path is checked this far ahead [m].
@@ -59,6 +66,7 @@ class Revision:
         stamp: When [s].
         before: All rooms as predicted before.
         after: All rooms as revised.
+        changed: Doors of the rooms whose shape changed, looked into or beside such.
         replanned: Whether the tour was solved again.
     """
 
@@ -66,6 +74,7 @@ class Revision:
     stamp: float
     before: tuple[Room, ...]
     after: tuple[Room, ...]
+    changed: tuple[str, ...]
     replanned: bool
 
 
@@ -120,11 +129,13 @@ class TourGuide:
         self._attempts = 0
         self._goal: Point | None = None
         self._checked_at = self._compared_at = -math.inf
+        self._known_before: dict[str, float] = {}
         self._shares: dict[str, tuple[float, float]] = {}
         self._looked_into: set[str] = set()
         self._surprise = (0.0, -math.inf)
         self._last_looks = 0
         self._begun = False
+        self._arrived = False
 
     def command(self, pose: Pose2, scan: LaserScan, grid: Callable[[], OccupancyGrid]) -> tuple[float, float]:
         """Speed [m/s] and turn rate [rad/s] for now; (0, 0) once ``status`` is set.
@@ -166,7 +177,7 @@ class TourGuide:
         if len(self.left):
             past = np.hypot(*(self.left - np.array(here)).T) <= VISITED
             if past[0] and self._goal is not None and len(self.left) > 1:
-                self._goal = None
+                self._goal, self._arrived = None, True
             self.visited += int(past.sum())
             self.left = self.left[~past]
 
@@ -176,12 +187,13 @@ class TourGuide:
             self.left, self.visited = self.left[1:], self.visited + 1
         elif math.dist(self._track[-1], self._home) <= 2.0 * VISITED:
             self.status = "complete"
-        self._goal, self._attempts = None, 0
+        self._goal, self._attempts, self._arrived = None, 0, True
 
     def _begin(self, pose: Pose2, grid: OccupancyGrid) -> None:
         """A closed tour may begin anywhere: at the vertex that is nearest to the robot."""
         self._begun = True
-        self._map.update(overlay(self.prediction, grid, self._doors))
+        self._known_before = seen_share(self.prediction, grid)
+        self._map.update(overlay(self.prediction, grid))
         costmap = self._map.costmap
         goals = np.zeros(costmap.frame.shape, dtype=np.bool_)
         cells = costmap.frame.to_cells(self.left)
@@ -203,9 +215,13 @@ class TourGuide:
             self._last_looks += 1
             self._revise((), pose, grid, now)
             self._solve_again(pose, driven=DRIVEN_AT_LAST)
+        elif self._arrived and _difference(self.prediction.grid, overlay(self.prediction, grid)) >= SURPRISE:
+            # What is seen from here is taken in before the robot turns away from it.
+            self._revise((), pose, grid, now)
+        self._arrived = False
         while True:
             goal = self._home if len(self.left) == 0 else (float(self.left[0, 0]), float(self.left[0, 1]))
-            self._map.update(overlay(self.prediction, grid, self._doors))
+            self._map.update(overlay(self.prediction, grid))
             costmap = self._map.costmap
             path = None
             if self._attempts < MAX_ATTEMPTS:
@@ -229,13 +245,13 @@ class TourGuide:
     def _check(self, pose: Pose2, grid: OccupancyGrid, now: float) -> None:
         """Compare the map with the prediction, and the path with the map."""
         self._checked_at = now
-        completed = overlay(self.prediction, grid, self._doors)
+        completed = overlay(self.prediction, grid)
         if now - self._compared_at >= COMPARE_INTERVAL - 1e-9:
             self._compared_at = now
             doors = self._news(grid, completed, now)
             if doors is not None:
                 self._revise(doors, pose, grid, now)
-                completed = overlay(self.prediction, grid, self._doors)
+                completed = overlay(self.prediction, grid)
         ahead = self._driver.ahead(CHECK_AHEAD)
         if self._goal is not None and not is_free(completed, ahead, self.config):
             self._goal = None
@@ -243,20 +259,23 @@ class TourGuide:
     def _news(self, grid: OccupancyGrid, completed: OccupancyGrid, now: float) -> tuple[str, ...] | None:
         """Doors of rooms that have been looked into by now; ``None`` when nothing calls for a revision."""
         doors = []
-        for door, share in seen_share(self.prediction, grid).items():
+        for door, known in seen_share(self.prediction, grid).items():
+            # A predicted room may hold a little that was known before its door opened: that is no look into it.
+            before = min(self._known_before.get(door, 0.0), 0.9)
+            share = (known - before) / (1.0 - before)
             last, since = self._shares.get(door, (0.0, now))
             if share > last + 0.02:
                 last, since = share, now
             self._shares[door] = (last, since)
-            settled = share >= GLIMPSED and now - since >= SETTLED
-            if door not in self._looked_into and (share >= LOOKED_INTO or settled):
+            enough = share >= LOOKED_INTO or (share >= GLIMPSED and self._was_at(door))
+            if door not in self._looked_into and enough and now - since >= SETTLED - 1e-9:
                 doors.append(door)
         surprise = _difference(self.prediction.grid, completed)
         last, since = self._surprise
         if abs(surprise - last) > 0.5 * SURPRISE:
             last, since = surprise, now
         self._surprise = (last, since)
-        if doors or (surprise >= SURPRISE and now - since >= SETTLED):
+        if doors or (surprise >= SURPRISE and now - since >= SETTLED - 1e-9):
             return tuple(doors)
         return None
 
@@ -267,9 +286,15 @@ class TourGuide:
         self._looked_into |= set(doors)
         self._surprise = (0.0, -math.inf)
         replanned = _difference(before.grid, self.prediction.grid) >= SURPRISE and self._solve_again(pose)
-        if doors or replanned:
-            self.revisions.append(Revision(doors, now, before.rooms, self.prediction.rooms, replanned))
+        changed = _changed(before.rooms, self.prediction.rooms)
+        if doors or changed or replanned:
+            self.revisions.append(Revision(doors, now, before.rooms, self.prediction.rooms, changed, replanned))
         return replanned
+
+    def _was_at(self, door_id: str) -> bool:
+        """Whether the robot has come close to a door."""
+        places = [door.midpoint for door in self._doors if door.id == door_id]
+        return any(math.dist(place, at) <= AT_DOOR for place in places for at in self._track)
 
     def _solve_again(self, pose: Pose2, *, driven: float = DRIVEN) -> bool:
         """The tour over what is left of the revised map; ``False`` where the map has no graph."""
@@ -295,17 +320,36 @@ class TourGuide:
         return True
 
 
+def _changed(before: Sequence[Room], after: Sequence[Room]) -> tuple[str, ...]:
+    """Doors of the rooms of which an area of at least ``CHANGED`` came or went."""
+    old = {door: room.polygon for room in before for door in room.doors}
+    new = {door: room.polygon for room in after for door in room.doors}
+    nothing = Polygon()
+    return tuple(
+        door
+        for door in sorted({*old, *new})
+        if shapely.symmetric_difference(
+            shapely.make_valid(old.get(door, nothing)), shapely.make_valid(new.get(door, nothing))
+        ).area
+        >= CHANGED
+    )
+
+
 def _was_near(vertex: FloatArray, track: FloatArray, distance: float, grid: OccupancyGrid) -> bool:
-    """Whether the nearest place of a track, shape (n, 2) [m], lies within a distance [m] of a vertex, in free sight."""
+    """Whether some place of a track, shape (n, 2) [m], lies within a distance [m] of a vertex, in free sight."""
     away = np.hypot(*(track - vertex).T)
-    nearest = int(np.argmin(away))
-    if away[nearest] > distance:
+    close = np.flatnonzero(away <= distance)
+    nearest = close[np.argsort(away[close], kind="stable")]
+    if len(nearest) == 0:
         return False
-    steps = max(2, math.ceil(float(away[nearest]) / grid.frame.resolution))
-    line = vertex + np.linspace(0.0, 1.0, steps + 1)[:, None] * (track[nearest] - vertex)
-    cells = grid.frame.to_cells(line)
-    cells = cells[grid.frame.contains(cells)]
-    return not bool(grid.occupied[cells[:, 0], cells[:, 1]].any())
+    # The nearest place may lie on the other side of a wall: all are asked, at points half a cell apart.
+    steps = max(2, math.ceil(2.0 * distance / grid.frame.resolution))
+    lines = vertex + np.linspace(0.0, 1.0, steps + 1)[None, :, None] * (track[nearest] - vertex)[:, None, :]
+    cells = grid.frame.to_cells(lines)
+    inside = grid.frame.contains(cells)
+    blocked = np.zeros(inside.shape, dtype=np.bool_)
+    blocked[inside] = grid.occupied[cells[inside][:, 0], cells[inside][:, 1]]
+    return bool((~blocked.any(axis=1)).any())
 
 
 def _open_tour(distances: FloatArray, config: CoverageConfig) -> list[int]:
