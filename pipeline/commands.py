@@ -38,6 +38,8 @@ class Result(Protocol):
 
 
 DONE, BAD_INPUT, WRONG_USAGE, PARTLY_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+# Failures that are named on the terminal; the rest stands in files.
+MOST_NAMED = 10
 
 Config = TypeVar("Config")
 
@@ -137,14 +139,19 @@ def _named_presets(words: Sequence[str]) -> "RunConfig":
     return RunConfig(sim=replace(RunConfig().sim, noise=noise, lidar=lidar))
 
 
-def _report(work: "Callable[[Terminal], Result]") -> int:
-    """Do the work with progress on the terminal, then print its table and where it was written."""
+def _report(work: "Callable[[Terminal], Result]", *, name_failures: bool = False) -> int:
+    """Do the work with progress on the terminal, then print its table, where it was written and what failed."""
     from closedrooms.pipeline.terminal import Terminal
 
     with Terminal() as terminal:
         result = work(terminal)
     terminal.table(result.title, result.table())
     terminal.say(f"written to {result.folder}")
+    if name_failures:
+        for name, reason in list(result.failures.items())[:MOST_NAMED]:
+            _complain(f"{name}: {reason}")
+        if len(result.failures) > MOST_NAMED:
+            _complain(f"and {len(result.failures) - MOST_NAMED} more; all are named in the folder")
     return PARTLY_FAILED if result.failures else DONE
 
 
@@ -219,7 +226,7 @@ def _evaluate(words: Sequence[str]) -> int:
     config = _parse(EvaluateConfig, "evaluate", words, COMMANDS["evaluate"][0])
     from closedrooms.pipeline.evaluation.evaluate import evaluate
 
-    return _report(lambda terminal: evaluate(config, progress=terminal))
+    return _report(lambda terminal: evaluate(config, progress=terminal), name_failures=True)
 
 
 COMMANDS: dict[str, tuple[str, Callable[[Sequence[str]], int]]] = {

@@ -1,22 +1,24 @@
 """``closedrooms evaluate``: methods against the truth, over datasets (paper, section 4.1)."""
 
 import json
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
+from statistics import median
 from typing import Any
 
-from closedrooms.core.errors import OutputError
+from closedrooms.core.errors import ClosedroomsError, OutputError
 from closedrooms.core.files import MANIFEST, PROGRAM, write_json
 from closedrooms.pipeline.evaluation.config import EvaluateConfig
-from closedrooms.pipeline.evaluation.sample import AUTHORS, Scores, evaluate_sample
-from closedrooms.pipeline.evaluation.samples import SamplePath, find_samples
+from closedrooms.pipeline.evaluation.listing import SamplePath, find_samples
+from closedrooms.pipeline.evaluation.sample import Outcome, Scores, evaluate_sample
 from closedrooms.pipeline.manifest import resolved, versions
 from closedrooms.pipeline.terminal import Progress, Silent
-
-Job = tuple[SamplePath, str]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,22 +29,25 @@ class EvaluationResult:
         folder: What was written.
         title: Head of the table.
         summary: One row a method over all samples.
-        failures: Why a sample failed, by ``method sample``.
+        failures: Why a sample failed, by ``sample``, or ``method sample`` where one method did.
+        seconds: Median time of a prediction by method [s].
     """
 
     folder: Path
     title: str
     summary: list[dict[str, Any]]
     failures: dict[str, str] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
 
     def table(self) -> list[tuple[str, ...]]:
         """Rows for people; the first is the head."""
         head = ("method", "rooms", "IoU matched", "median", "IoU by door", "IoU whole area", "agreement", "s a map")
-        names = ("matched_mean", "matched_median", "by_door_mean", "area_mean", "agreement_mean", "seconds_median")
+        names = ("matched_mean", "matched_median", "by_door_mean", "area_mean", "agreement_mean")
         rows: list[tuple[str, ...]] = [head]
         for row in self.summary:
             figures = ["" if row[name] is None else f"{row[name]:.3f}" for name in names]
-            rows.append((row["method"], str(row["rooms"]), *figures))
+            seconds = self.seconds.get(row["method"])
+            rows.append((row["method"], str(row["rooms"]), *figures, "" if seconds is None else f"{seconds:.3f}"))
         return rows
 
 
@@ -62,22 +67,20 @@ def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Eva
     progress = progress or Silent()
     samples = find_samples(config.datasets)
     _claim(config.out)
-    jobs: list[Job] = [(sample, method) for sample in samples for method in config.methods]
-    jobs += [(sample, AUTHORS) for sample in samples if (sample.folder / "authors.yaml").is_file()]
-    progress.stage("evaluate", len(jobs))
+    progress.stage("evaluate", len(samples))
     scores: list[Scores] = []
     failures: dict[str, str] = {}
-    for number, ((sample, method), outcome) in enumerate(_work(jobs, config), start=1):
-        if isinstance(outcome, str):
-            failures[f"{method} {sample.name}"] = outcome
-        else:
-            scores.append(outcome)
-        progress.advance(number, f"{number} of {len(jobs)}")
+    for number, outcome in enumerate(_work(samples, config), start=1):
+        scores += outcome.scores
+        failures |= outcome.problems
+        progress.advance(number, f"{number} of {len(samples)}")
     scores.sort(key=lambda score: (score["method"], score["sample"]))
+    failures = dict(sorted(failures.items()))
     from closedrooms.pipeline.evaluation.report import write_report
 
     progress.stage("report")
-    summary = write_report(config.out, scores, samples, config)
+    summary = write_report(config.out, scores, samples, config, failures)
+    seconds = _seconds(scores)
     manifest = {
         "program": PROGRAM,
         "command": "evaluate",
@@ -85,11 +88,20 @@ def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Eva
         "versions": versions(),
         "samples": len(samples),
         "summary": summary,
-        "failures": dict(sorted(failures.items())),
+        "failures": failures,
+        "durations": {"prediction_median_s": seconds},
         "files": sorted(path.name for path in config.out.iterdir() if path.name != MANIFEST),
     }
     write_json(config.out / MANIFEST, manifest)
-    return EvaluationResult(config.out, f"{len(samples)} samples", summary, failures)
+    return EvaluationResult(config.out, f"{len(samples)} samples", summary, failures, seconds)
+
+
+def _seconds(scores: Sequence[Scores]) -> dict[str, float]:
+    times: defaultdict[str, list[float]] = defaultdict(list)
+    for score in scores:
+        if "seconds" in score:
+            times[score["method"]].append(score["seconds"])
+    return {method: round(median(values), 3) for method, values in sorted(times.items())}
 
 
 def _claim(folder: Path) -> None:
@@ -112,17 +124,26 @@ def _claim(folder: Path) -> None:
     write_json(manifest, {"program": PROGRAM, "command": "evaluate", "files": []})
 
 
-def _work(jobs: Sequence[Job], config: EvaluateConfig) -> Iterator[tuple[Job, Scores | str]]:
-    """Outcomes of the jobs as they come: scores, or the reason why a sample failed."""
-    if config.workers == 1 or len(jobs) == 1:
-        for job in jobs:
-            yield job, evaluate_sample(*job, config.out)
+def _work(samples: Sequence[SamplePath], config: EvaluateConfig) -> Iterator[Outcome]:
+    """What comes of the samples, as they are finished."""
+    job = partial(evaluate_sample, methods=config.methods, out=config.out, tours=config.tours)
+    if config.workers == 1 or len(samples) == 1:
+        yield from map(job, samples)
         return
-    with ProcessPoolExecutor(config.workers, mp_context=get_context("spawn")) as pool:
-        waiting: dict[Future[Scores | str], Job] = {pool.submit(evaluate_sample, *job, config.out): job for job in jobs}
+    with ProcessPoolExecutor(config.workers, mp_context=get_context("spawn"), initializer=_one_thread) as pool:
+        waiting = [pool.submit(job, sample) for sample in samples]
         try:
             for future in as_completed(waiting):
-                yield waiting[future], future.result()
+                yield future.result()
+        except BrokenProcessPool as error:
+            raise ClosedroomsError("a worker process was killed; the same command goes on where it stopped") from error
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def _one_thread() -> None:
+    """Workers share the processors: OpenCV's own threads would only get in each other's way."""
+    import cv2
+
+    cv2.setNumThreads(1)

@@ -1,215 +1,171 @@
-"""Tables and pictures of an evaluation."""
+"""Tables, pictures and the page of an evaluation."""
 
-import csv
-import io
-from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from closedrooms.core.arrays import FloatArray
-from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import write_bytes
-from closedrooms.core.random import stream
-from closedrooms.pipeline.evaluation.config import EvaluateConfig
-from closedrooms.pipeline.evaluation.samples import SamplePath, read_sample
+from closedrooms.pipeline.evaluation.cases import draw_extremes, draw_worst, extreme_cases
+from closedrooms.pipeline.evaluation.config import METHODS, EvaluateConfig
+from closedrooms.pipeline.evaluation.curves import draw_errors, draw_iou
+from closedrooms.pipeline.evaluation.listing import SamplePath
+from closedrooms.pipeline.evaluation.numbers import number_rows
+from closedrooms.pipeline.evaluation.page import Section, write_page
+from closedrooms.pipeline.evaluation.summary import (
+    WITHOUT_PREDICTION,
+    coverage_rows,
+    headline,
+    iou_rows,
+    paired_rows,
+    room_rows,
+    sample_rows,
+    subset,
+    world_rows,
+)
+from closedrooms.pipeline.evaluation.tables import write_table
 
 Scores = dict[str, Any]
-COLUMNS = ("method", "sample", "closed_doors", "measure", "room", "iou")
+Row = dict[str, Any]
+INTERVALS = (
+    "Intervals hold 95 %: low to high draws samples (other doors in the same buildings), world low to world high draws "
+    "buildings with all their samples (other buildings)."
+)
 
 
 def write_report(
-    folder: Path, scores: Sequence[Scores], samples: Sequence[SamplePath], config: EvaluateConfig
-) -> list[dict[str, Any]]:
-    """Write rooms.{csv,parquet}, samples.csv, summary.csv, iou.png and worst.png; returns a row a method.
+    folder: Path,
+    scores: Sequence[Scores],
+    samples: Sequence[SamplePath],
+    config: EvaluateConfig,
+    failures: Mapping[str, str],
+) -> list[Row]:
+    """Write every table (CSV, Parquet), picture (PNG) and ``report.html``.
 
     Args:
-        folder: Where to write.
+        folder: Where to write; the results of the samples are in it.
         scores: One entry a sample and method, sorted.
-        samples: All samples, for the contact sheet.
-        config: Bootstrap and size of the contact sheet.
+        samples: All samples, for the pictures.
+        config: Options.
+        failures: Why a sample, or a method on one, failed.
+
+    Returns:
+        A row a method, over all samples.
     """
-    rooms = _room_rows(scores)
-    _write_csv(folder / "rooms.csv", COLUMNS, rooms)
-    _write_parquet(folder / "rooms.parquet", rooms)
-    columns = ("method", "sample", "doors", "area", "agreement", "seconds")
-    _write_csv(folder / "samples.csv", columns, [[score.get(name) for name in columns] for score in scores])
-    overall = [_summary(method, group, config) for method, group in _grouped(scores, "method").items()]
-    by_doors = [
-        _summary(method, group, config) | {"closed_doors": doors}
-        for method, own in _grouped(scores, "method").items()
-        for doors, group in _grouped(own, "doors").items()
-    ]
-    if overall:
-        head = ("closed_doors", *overall[0])
-        table = [[row.get(name, "all") for name in head] for row in [*overall, *by_doors]]
-        _write_csv(folder / "summary.csv", head, table)
-        _draw_curves(folder / "iou.png", by_doors)
-        _draw_worst(folder / "worst.png", scores, samples, config)
+    if not scores:
+        write_page(folder / "report.html", "closedrooms evaluate", [_failure_section(failures)])
+        return []
+    chosen = subset(scores, config)
+    iou, tests = iou_rows(scores, config), paired_rows(scores, config)
+    coverage = [*coverage_rows(chosen, config, "subset"), *coverage_rows(scores, config, "all")]
+    numbers, worlds = number_rows(scores, chosen, tests), world_rows(scores)
+    write_table(folder / "rooms", room_rows(scores), ("method", "sample", "world", "repetition", "closed_doors",
+                                                      "measure", "room", "iou"))  # fmt: skip
+    write_table(folder / "samples", sample_rows(scores))
+    write_table(folder / "summary", iou)
+    write_table(folder / "worlds", worlds)
+    for name, rows in (("coverage", coverage), ("tests", tests), ("numbers", numbers)):
+        if rows:
+            write_table(folder / name, rows)
+    sections = _sections(folder, scores, {sample.name: sample for sample in samples}, config, iou, coverage)
+    overall = [row for row in iou if row["closed_doors"] == "all"]
+    first = Section(
+        "Numbers of the text",
+        f"{len(samples)} samples of {len({s['world'] for s in scores})} buildings. {INTERVALS}",
+        tables=[_table(numbers), _iou_table(overall)],
+    )
+    tested = Section(
+        "Paired tests",
+        "Second minus first on the same samples; Wilcoxon's signed-rank test over the means of buildings, and over "
+        "samples, which takes samples of one building as independent. The interval draws buildings. "
+        "Measure error: coverage error of the prediction in percent.",
+        tables=[_table(tests)] if tests else [],
+    )
+    by_world = Section("Buildings (table 1: most closed doors)", tables=[_table(worlds)])
+    tail = [_failure_section(failures)] if failures else []
+    title = f"closedrooms evaluate: {len(samples)} samples"
+    write_page(folder / "report.html", title, [first, *sections, tested, by_world, *tail])
     return overall
 
 
-def _grouped(scores: Sequence[Scores], key: str) -> dict[Any, list[Scores]]:
-    groups: defaultdict[Any, list[Scores]] = defaultdict(list)
-    for score in scores:
-        groups[score[key]].append(score)
-    return dict(sorted(groups.items()))
+def _sections(
+    folder: Path,
+    scores: Sequence[Scores],
+    samples: Mapping[str, SamplePath],
+    config: EvaluateConfig,
+    iou: Sequence[Row],
+    coverage: Sequence[Row],
+) -> list[Section]:
+    """The figures of the paper, as far as methods and samples allow."""
+    present = {score["method"] for score in scores}
+    measure = headline(scores)
+    sections: list[Section] = []
+
+    def add(heading: str, text: str, name: str, *tables: Sequence[Sequence[Any]], drawn: bool) -> None:
+        if drawn:
+            sections.append(Section(heading, text, folder / name, list(tables)))
+
+    every = [name for name in (*METHODS, "authors") if name in present]
+    drawn = draw_iou(folder / "iou.png", iou, every, ("matched", "by_door"))
+    add("All methods: IoU by number of closed doors", "Both ways to compare a room with the truth.", "iou.png",
+        _doors_table(iou, "method", every, measure), drawn=drawn)  # fmt: skip
+    names = [name for name in ("paper", "line-of-sight", "geometric") if name in present]
+    drawn = draw_iou(folder / "figure-05.png", iou, names, (measure,))
+    add("Figure 5: IoU of the method and both baselines", "", "figure-05.png", drawn=drawn)
+    names = [name for name in ("paper", "rose") if name in present]
+    drawn = draw_iou(folder / "figure-09.png", iou, names, (measure,))
+    add("Figure 9: IoU with two ways to find structure", "", "figure-09.png", drawn=drawn)
+    names = [name for name in METHODS if any(row["estimate"] == name for row in coverage)]
+    shown = [*WITHOUT_PREDICTION, *names[:1]]
+    drawn = draw_errors(folder / "figure-12.png", coverage, shown)
+    table = [row for row in coverage if row["part"] == "all"]
+    add("Figure 12: errors of the coverage cost", "", "figure-12.png",
+        _doors_table(table, "estimate", [*WITHOUT_PREDICTION, *names], "error"), drawn=drawn)  # fmt: skip
+    drawn = draw_errors(folder / "figure-14.png", coverage, names)
+    add("Figure 14: errors of the coverage cost by prediction", "", "figure-14.png", drawn=drawn)
+    method = next((name for name in METHODS if name in present), None)
+    if method is not None:
+        cases = extreme_cases(scores, method)
+        count = draw_extremes(folder / "figure-07.png", folder / "figure-13.png", cases, samples)
+        add("Figure 7: much predicted from little", "Of the tenth of the maps that show least: the one whose coverage "
+            "cost is estimated best, and the one of another building where it is estimated worst.", "figure-07.png",
+            drawn=count > 0)  # fmt: skip
+        add("Figure 13: graphs of the same maps", "", "figure-13.png", drawn=count > 1)
+        worst = "best" if "best" in present else method
+        drawn = draw_worst(folder / "worst.png", scores, samples, worst, config.worst)
+        add("Worst cases", "By mean IoU of matched rooms.", "worst.png", drawn=drawn)
+    return sections
 
 
-def _room_rows(scores: Sequence[Scores]) -> list[list[Any]]:
-    """A row a room and measure; a hidden room whose door was not seen counts 0 in a measure of its own."""
-    rows: list[list[Any]] = []
-    for score in scores:
-        head = [score["method"], score["sample"], score["doors"]]
-        rows += [[*head, "matched", f"{number:02d}", figure] for number, figure in enumerate(score["matched"])]
-        rows += [[*head, "by door", door, figure] for door, figure in score["by_door"].items()]
-        rows += [[*head, "not seen", door, 0.0] for door in score["not_seen"]]
-    return rows
+def _table(rows: Sequence[Row]) -> list[list[Any]]:
+    if not rows:
+        return [[]]
+    head = list(rows[0])
+    return [[name.replace("_", " ") for name in head], *([row.get(name) for name in head] for row in rows)]
 
 
-def _summary(method: str, scores: Sequence[Scores], config: EvaluateConfig) -> dict[str, Any]:
-    """Means with standard deviations and 95 % bootstrap intervals over samples."""
-    matched = [np.array(score["matched"], dtype=np.float64) for score in scores]
-    by_door = [np.array([*score["by_door"].values()], dtype=np.float64) for score in scores]
-    area = [np.array([score["area"]]) for score in scores]
-    agreement = [np.array([score["agreement"]]) for score in scores if "agreement" in score]
-    seconds = [score["seconds"] for score in scores if "seconds" in score]
-    row: dict[str, Any] = {"method": method, "samples": len(scores), "rooms": sum(map(len, matched))}
-    for name, groups in (("matched", matched), ("by_door", by_door), ("area", area), ("agreement", agreement)):
-        values = np.concatenate(groups) if groups else np.zeros(0)
-        low, high = bootstrap(groups, config.resamples, f"{method} {name}")
-        row |= {
-            f"{name}_mean": _rounded(values.mean()) if values.size else None,
-            f"{name}_median": _rounded(np.median(values)) if values.size else None,
-            f"{name}_sd": _rounded(values.std()) if values.size else None,
-            f"{name}_low": low,
-            f"{name}_high": high,
-        }
-    row["not_seen"] = sum(len(score["not_seen"]) for score in scores)
-    row["seconds_median"] = round(float(np.median(seconds)), 3) if seconds else None
-    return row
+def _iou_table(rows: Sequence[Row]) -> list[list[Any]]:
+    head: list[Any] = ["method", "samples", "rooms", "not seen"]
+    measures = {"by_door": "IoU by door", "matched": "IoU matched", "area": "IoU whole area", "with_unseen": "by door, "
+                "unseen 0"}  # fmt: skip
+    head += [f"{name}: mean (sd; low to high; world low to world high)" for name in measures.values()]
+    table = [head]
+    for row in rows:
+        line: list[Any] = [row["method"], row["samples"], row["rooms"], row["not_seen"]]
+        for name in measures:
+            keys = ("mean", "sd", "low", "high", "world_low", "world_high")
+            figures = [row[f"{name}_{key}"] for key in keys]
+            text = "{:.3f} ({:.3f}; {:.3f} to {:.3f}; {:.3f} to {:.3f})"
+            line.append(None if None in figures else text.format(*figures))
+        table.append(line)
+    return table
 
 
-def _rounded(value: Any) -> float:
-    return round(float(value), 6)
+def _doors_table(rows: Sequence[Row], key: str, names: Sequence[str], measure: str) -> list[list[Any]]:
+    """Means by number of closed doors: a line a number, a column a method."""
+    numbers = sorted({row["closed_doors"] for row in rows if row["closed_doors"] != "all"})
+    means = {(row[key], row["closed_doors"]): row[f"{measure}_mean"] for row in rows}
+    return [["closed doors", *names], *([n, *(means.get((name, n)) for name in names)] for n in numbers)]
 
 
-def bootstrap(groups: Sequence[FloatArray], resamples: int, name: str) -> tuple[float | None, float | None]:
-    """95 % percentile interval of the mean over all values, whole groups (samples) drawn with replacement.
-
-    Rooms of one sample are not independent of each other, so samples are what is drawn.
-    """
-    sums = np.array([group.sum() for group in groups if group.size])
-    counts = np.array([group.size for group in groups if group.size])
-    if not sums.size:
-        return None, None
-    draws = stream(0, "bootstrap", name).integers(0, sums.size, (resamples, sums.size))
-    means = sums[draws].sum(axis=1) / counts[draws].sum(axis=1)
-    low, high = np.percentile(means, [2.5, 97.5])
-    return _rounded(low), _rounded(high)
-
-
-def _write_csv(path: Path, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows(["" if value is None else value for value in row] for row in rows)
-    write_bytes(path, text.getvalue().encode())
-
-
-def _write_parquet(path: Path, rows: Sequence[Sequence[Any]]) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    columns: list[list[Any]] = [[row[i] for row in rows] for i in range(len(COLUMNS))]
-    types = (pa.string(), pa.string(), pa.int64(), pa.string(), pa.string(), pa.float64())
-    arrays = [pa.array(values, kind) for values, kind in zip(columns, types, strict=True)]
-    data = io.BytesIO()
-    pq.write_table(pa.table(arrays, names=COLUMNS), data)
-    write_bytes(path, data.getvalue())
-
-
-def _draw_curves(path: Path, by_doors: Sequence[dict[str, Any]]) -> None:
-    """IoU against the number of closed doors, with standard deviations, by method (paper, figure 5)."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11, 4.5), layout="constrained")
-    FigureCanvasAgg(figure)
-    for axes, (measure, title) in zip(
-        figure.subplots(1, 2, sharey=True),
-        (("matched", "hidden rooms, matched one-to-one"), ("by_door", "rooms with the same door")),
-        strict=True,
-    ):
-        methods = sorted({row["method"] for row in by_doors})
-        for number, method in enumerate(methods):
-            rows = [row for row in by_doors if row["method"] == method and row[f"{measure}_mean"] is not None]
-            if not rows:
-                continue
-            doors = np.array([row["closed_doors"] for row in rows]) + (number - len(methods) / 2) * 0.06
-            means, spread = [np.array([row[f"{measure}_{name}"] for row in rows]) for name in ("mean", "sd")]
-            axes.errorbar(doors, means, spread, label=method, marker="o", markersize=3, elinewidth=0.7, capsize=2)
-        axes.set(title=title, xlabel="closed doors", ylim=(0, 1.05))
-        axes.grid(alpha=0.3)
-        if axes.get_legend_handles_labels()[0]:
-            axes.legend(fontsize=8)
-    figure.axes[0].set_ylabel("IoU (mean, standard deviation)")
-    _save(figure, path)
-
-
-def _draw_worst(path: Path, scores: Sequence[Scores], samples: Sequence[SamplePath], config: EvaluateConfig) -> None:
-    """The samples with the lowest mean IoU of the first method asked for: map, prediction and truth in one picture."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    method = "best" if "best" in config.methods else config.methods[0]
-    scored = [score for score in scores if score["method"] == method and score["matched"]]
-    scored.sort(key=lambda score: (float(np.mean(score["matched"])), score["sample"]))
-    folders = {sample.name: sample.folder for sample in samples}
-    worst = scored[: config.worst]
-    if not worst:
-        return
-    columns = min(4, len(worst))
-    rows = -(-len(worst) // columns)
-    figure = Figure(figsize=(4.2 * columns, 4.2 * rows), layout="constrained")
-    FigureCanvasAgg(figure)
-    grid = np.atleast_1d(figure.subplots(rows, columns)).ravel()
-    for axes in grid:
-        axes.axis("off")
-    for axes, score in zip(grid, worst, strict=False):
-        _draw_case(axes, path.parent / method / score["sample"] / "rooms.geojson", folders[score["sample"]])
-        axes.set_title(f"{score['sample']}\n{method}: {np.mean(score['matched']):.2f}", fontsize=8)
-    figure.suptitle("worst cases: true free space hidden from the map (orange), predicted rooms (blue outline)")
-    _save(figure, path)
-
-
-def _draw_case(axes: Any, rooms_path: Path, folder: Path) -> None:
-    import shapely
-    from shapely.geometry import Polygon
-
-    from closedrooms.core.geojson import read_rooms
-    from closedrooms.pipeline.evaluation.scores import hidden_area
-
-    try:
-        sample, rooms = read_sample(folder), read_rooms(rooms_path)
-    except InvalidInputError:
-        return
-    shown = np.full((*sample.observed.frame.shape, 3), 215, dtype=np.uint8)
-    shown[sample.observed.free] = 255
-    shown[hidden_area(sample.observed, sample.truth)] = (255, 205, 130)
-    shown[sample.observed.occupied | (sample.truth.occupied & sample.observed.unknown)] = 40
-    x_min, y_min, x_max, y_max = sample.observed.frame.bounds
-    axes.imshow(shown, origin="lower", extent=(x_min, x_max, y_min, y_max), interpolation="nearest")
-    for room in rooms:
-        for part in shapely.get_parts(room.polygon):
-            if isinstance(part, Polygon):
-                axes.plot(*part.exterior.xy, color="#1c5fb0", linewidth=1.2)
-    axes.plot(*np.array([door.midpoint for door in sample.doors]).reshape(-1, 2).T, "r.", markersize=4)
-
-
-def _save(figure: Any, path: Path) -> None:
-    data = io.BytesIO()
-    figure.savefig(data, format="png", dpi=110, metadata={"Software": None})
-    write_bytes(path, data.getvalue())
+def _failure_section(failures: Mapping[str, str]) -> Section:
+    table = [["sample", "why"], *([name, why] for name, why in sorted(failures.items()))]
+    return Section("What failed", tables=[table])

@@ -1,18 +1,24 @@
-"""One method on one sample: predict, score, keep."""
+"""All methods on one sample: read once; predict, plan, score and keep for each method."""
 
 import hashlib
 import json
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from closedrooms.core.arrays import BoolArray
 from closedrooms.core.errors import ClosedroomsError, OutputError
 from closedrooms.core.files import write_json
 from closedrooms.core.geojson import write_rooms
-from closedrooms.pipeline.evaluation.samples import Sample, SamplePath, read_sample
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.pipeline.evaluation.config import TOURED
+from closedrooms.pipeline.evaluation.listing import SamplePath
+from closedrooms.pipeline.evaluation.samples import Sample, read_sample
 from closedrooms.pipeline.evaluation.scores import (
     added_rooms,
     hidden_area,
@@ -22,56 +28,114 @@ from closedrooms.pipeline.evaluation.scores import (
     room_masks,
     union_of,
 )
+from closedrooms.pipeline.evaluation.tours import Tour, code_digest, kept_tour, plan_tour, tour_code, tour_figures
 from closedrooms.pipeline.manifest import versions
 from closedrooms.pipeline.metrics import room_iou
 from closedrooms.predictor.prediction import Prediction
 
 AUTHORS = "authors"
 RESULT = "scores.json"
-INPUTS = {".yaml", ".png", ".pgm", ".geojson"}
+INPUTS = {".yaml", ".png", ".pgm", ".geojson", ".json"}
 Scores = dict[str, Any]
 
 
-def evaluate_sample(sample: SamplePath, method: str, out: Path) -> Scores | str:
-    """Scores of one method on one sample, kept in ``out/<method>/<sample>``; the reason as text when it fails.
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """What came of one sample.
+
+    Attributes:
+        scores: One entry a method that could be scored.
+        problems: Why something failed, by ``sample`` (all of it), or ``method sample``.
+    """
+
+    scores: list[Scores] = field(default_factory=list)
+    problems: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Hidden:
+    """What the map does not show of the truth: the same for every method."""
+
+    area: BoolArray
+    rooms: list[BoolArray]
+    share: float
+
+
+def evaluate_sample(sample: SamplePath, methods: Sequence[str], out: Path, *, tours: bool = True) -> Outcome:
+    """Scores of some methods on one sample, each kept in ``out/<method>/<sample>``.
+
+    What was kept before from the same files, with the same method and code, is not done again.
+
+    Args:
+        sample: The sample.
+        methods: Methods; the authors' own map is scored too where the sample has it.
+        out: Folder of the evaluation.
+        tours: Plan coverage tours too, where the sample's run.json tells |R|.
 
     Raises:
         OutputError: The result cannot be written.
     """
-    folder = out / method / sample.name
-    key = _fingerprint(sample.folder, method)
-    kept = _kept(folder / RESULT, key)
-    if kept is not None:
-        return kept
+    outcome = Outcome()
+    if sample.problem:
+        outcome.problems[sample.name] = sample.problem
+        return outcome
+    wanted = [*methods, *([AUTHORS] if (sample.folder / "authors.yaml").is_file() else [])]
+    content = _content(sample.folder)
+    keys = {method: _fingerprint(content, method, tours=tours) for method in wanted}
+    kept = {method: _kept(out / method / sample.name / RESULT, keys[method]) for method in wanted}
+    if any(scores is None for scores in kept.values()):
+        try:
+            read = read_sample(sample)
+            hidden = _hidden(read)
+        except ClosedroomsError as error:
+            outcome.problems[sample.name] = str(error)
+            return outcome
+    for method in wanted:
+        scores = kept[method]
+        if scores is None:
+            folder = out / method / sample.name
+            _make(folder)
+            head = _head(read, sample.name, method, keys[method], hidden)
+            try:
+                scores = head | _score(read, method, folder, hidden, out, tours=tours)
+            except OutputError:
+                raise
+            except ClosedroomsError as error:
+                outcome.problems[f"{method} {sample.name}"] = str(error)
+                continue
+            write_json(folder / RESULT, scores)
+        outcome.scores.append(scores)
+        if "no_tour" in scores:
+            outcome.problems[f"{method} {sample.name}"] = scores["no_tour"]
+    return outcome
+
+
+def _make(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot write ({error.strerror}): {folder}") from error
-    try:
-        read = read_sample(sample.folder)
-        scores: Scores = {"key": key, "sample": sample.name, "method": method, "doors": len(read.doors)}
-        scores |= _score_authors(read) if method == AUTHORS else _score(read, method, folder)
-    except OutputError:
-        raise
-    except ClosedroomsError as error:
-        return str(error)
-    write_json(folder / RESULT, scores)
-    return scores
 
 
-def _fingerprint(folder: Path, method: str) -> str:
-    """Changes with the input, the method, the versions of libraries and the code that predicts and scores."""
-    digest = hashlib.sha256(f"{method} {json.dumps(versions())}".encode())
-    root = Path(__file__).parents[2]
-    code = [
-        *(root / "predictor").rglob("*.py"),
-        *(root / "core").rglob("*.py"),
-        *(root / "pipeline" / "evaluation").glob("*.py"),
-    ]
-    given = [path for path in folder.glob("*") if path.is_file() and path.suffix in INPUTS]
-    for path in [*sorted(code), *sorted(given)]:
+def _content(folder: Path) -> str:
+    """Digest of the files of a sample."""
+    digest = hashlib.sha256()
+    for path in sorted(path for path in folder.glob("*") if path.suffix in INPUTS and path.is_file()):
         digest.update(path.name.encode() + hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
+
+
+def _fingerprint(content: str, method: str, *, tours: bool) -> str:
+    """Changes with the input, the method, the versions of libraries and the code that predicts, plans and scores."""
+    parts = [content, method, json.dumps(versions()), _code(), tour_code() if tours and method in TOURED else ""]
+    return hashlib.sha256(" ".join(parts).encode()).hexdigest()
+
+
+@lru_cache(maxsize=1)
+def _code() -> str:
+    root, here = Path(__file__).parents[2], Path(__file__).parent
+    files = [*(root / "predictor").rglob("*.py"), *(root / "core").rglob("*.py"), root / "pipeline" / "metrics.py"]
+    return code_digest([*files, *(here / name for name in ("sample.py", "samples.py", "scores.py"))])
 
 
 def _kept(path: Path, key: str) -> Scores | None:
@@ -79,7 +143,7 @@ def _kept(path: Path, key: str) -> Scores | None:
         scores: Scores = json.loads(path.read_text())
     except (OSError, ValueError):
         return None
-    return scores if scores.get("key") == key else None
+    return scores if isinstance(scores, dict) and scores.get("key") == key else None
 
 
 def predict_with(method: str, sample: Sample) -> Prediction:
@@ -98,7 +162,31 @@ def predict_with(method: str, sample: Sample) -> Prediction:
     return predict(sample.observed, sample.doors, config)
 
 
-def _score(sample: Sample, method: str, folder: Path) -> Scores:
+def _hidden(sample: Sample) -> _Hidden:
+    area = hidden_area(sample.observed, sample.truth)
+    rooms = hidden_rooms(area, sample.observed.frame.resolution)
+    free = int(np.count_nonzero(sample.truth.free))
+    return _Hidden(area, rooms, int(np.count_nonzero(area)) / max(free, 1))
+
+
+def _head(sample: Sample, name: str, method: str, key: str, hidden: _Hidden) -> Scores:
+    return {
+        "key": key,
+        "sample": name,
+        "method": method,
+        "world": sample.world,
+        "repetition": sample.repetition,
+        "closed_doors": sample.closed,
+        "doors": len(sample.doors),
+        "hidden_share": round(hidden.share, 6),
+    }
+
+
+def _score(sample: Sample, method: str, folder: Path, hidden: _Hidden, out: Path, *, tours: bool) -> Scores:
+    if method == AUTHORS:
+        assert sample.authors is not None, "only samples with authors.yaml come here"
+        masks = added_rooms(sample.observed, sample.authors)
+        return _hidden_scores(hidden, masks) | {"by_door": {}, "not_seen": []}
     begin = time.perf_counter()
     prediction = predict_with(method, sample)
     seconds = time.perf_counter() - begin
@@ -107,7 +195,7 @@ def _score(sample: Sample, method: str, folder: Path) -> Scores:
     masks = [mask & unknown for mask in room_masks(prediction.rooms, sample.observed.frame)]
     detected = {door.id for door in sample.doors}
     figures = room_iou(prediction.rooms, sample.rooms)
-    scores = _hidden_scores(sample, masks) | {
+    scores = _hidden_scores(hidden, masks) | {
         "by_door": {door: round(figure, 6) for door, figure in figures.items() if door in detected},
         "not_seen": sorted(set(figures) - detected),
         "failures": prediction.failures,
@@ -117,18 +205,40 @@ def _score(sample: Sample, method: str, folder: Path) -> Scores:
         theirs = sample.authors.free & unknown
         ours = prediction.grid.on(sample.observed.frame).free & unknown
         scores["agreement"] = round(iou(ours, theirs), 6)
+    if tours and method in TOURED and sample.rooms_seen is not None:
+        try:
+            scores["tour"] = _tours(sample, prediction.grid, sample.rooms_seen, out)
+        except OutputError:
+            raise
+        except ClosedroomsError as error:
+            scores["no_tour"] = f"no tour: {error}"
     return scores
 
 
-def _score_authors(sample: Sample) -> Scores:
-    assert sample.authors is not None, "only samples with authors.yaml come here"
-    return _hidden_scores(sample, added_rooms(sample.observed, sample.authors)) | {"by_door": {}, "not_seen": []}
+def _tours(sample: Sample, predicted: OccupancyGrid, rooms_seen: int, out: Path) -> Tour:
+    """The three tours and the errors of the three estimates in percent (paper, sections 5.2 and 5.3)."""
+    from closedrooms.coverage.estimates import errors_of_lengths
 
-
-def _hidden_scores(sample: Sample, masks: Sequence[BoolArray]) -> Scores:
-    area = hidden_area(sample.observed, sample.truth)
-    rooms = hidden_rooms(area, sample.observed.frame.resolution)
+    closed = kept_tour(out, sample.observed, sample.doors)
+    truth = kept_tour(out, sample.truth)
+    own = tour_figures(plan_tour(predicted))
+    errors = errors_of_lengths(
+        closed["length_m"], own["length_m"], truth["length_m"], n_rooms=rooms_seen, n_doors=len(sample.doors)
+    )
     return {
-        "matched": [round(float(figure), 6) for figure in matched_iou(rooms, masks)],
-        "area": round(iou(area, union_of(masks, area.shape)), 6),
+        "rooms_seen": rooms_seen,
+        "closed": closed,
+        "predicted": own,
+        "truth": truth,
+        "baseline_m": round(errors.tsp_baseline, 6),
+        "error_closed": round(errors.error_closed, 6),
+        "error_baseline": round(errors.error_baseline, 6),
+        "error_predicted": round(errors.error_pred, 6),
+    }
+
+
+def _hidden_scores(hidden: _Hidden, masks: Sequence[BoolArray]) -> Scores:
+    return {
+        "matched": [round(float(figure), 6) for figure in matched_iou(hidden.rooms, masks)],
+        "area": round(iou(hidden.area, union_of(masks, hidden.area.shape)), 6),
     }

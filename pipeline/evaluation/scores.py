@@ -98,7 +98,10 @@ def matched_iou(truth: Sequence[BoolArray], predicted: Sequence[BoolArray]) -> F
     figures = np.zeros(len(truth))
     if not len(truth) or not len(predicted):
         return figures
-    table = np.array([[iou(room, other) for other in predicted] for room in truth])
+    sizes = [np.array([np.count_nonzero(mask) for mask in masks]) for masks in (truth, predicted)]
+    common = np.array([[np.count_nonzero(room & other) for other in predicted] for room in truth])
+    union = sizes[0][:, None] + sizes[1][None] - common
+    table = np.where(union > 0, common / np.maximum(union, 1), 1.0)
     rows, cols = linear_sum_assignment(-table)
     figures[rows] = table[rows, cols]
     return figures
@@ -106,8 +109,8 @@ def matched_iou(truth: Sequence[BoolArray], predicted: Sequence[BoolArray]) -> F
 
 def iou(a: BoolArray, b: BoolArray) -> float:
     """Intersection over union of two masks, 1 when both are empty."""
-    union = int((a | b).sum())
-    return float((a & b).sum() / union) if union else 1.0
+    union = np.count_nonzero(a | b)
+    return float(np.count_nonzero(a & b) / union) if union else 1.0
 
 
 def union_of(masks: Sequence[BoolArray], shape: tuple[int, int]) -> BoolArray:

@@ -1,6 +1,7 @@
 import csv
 import json
 import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +18,10 @@ from closedrooms.core.rosmap import write_map
 from closedrooms.pipeline.commands import main
 from closedrooms.pipeline.evaluation.config import EvaluateConfig
 from closedrooms.pipeline.evaluation.evaluate import evaluate
-from closedrooms.pipeline.evaluation.report import bootstrap
-from closedrooms.pipeline.evaluation.samples import find_samples
+from closedrooms.pipeline.evaluation.listing import find_samples
 
 
-def write_sample(folder: Path, *, width: int = 100) -> None:
+def write_sample(folder: Path, *, width: int = 100, about: dict[str, object] | None = None) -> None:
     """A corridor with rooms above it; the middle one, ``width`` cells wide, is closed."""
     folder.mkdir(parents=True)
     frame = GridFrame(0.05, 0.0, 0.0, 160, 220 + width)
@@ -38,6 +38,8 @@ def write_sample(folder: Path, *, width: int = 100) -> None:
     write_map(folder / "map", OccupancyGrid(frame, observed))
     write_doors(folder / "doors.geojson", [ClosedDoor("d1", (151 * 0.05, 2.6), None, 0.9)])
     write_rooms(folder / "truth_rooms.geojson", [Room(box(5.6, 2.7, 5.4 + 0.05 * width, 7.5), ("d1",))])
+    if about is not None:
+        (folder / "run.json").write_text(json.dumps(about))
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +60,10 @@ def evaluated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_writes_tables_pictures_and_the_rooms_of_every_sample(evaluated: Path) -> None:
     out = evaluated / "out"
     files = {path.name for path in out.iterdir() if path.is_file()}
-    assert files == {"run.json", "rooms.csv", "rooms.parquet", "samples.csv", "summary.csv", "iou.png", "worst.png"}
+    tables = {f"{name}.{kind}" for name in ("rooms", "samples", "summary", "worlds", "tests", "numbers")
+              for kind in ("csv", "parquet")}  # fmt: skip
+    pictures = {"iou.png", "figure-05.png", "figure-07.png", "figure-09.png", "worst.png"}
+    assert files == {"run.json", "report.html", *tables, *pictures}
     assert read_rooms(out / "paper" / "house" / "01" / "rooms.geojson")[0].doors == ("d1",)
     assert not (out / "authors" / "house" / "02").exists()
 
@@ -89,15 +94,18 @@ def test_goes_on_where_it_stopped_and_ends_with_the_same_figures(evaluated: Path
     assert (out / "rooms.csv").read_bytes() == before
 
 
-def test_a_broken_sample_is_said_and_the_others_are_evaluated(tmp_path: Path) -> None:
+def test_a_broken_sample_is_said_and_the_others_are_evaluated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     write_sample(tmp_path / "data" / "good")
     write_sample(tmp_path / "data" / "bad")
     (tmp_path / "data" / "bad" / "map.png").write_bytes(b"no picture")
     words = ["evaluate", tmp_path / "data", "--methods", "paper", "--workers", "1", "--out", tmp_path / "out"]
     assert main([str(word) for word in words]) == 3
     failures = json.loads((tmp_path / "out" / "run.json").read_text())["failures"]
-    assert list(failures) == ["paper bad"]
+    assert list(failures) == ["bad"]
     assert (tmp_path / "out" / "paper" / "good" / "rooms.geojson").exists()
+    assert "closedrooms: bad: a picture that cannot be read" in capsys.readouterr().err
 
 
 def test_two_samples_of_one_name_and_a_dataset_without_any_are_refused(tmp_path: Path) -> None:
@@ -121,14 +129,67 @@ def test_refuses_a_folder_that_holds_something_else(tmp_path: Path) -> None:
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["thesis.tex"]
 
 
-def test_the_bootstrap_interval_holds_the_mean_and_narrows_with_more_samples() -> None:
-    values = [np.random.default_rng(i).random(3) for i in range(200)]
-    low, high = bootstrap(values, 500, "test")
-    few_low, few_high = bootstrap(values[:10], 500, "test")
-    assert low is not None
-    assert high is not None
-    assert few_low is not None
-    assert few_high is not None
-    assert low < float(np.concatenate(values).mean()) < high
-    assert high - low < few_high - few_low
-    assert bootstrap([], 10, "test") == (None, None)
+@pytest.fixture(scope="module")
+def toured(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two runs in one building."""
+    base = tmp_path_factory.mktemp("toured")
+    for name in ("01", "02"):
+        about = {"world": "house", "closed": ["d1"], "repetition": int(name), "metrics": {"rooms_seen": 2}}
+        write_sample(base / "data" / name, about=about)
+    config = EvaluateConfig(datasets=(base / "data",), out=base / "out", methods=("paper", "geometric"), workers=1)
+    assert not evaluate(config).failures
+    return base / "out"
+
+
+def test_the_three_errors_of_the_coverage_cost_are_those_of_the_tours(toured: Path) -> None:
+    with (toured / "samples.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["method"] == "paper"]
+    assert [row["repetition"] for row in rows] == ["1", "2"]
+    for row in rows:
+        closed, predicted, truth = (float(row[f"tsp_{name}_m"]) for name in ("closed", "predicted", "truth"))
+        assert float(row["tsp_baseline_m"]) == pytest.approx(closed + closed / 2 * 1, abs=1e-5)
+        assert float(row["error_closed"]) == pytest.approx(abs(truth - closed) / truth * 100.0, abs=1e-3)
+        assert float(row["error_predicted"]) == pytest.approx(abs(truth - predicted) / truth * 100.0, abs=1e-3)
+        assert float(row["error_predicted"]) < float(row["error_closed"])
+
+
+def test_baselines_have_no_tour_and_maps_that_samples_share_are_toured_once(toured: Path) -> None:
+    with (toured / "coverage.csv").open() as file:
+        assert {row["estimate"] for row in csv.DictReader(file)} == {"closed", "baseline", "paper"}
+    assert len(list((toured / "tours").iterdir())) == 2
+    assert {"figure-12.png", "figure-13.png", "figure-14.png"} <= {path.name for path in toured.iterdir()}
+
+
+def test_the_numbers_of_the_text_stand_beside_ours(toured: Path) -> None:
+    with (toured / "numbers.csv").open() as file:
+        rows = {row["what"]: row for row in csv.DictReader(file)}
+    assert rows["environments"]["ours"] == "1"
+    assert rows["maps"] == {"where": "4.1", "what": "maps", "paper": "3885", "ours": "2"}
+    assert rows["subset: coverage error [%], closed: mean (sd)"]["paper"] == "21.37 (16.18)"
+
+
+def test_tours_can_be_left_out(tmp_path: Path) -> None:
+    write_sample(tmp_path / "data" / "01", about={"metrics": {"rooms_seen": 2}})
+    config = EvaluateConfig(
+        datasets=(tmp_path / "data",), out=tmp_path / "out", methods=("paper",), workers=1, tours=False
+    )
+    evaluate(config)
+    assert not (tmp_path / "out" / "tours").exists()
+    assert not (tmp_path / "out" / "figure-12.png").exists()
+
+
+def test_the_page_opens_in_a_browser_without_network_and_without_complaint(toured: Path, tmp_path: Path) -> None:
+    browser = shutil.which("chromium") or shutil.which("chromium-browser")
+    if browser is None:
+        pytest.skip("no chromium on this machine (Debian: apt-get install chromium)")
+    page = toured / "report.html"
+    text = page.read_text()
+    assert "http" not in text
+    assert "src=" not in text.replace('src="data:image/png;base64,', "")
+    words = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
+             "--enable-logging=stderr", f"--user-data-dir={tmp_path}", "--dump-dom", page.as_uri()]  # fmt: skip
+    opened = subprocess.run(words, capture_output=True, text=True, timeout=120, check=True)
+    assert "CONSOLE" not in opened.stderr
+    assert "<title>closedrooms evaluate: 2 samples</title>" in opened.stdout
+    for number in (5, 7, 9, 12, 13, 14):
+        assert f'<img alt="Figure {number}:' in opened.stdout
