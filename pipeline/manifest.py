@@ -1,6 +1,7 @@
 """What ``run.json`` says of how a result came about."""
 
 import dataclasses
+import functools
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,11 @@ LIBRARIES = (
 
 def versions() -> dict[str, str]:
     """Version of every library that can change a result."""
+    return dict(_versions())
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
     found = {}
     for name in LIBRARIES:
         try:

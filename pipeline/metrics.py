@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from closedrooms.core.arrays import BoolArray
+from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
@@ -58,8 +58,12 @@ def mean(figures: Mapping[str, float]) -> float | None:
 
 def rooms_seen(plan: FloorPlan, grid: OccupancyGrid, map_T_world: Pose2) -> int:
     """How many true rooms the robot saw: |R| of section 5.2. A room counts when half of it is known in ``grid``."""
-    known = grid.known
-    seen = 0
+    return count_seen(room_points(plan), grid, map_T_world)
+
+
+def room_points(plan: FloorPlan) -> list[FloatArray]:
+    """Points spread evenly over each room that has an inside, shape (n, 2) each, building frame [m]."""
+    spread = []
     for room in plan.rooms:
         interior = room_interior(plan, room.id)
         if interior.is_empty:
@@ -67,8 +71,17 @@ def rooms_seen(plan: FloorPlan, grid: OccupancyGrid, map_T_world: Pose2) -> int:
         x_min, y_min, x_max, y_max = interior.bounds
         xs, ys = np.meshgrid(np.arange(x_min, x_max, SEEN_SPACING), np.arange(y_min, y_max, SEEN_SPACING))
         inside = shapely.contains_xy(interior, xs.ravel(), ys.ravel())
-        points = np.column_stack((xs.ravel()[inside], ys.ravel()[inside]))
+        if inside.any():
+            spread.append(np.column_stack((xs.ravel()[inside], ys.ravel()[inside])))
+    return spread
+
+
+def count_seen(rooms: Sequence[FloatArray], grid: OccupancyGrid, map_T_world: Pose2) -> int:
+    """:func:`rooms_seen` for many maps of one building, whose :func:`room_points` are computed once."""
+    known = grid.known
+    seen = 0
+    for points in rooms:
         cells = grid.frame.to_cells(map_T_world.transform(points))
         cells = cells[grid.frame.contains(cells)]
-        seen += bool(len(points)) and int(known[cells[:, 0], cells[:, 1]].sum()) >= SEEN_SHARE * len(points)
+        seen += int(known[cells[:, 0], cells[:, 1]].sum()) >= SEEN_SHARE * len(points)
     return seen

@@ -18,7 +18,7 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.beams import Beams, clean
+from closedrooms.mapping.beams import clean
 from closedrooms.mapping.doors import fuse_doors
 from closedrooms.mapping.evidence import EvidenceGrid
 from closedrooms.mapping.keyframe import Keyframe
@@ -61,6 +61,18 @@ class _Crossings:
     distance: FloatArray
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Drawn:
+    """A keyframe as it stands in the drawing, with the closed doors that its scan measured."""
+
+    scan: LaserScan
+    keyframe: Keyframe
+    doors: tuple[str, ...]
+
+    def shows(self, ranges: FloatArray, doors: tuple[str, ...]) -> bool:
+        return self.doors == doors and np.array_equal(self.scan.ranges, ranges, equal_nan=True)
+
+
 class Eraser:
     """Redraws maps of one survey; keeps what does not depend on which doors are closed.
 
@@ -85,9 +97,14 @@ class Eraser:
         self._ranges = np.array([scan.ranges for scan in survey.keyframes.scans])
         draws = stream(survey.seed, "erased", "range").standard_normal(self._ranges.shape)
         self._noise = config.noise.range_sd * draws
-        self._beams: dict[int, Beams] = {}
         self._shut: dict[str, _Crossings] = {}
-        self._open: dict[str, _Crossings] = {}
+        self._stood_open: dict[str, _Crossings] = {}
+        # The drawing as it is now: counts are sums, so that going from one set of closed doors to the next only takes
+        # out and puts in the scans that differ, and the way there leaves no trace. It begins with all doors open and
+        # so keeps the frame of the whole survey.
+        self._grid = EvidenceGrid(survey.mapper)
+        self._drawn: list[_Drawn | None] = [None] * len(survey.poses)
+        self._draw(np.arange(len(survey.poses)), self._ranges, np.full(self._ranges.shape, -1), ())
 
     def erase(self, closed: Collection[str]) -> ErasedMap:
         """The map with ``closed`` doors closed.
@@ -98,26 +115,43 @@ class Eraser:
         Raises:
             InvalidInputError: Doors that do not exist or close no room.
         """
-        survey = self.survey
-        closed = check_closed(survey.plan, closed)
-        kept = self._outside(closed, survey.true_poses)
+        closed = check_closed(self.survey.plan, closed)
+        kept = self._outside(closed, self.survey.true_poses)
         ranges, owner = self._cut(closed)
-        grid = EvidenceGrid(survey.mapper)
-        keyframes, scans = [], []
-        for index in kept:
-            number = int(index)
-            same = np.array_equal(ranges[number], self._ranges[number], equal_nan=True)
-            scan = self._scan(number) if same else replace(self._scan(number), ranges=ranges[number])
-            beams = self._beams_of(number) if same else clean(scan, max_range=survey.mapper.max_range)
-            pose = Pose2(*survey.poses[number])
-            keyframe = Keyframe(number, scan.stamp, pose, beams, np.zeros((0, 2)), 0.0)
-            measured = np.unique(owner[number][np.isfinite(ranges[number])])
-            for door in measured[measured >= 0]:
-                keyframe.remember(self._sighting(closed[int(door)], number), Pose2())
-            grid.add(beams, pose)
-            keyframes.append(keyframe)
-            scans.append(scan)
-        return ErasedMap(grid.grid(), fuse_doors(keyframes), kept, tuple(scans))
+        self._draw(kept, ranges, owner, closed)
+        drawn = [entry for entry in self._drawn if entry is not None]
+        doors = fuse_doors([entry.keyframe for entry in drawn])
+        return ErasedMap(self._grid.grid(), doors, kept, tuple(entry.scan for entry in drawn))
+
+    def _draw(self, kept: IntArray, ranges: FloatArray, owner: IntArray, closed: tuple[str, ...]) -> None:
+        """Bring the drawing to these scans: keyframes ``kept``, ranges and owners of all keyframes."""
+        wanted = set(kept.tolist())
+        for number, before in enumerate(self._drawn):
+            if number in wanted:
+                seen = np.unique(owner[number][np.isfinite(ranges[number])])
+                doors = tuple(closed[int(index)] for index in seen[seen >= 0])
+                if before is not None and before.shows(ranges[number], doors):
+                    continue
+                self._drawn[number] = self._keyframe(number, ranges[number], doors)
+            else:
+                self._drawn[number] = None
+            after = self._drawn[number]
+            if before is not None:
+                self._grid.add(before.keyframe.beams, before.keyframe.pose, sign=-1)
+            if after is not None:
+                self._grid.add(after.keyframe.beams, after.keyframe.pose)
+
+    def _keyframe(self, number: int, ranges: FloatArray, doors: tuple[str, ...]) -> "_Drawn":
+        """A keyframe of the survey with other ranges, that sees ``doors``."""
+        survey = self.survey
+        scan = survey.keyframes.scans[number]
+        if not np.array_equal(ranges, self._ranges[number], equal_nan=True):
+            scan = replace(scan, ranges=ranges)
+        beams, pose = clean(scan, max_range=survey.mapper.max_range), Pose2(*survey.poses[number])
+        keyframe = Keyframe(number, scan.stamp, pose, beams, np.zeros((0, 2)), 0.0)
+        for name in doors:
+            keyframe.remember(self._sighting(name, number), Pose2())
+        return _Drawn(scan, keyframe, doors)
 
     def _outside(self, closed: Collection[str], poses_map: FloatArray) -> IntArray:
         """Indices of the true poses, shape (n, 3), map frame, that are not behind a closed door."""
@@ -128,15 +162,6 @@ class Eraser:
         points = self.survey.world_T_map.transform(poses_map[:, :2])
         return np.flatnonzero(~shapely.contains_xy(hidden, points[:, 0], points[:, 1]))
 
-    def _scan(self, number: int) -> LaserScan:
-        return self.survey.keyframes.scans[number]
-
-    def _beams_of(self, number: int) -> Beams:
-        """A scan that no closed door changes, cleaned once."""
-        if number not in self._beams:
-            self._beams[number] = clean(self._scan(number), max_range=self.survey.mapper.max_range)
-        return self._beams[number]
-
     def _cut(self, closed: tuple[str, ...]) -> tuple[FloatArray, IntArray]:
         """Ranges with the doors closed, shape (k, beams) [m], and by which door (its index) each was cut, else -1."""
         ranges = self._ranges.copy()
@@ -145,7 +170,7 @@ class Eraser:
         limit = np.full(ranges.shape, np.inf)
         owner = np.full(ranges.shape, -1)
         for index, name in enumerate(closed):
-            met = self._crossings(name, opened=False)
+            met = self._crossings(name)
             nearer = met.distance < limit[met.scan, met.beam]
             limit[met.scan[nearer], met.beam[nearer]] = met.distance[nearer]
             owner[met.scan[nearer], met.beam[nearer]] = index
@@ -160,33 +185,40 @@ class Eraser:
 
     def _cast_anew(self, closed: tuple[str, ...], ranges: FloatArray) -> None:
         """Replace, in place, what measured a closed door's leaf where it stood open."""
-        survey, lidar = self.survey, self.survey.sim.lidar
-        ended = []
-        for name in closed:
-            met = self._crossings(name, opened=True)
-            measured = self._ranges[met.scan, met.beam]
-            near = measured >= met.distance - NEAR_LEAF - SIGMAS * survey.sim.noise.range_sd
-            ended.append(np.column_stack((met.scan[near], met.beam[near])))
-        pairs = np.unique(np.concatenate(ended), axis=0) if ended else np.zeros((0, 2), dtype=np.int64)
-        if len(pairs) == 0:
+        if not closed:
             return
-        scan, beam = pairs.T
+        lidar = self.survey.sim.lidar
+        ended = [self._ended_on(name) for name in closed]
+        scan, beam, solid = (
+            np.concatenate([getattr(met, part) for met in ended]) for part in ("scan", "beam", "distance")
+        )
         leaves = [leaf.at(0.0 if name in closed else leaf.travel) for name, own in self._leaves.items() for leaf in own]
-        edges = np.concatenate([self._edges, *(np.array(leaf_edges(corners)) for corners in leaves)])
-        angles = self._angles[scan, beam]
-        directions = np.column_stack((np.cos(angles), np.sin(angles)))
-        true = first_hits(self._places[scan], directions, edges)
+        edges = np.concatenate([np.array(leaf_edges(corners)) for corners in leaves])
+        true = np.minimum(solid, first_hits(self._places[scan], self._directions(scan, beam), edges))
         seen = true + self._noise[scan, beam]
         seen = np.where(seen < lidar.range_min, np.nan, np.where(seen >= lidar.range_max, np.inf, seen))
         ranges[scan, beam] = seen
 
-    def _crossings(self, name: str, *, opened: bool) -> _Crossings:
-        """Beams that meet a door's leaves where they close it, or where they stood open."""
-        known = self._open if opened else self._shut
-        if name not in known:
-            corners = np.array([leaf.at(leaf.travel if opened else 0.0) for leaf in self._leaves[name]])
-            known[name] = self._meeting(corners)
-        return known[name]
+    def _ended_on(self, name: str) -> _Crossings:
+        """Beams that ended on the leaves of a door that stood open, and how far the walls let them go without."""
+        if name not in self._stood_open:
+            met = self._meeting(np.array([leaf.at(leaf.travel) for leaf in self._leaves[name]]))
+            measured = self._ranges[met.scan, met.beam]
+            near = measured >= met.distance - NEAR_LEAF - SIGMAS * self.survey.sim.noise.range_sd
+            scan, beam = met.scan[near], met.beam[near]
+            solid = first_hits(self._places[scan], self._directions(scan, beam), self._edges)
+            self._stood_open[name] = _Crossings(scan, beam, solid)
+        return self._stood_open[name]
+
+    def _directions(self, scan: IntArray, beam: IntArray) -> FloatArray:
+        angles = self._angles[scan, beam]
+        return np.column_stack((np.cos(angles), np.sin(angles)))
+
+    def _crossings(self, name: str) -> _Crossings:
+        """Beams that meet a door's leaves where they close it."""
+        if name not in self._shut:
+            self._shut[name] = self._meeting(np.array([leaf.at(0.0) for leaf in self._leaves[name]]))
+        return self._shut[name]
 
     def _meeting(self, corners: FloatArray) -> _Crossings:
         """Beams that meet leaves with ``corners``, shape (leaves, 4, 2), building frame [m]."""
@@ -200,9 +232,8 @@ class Eraser:
         turned = np.abs(np.mod(self._angles - bearing[:, None] + np.pi, 2.0 * np.pi) - np.pi)
         within = distance - radius <= self.survey.sim.lidar.range_max
         scan, beam = np.nonzero((turned <= half[:, None] + 1e-9) & within[:, None])
-        angles = self._angles[scan, beam]
         edges = np.concatenate([np.array(leaf_edges(leaf)) for leaf in corners])
-        found = first_hits(self._places[scan], np.column_stack((np.cos(angles), np.sin(angles))), edges)
+        found = first_hits(self._places[scan], self._directions(scan, beam), edges)
         met = np.isfinite(found)
         return _Crossings(scan[met], beam[met], found[met])
 
@@ -211,7 +242,7 @@ class Eraser:
         door = next(door for door in self.survey.plan.doors if door.id == name)
         robot_T_world = (self.survey.world_T_map @ Pose2(*self.survey.true_poses[number])).inverse()
         (ax, ay), (bx, by) = robot_T_world.transform(np.array(door.segment))
-        stamp = float(self._scan(number).stamp)
+        stamp = float(self.survey.keyframes.scans[number].stamp)
         return DoorSighting(name, ((float(ax), float(ay)), (float(bx), float(by))), stamp)
 
 

@@ -13,7 +13,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import ClosedroomsError, OutputError
 from closedrooms.core.files import output_folder
 from closedrooms.core.geojson import write_doors, write_rooms
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.rosmap import write_map
 from closedrooms.core.tum import write_trajectory
@@ -28,16 +28,16 @@ from closedrooms.pipeline.dataset.open_survey import survey_open
 from closedrooms.pipeline.dataset.survey_store import read_survey, write_survey
 from closedrooms.pipeline.dataset.variants import Variant, World, noise_seed
 from closedrooms.pipeline.manifest import resolved, versions
-from closedrooms.pipeline.metrics import area_mapped, rooms_seen
+from closedrooms.pipeline.metrics import area_mapped, count_seen, room_points
 from closedrooms.pipeline.observer import Observer
 from closedrooms.pipeline.recording.opening import open_recording
-from closedrooms.pipeline.survey import survey_building, true_building
+from closedrooms.pipeline.survey import Truth, survey_building
 from closedrooms.pipeline.terminal import Silent
 from closedrooms.pipeline.witness import Witness
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan
-from closedrooms.worlds.truth import reachable
+from closedrooms.worlds.truth import rasterise, reachable, true_rooms, truth_bounds
 
 FORMAT = 1
 SURVEYS = "surveys"
@@ -142,7 +142,7 @@ def _make_sample(task: Task, variant: Variant, plan: FloorPlan) -> None:
         observer.configuration(manifest["configuration"])
         observer.building(plan, start.inverse(), closed)
         observed = _erased(config, world, closed) if erased else _simulated(config, plan, closed, seed, observer)
-        truth = true_building(plan, closed, observed.grid.frame, start.inverse())
+        truth = Truth(_true_map(world.source, observed.grid.frame, start), true_rooms(plan, closed, start.inverse()))
         if erased:
             _show(observer, observed)
         observer.truth(truth.grid, truth.rooms)
@@ -156,17 +156,17 @@ def _make_sample(task: Task, variant: Variant, plan: FloorPlan) -> None:
         if config.keep_scans and observed.scans is not None:
             write_scans(staging / "scans.npz", observed.scans, estimate=observed.estimate)
         manifest["exploration"] = observed.about
-        manifest["metrics"] = _metrics(plan, closed, observed, truth.grid, start)
+        manifest["metrics"] = _metrics(world.source, closed, observed, truth.grid, start)
         seen = {door.id for door in observed.doors}
         manifest["doors"] = {"seen": sorted(seen), "not_seen": sorted(set(closed) - seen)}
         manifest["checksums"] = checksums(staging)
 
 
 def _metrics(
-    plan: FloorPlan, closed: Sequence[str], observed: Observed, truth: OccupancyGrid, start: Pose2
+    source: str, closed: Sequence[str], observed: Observed, truth: OccupancyGrid, start: Pose2
 ) -> dict[str, Any]:
     """What a run's ``run.json`` says of the map, under the same names."""
-    map_T_world = start.inverse()
+    plan, map_T_world = _plan(source), start.inverse()
     position, heading = ate(observed.estimate, observed.truth)
     cells = reachable(plan, closed, truth.frame, map_T_world, (start.x, start.y))
     return {
@@ -175,7 +175,7 @@ def _metrics(
         "ate_rad": round(heading, 6),
         "doors_closed": len(closed),
         "doors_seen": len(observed.doors),
-        "rooms_seen": rooms_seen(plan, observed.grid, map_T_world),
+        "rooms_seen": count_seen(_room_points(source), observed.grid, map_T_world),
         "units": {"area_mapped": "share 0..1", "ate_m": "m", "ate_rad": "rad"},
     }
 
@@ -200,6 +200,18 @@ def _eraser(config: DatasetConfig, world: World) -> Eraser:
 @functools.lru_cache(maxsize=2)
 def _plan(source: str) -> FloorPlan:
     return load_world(source)
+
+
+@functools.lru_cache(maxsize=2)
+def _room_points(source: str) -> list[FloatArray]:
+    return room_points(_plan(source))
+
+
+@functools.lru_cache(maxsize=2)
+def _true_map(source: str, frame: GridFrame, start: Pose2) -> OccupancyGrid:
+    """The truth on ``frame``, grown so that it holds the building; erased maps of one survey share it."""
+    plan, map_T_world = _plan(source), start.inverse()
+    return rasterise(plan, frame.covering(*truth_bounds(plan, map_T_world)), map_T_world)
 
 
 def _simulated(
