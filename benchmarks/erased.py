@@ -1,0 +1,110 @@
+"""Do erased maps agree with simulated ones? 40 samples made both ways, same doors closed, same start.
+
+    python benchmarks/erased.py OUT [--workers 2]
+
+Ten bundled worlds, one order of closing each, with one door, a third, two thirds and all of the doors closed.
+Resumable: what OUT holds is not made again. Tolerances, set before the first measurement: on average over the samples
+the known areas agree with IoU of at least 0.97 and the hidden rooms with at least 0.95, and the mean IoU of the
+prediction (preset `paper`, by door) differs by at most 0.03.
+"""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from closedrooms.core.geojson import read_doors, read_rooms
+from closedrooms.core.rosmap import read_map
+from closedrooms.pipeline.config import named_noise
+from closedrooms.pipeline.dataset.config import DatasetConfig, MapSource
+from closedrooms.pipeline.dataset.sample import Outcome, Task, make
+from closedrooms.pipeline.dataset.variants import Variant, find_variants, find_worlds
+from closedrooms.pipeline.evaluation.scores import iou
+from closedrooms.pipeline.metrics import room_iou
+from closedrooms.pipeline.workers import Crew
+from closedrooms.predictor.config import preset
+from closedrooms.predictor.predict import predict
+
+WORLDS = (
+    "office-01", "office-02", "office-03", "office-05", "office-06", "school-01", "school-02", "school-03", "school-04",
+    "school-05",
+)  # fmt: skip
+KNOWN, HIDDEN, PREDICTED = 0.97, 0.95, 0.03
+
+
+def chosen(config: DatasetConfig) -> list[Variant]:
+    """Four samples of each world: one door, a third, two thirds and all of the doors closed."""
+    variants = []
+    for world in find_worlds(config):
+        order = find_variants(world, config)
+        counts = [1, *(max(round(len(order) * share / 3), 1) for share in (1, 2, 3))]
+        variants += [order[count - 1] for count in counts]
+    return variants
+
+
+def build(out: Path, maps: MapSource, workers: int) -> list[tuple[Variant, Path]]:
+    """Make the samples one way; those that failed are named and left out."""
+    config = DatasetConfig(worlds=WORLDS, out=out.resolve() / maps, repetitions=1, maps=maps)
+    config = replace(config, sim=named_noise(config.sim, config.noise))
+    variants = chosen(config)
+    tasks = [Task(config, world) for world in find_worlds(config)] if maps == "erased" else []
+    crew: Crew[Task, Outcome] = Crew(workers)
+    for batch in (tasks, [Task(config, variant.world, variant) for variant in variants]):
+        for task, outcome in crew.do(make, [task for task in batch if not task.folder.exists()]):
+            if outcome != Outcome():
+                print(task.folder, outcome)
+    return [(variant, config.out / variant.id) for variant in variants if (config.out / variant.id).exists()]
+
+
+def prediction_iou(folder: Path) -> float:
+    """Mean IoU by door of the preset ``paper``; a room whose door was not seen counts 0."""
+    prediction = predict(read_map(folder / "map.yaml"), read_doors(folder / "doors.geojson"), preset("paper"))
+    figures = room_iou(prediction.rooms, read_rooms(folder / "truth_rooms.geojson"))
+    return float(np.mean(list(figures.values())))
+
+
+def compare(erased: Path, simulated: Path) -> tuple[float, float, float, float]:
+    """IoU of the known areas and of the hidden rooms, and the two prediction IoUs."""
+    first, truth, second = (read_map(path) for path in (
+        erased / "map.yaml", erased / "truth.yaml", simulated / "map.yaml",
+    ))  # fmt: skip
+    frame = truth.frame.covering(*second.frame.bounds)
+    a, b, true = first.on(frame), second.on(frame), truth.on(frame)
+    known = iou(a.known & true.known, b.known & true.known)
+    hidden = iou(true.free & a.unknown, true.free & b.unknown)
+    return known, hidden, prediction_iou(erased), prediction_iou(simulated)
+
+
+def main() -> None:
+    """Make, compare, print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--workers", type=int, default=2)
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    pairs = zip(
+        build(arguments.out, "erased", arguments.workers),
+        build(arguments.out, "simulated", arguments.workers),
+        strict=True,
+    )
+    rows = []
+    print("| sample | known | hidden | prediction erased | simulated |\n| --- | ---: | ---: | ---: | ---: |")
+    for (variant, erased), (_, simulated) in pairs:
+        rows.append(compare(erased, simulated))
+        print(f"| {variant.id} | " + " | ".join(f"{value:.3f}" for value in rows[-1]) + " |", flush=True)
+    known, hidden, first, second = np.array(rows).T
+    difference = first - second
+    print(f"\n{len(rows)} samples")
+    print(f"known areas: IoU mean {known.mean():.4f}, least {known.min():.4f} (at least {KNOWN} wanted)")
+    print(f"hidden rooms: IoU mean {hidden.mean():.4f}, least {hidden.min():.4f} (at least {HIDDEN} wanted)")
+    print(
+        f"prediction: {first.mean():.4f} erased, {second.mean():.4f} simulated, difference {difference.mean():+.4f} "
+        f"(at most {PREDICTED} wanted; sd over samples {difference.std(ddof=1):.4f})"
+    )
+    within = known.mean() >= KNOWN and hidden.mean() >= HIDDEN and abs(difference.mean()) <= PREDICTED
+    print("within the tolerances" if within else "NOT within the tolerances")
+
+
+if __name__ == "__main__":
+    main()
