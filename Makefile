@@ -2,7 +2,9 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: run test test-slow lint format clean
+PAPER ?= paper
+
+.PHONY: run test test-slow lint format paper paper-quick clean
 
 run: $(VENV)/.ready  ## The main job on a bundled world; writes runs/<world>-0
 	$(BIN)/closedrooms run $(ARGS)
@@ -12,6 +14,14 @@ test: $(VENV)/.ready  ## The default tests (no whole simulated runs)
 
 test-slow: $(VENV)/.ready  ## The tests that simulate whole runs
 	$(BIN)/pytest -q -n 2 -m slow
+
+paper: $(VENV)/.ready  ## The paper's protocol in full: 3,885 maps, every method; writes $(PAPER)/, goes on where it stopped
+	$(BIN)/closedrooms dataset all --out $(PAPER)/dataset
+	$(BIN)/closedrooms evaluate $(PAPER)/dataset --out $(PAPER)/evaluation
+
+paper-quick: $(VENV)/.ready  ## A tenth of it, in minutes: two orders of closing, up to eleven closed doors
+	$(BIN)/closedrooms dataset all --repetitions 2 --max-closed 11 --out $(PAPER)-quick/dataset
+	$(BIN)/closedrooms evaluate $(PAPER)-quick/dataset --out $(PAPER)-quick/evaluation
 
 lint: $(VENV)/.ready  ## Style and types
 	$(BIN)/ruff format --check .
