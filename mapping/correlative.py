@@ -114,12 +114,16 @@ def search_heading(field: LikelihoodField, points: FloatArray, guess: Pose2, sig
     step = _angle_step(field, points)
     count = math.ceil(reach * sigma / step)
     turns: FloatArray = np.arange(-count, count + 1, dtype=np.float64) * step
-    values, rows, cols = _surroundings(field, points, guess, turns, 0)
-    no_shift = np.zeros((1, 2), dtype=np.int64)
-    scores = _scores(values, rows, cols, no_shift) - _penalties(turns, no_shift, 1, 1.0, (1.0, sigma))
+    rows, cols = _cells(field, points, guess, turns)
+    lattice = field.lattice
+    # What lies outside reads the border, which is zero.
+    rows = np.clip(rows - lattice.row0, 0, lattice.rows - 1)
+    cols = np.clip(cols - lattice.col0, 0, lattice.cols - 1)
+    likelihoods = field.values.reshape(-1).take(rows * lattice.cols + cols)
+    scores = likelihoods.mean(axis=1, dtype=np.float64) - PRIOR_COST * (turns / sigma) ** 2
     # From the middle outwards, so that the odometry wins ties.
     order = np.argsort(np.abs(turns), kind="stable")
-    best = order[int(np.argmax(scores[order, 0]))]
+    best = order[int(np.argmax(scores[order]))]
     return Pose2(guess.x, guess.y, guess.theta + float(turns[best]))
 
 
@@ -138,10 +142,7 @@ def _surroundings(
         The values, and rows and columns, shape (turns, n) each.
     """
     lattice = field.lattice
-    angles = guess.theta + turns
-    c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
-    cols = np.floor((c * points[:, 0] - s * points[:, 1] + guess.x) / lattice.resolution).astype(np.int64)
-    rows = np.floor((s * points[:, 0] + c * points[:, 1] + guess.y) / lattice.resolution).astype(np.int64)
+    rows, cols = _cells(field, points, guess, turns)
     row0, col0 = int(rows.min()) - margin, int(cols.min()) - margin
     values = np.zeros((int(rows.max()) + margin + 1 - row0, int(cols.max()) + margin + 1 - col0), dtype=np.float32)
     r0, c0 = max(row0, lattice.row0), max(col0, lattice.col0)
@@ -151,6 +152,16 @@ def _surroundings(
         known = field.values[r0 - lattice.row0 : r1 - lattice.row0, c0 - lattice.col0 : c1 - lattice.col0]
         values[r0 - row0 : r1 - row0, c0 - col0 : c1 - col0] = known
     return values, rows - row0, cols - col0
+
+
+def _cells(field: LikelihoodField, points: FloatArray, guess: Pose2, turns: FloatArray) -> tuple[IntArray, IntArray]:
+    """Rows and columns of the unbounded lattice that the points fall in for each turn, shape (turns, n) each."""
+    cell = field.lattice.resolution
+    # As complex numbers, a turn is one product.
+    at = np.exp(1j * (guess.theta + turns))[:, None] * np.ascontiguousarray(points).view(np.complex128)[:, 0]
+    at += complex(guess.x, guess.y)
+    cells = np.floor(at.view(np.float64) * (1.0 / cell)).astype(np.int64)
+    return cells[:, 1::2], cells[:, ::2]
 
 
 def _block_maxima(values: Float32Array, cells: int) -> Float32Array:
@@ -170,10 +181,8 @@ def _scores(values: Float32Array, rows: IntArray, cols: IntArray, shifts: IntArr
     flat = rows * width + cols
     offsets = (shifts[:, 0] * width + shifts[:, 1])[:, None]
     scores: FloatArray = np.empty((rows.shape[0], len(shifts)), dtype=np.float64)
-    if len(shifts) == 1:
-        return np.asarray(flat_values[flat + offsets[0]].mean(axis=1, dtype=np.float64)[:, None])
     for i in range(rows.shape[0]):
-        scores[i] = flat_values[flat[i] + offsets].mean(axis=1)
+        scores[i] = flat_values.take(flat[i] + offsets).mean(axis=1)
     return scores
 
 
@@ -182,7 +191,7 @@ def _opened_scores(values: Float32Array, rows: IntArray, cols: IntArray, shifts:
     width = values.shape[1]
     offsets = shifts[..., 0] * width + shifts[..., 1]
     flat = (rows * width + cols)[:, None, :] + offsets[:, :, None]
-    return np.asarray(values.reshape(-1)[flat].mean(axis=2), dtype=np.float64)
+    return np.asarray(values.reshape(-1).take(flat).mean(axis=2), dtype=np.float64)
 
 
 def _penalties(

@@ -24,6 +24,7 @@ class Keyframe:
         drawn: The pose at which it is drawn into the map, ``None`` while it is not.
         sightings: Closed doors seen while this was the latest keyframe, by id: the nearest sighting in the
             keyframe's frame and its distance from the robot [m].
+        middle: Median of ``points``, ``(x, y)`` [m].
     """
 
     index: int
@@ -34,13 +35,16 @@ class Keyframe:
     way: float
     drawn: Pose2 | None = None
     sightings: dict[str, tuple[Segment, float]] = field(default_factory=dict)
+    middle: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        half = len(self.points) // 2
+        self.middle = np.partition(self.points, half, axis=0)[half] if len(self.points) else np.zeros(2)
 
     @property
     def view(self) -> FloatArray:
         """Middle of what it sees, map frame, ``(x, y)`` [m]: two scans with near middles see the same surfaces."""
-        if len(self.points) == 0:
-            return np.array([self.pose.x, self.pose.y])
-        return self.pose.transform(np.median(self.points, axis=0))
+        return self.pose.transform(self.middle)
 
     def remember(self, sighting: DoorSighting, keyframe_T_robot: Pose2) -> None:
         """Keep a sighting relative to this keyframe, if it is the nearest of its door so far."""

@@ -1,8 +1,10 @@
 """The likelihood field: how likely a scan point lies somewhere, given the surfaces seen so far."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from closedrooms.core.arrays import FloatArray
+from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.mapping.config import MatcherConfig
 from closedrooms.mapping.lattice import Lattice
 
@@ -22,36 +24,51 @@ class LikelihoodField:
     """
 
     def __init__(self, resolution: float, config: MatcherConfig) -> None:
-        self._config = config
-        self._resolution = resolution
-        self.clear()
+        self._sigma, self._new_surface = config.field_sigma, config.new_surface
+        self._reach = max(1, round(REACH_SIGMAS * config.field_sigma / resolution))
+        self.lattice = Lattice(resolution)
+        self.values: Float32Array = np.zeros(self.lattice.frame.shape, dtype=np.float32)
 
     def clear(self) -> None:
-        """Forget every surface."""
-        self.lattice = Lattice(self._resolution)
-        self.values: Float32Array = np.zeros(self.lattice.frame.shape, dtype=np.float32)
+        """Forget every surface; the window stays, as what comes next lies there too."""
+        self.values = np.zeros_like(self.values)
 
     def add(self, points: FloatArray) -> None:
         """Stamp the hits, map frame, shape (n, 2) [m], that lie on no known surface."""
-        if len(points) == 0:
+        self.add_scans([points])
+
+    def add_scans(self, scans: Sequence[FloatArray]) -> None:
+        """Stamp the hits of one scan after the other, map frame, shape (n, 2) each [m]."""
+        if not any(map(len, scans)):
             return
-        resolution, sigma = self.lattice.resolution, self._config.field_sigma
-        reach = max(1, round(REACH_SIGMAS * sigma / resolution))
-        padding = self.lattice.cover(points.min(axis=0), points.max(axis=0), margin=reach + BORDER)
+        hits = np.vstack(scans)
+        padding = self.lattice.cover(hits.min(axis=0), hits.max(axis=0), margin=self._reach + BORDER)
         if padding is not None:
             self.values = np.pad(self.values, padding)
-        rows, cols = self.lattice.cells(points)
-        flat = rows * self.lattice.cols + cols
+        exact = hits * (1.0 / self.lattice.resolution)
+        cells = np.floor(exact)
+        # Where in its cell each hit fell, from the cell's centre, in cells.
+        offsets = exact - cells - 0.5
+        flat = cells[:, 1].astype(np.int64) - self.lattice.row0
+        flat = flat * self.lattice.cols + (cells[:, 0].astype(np.int64) - self.lattice.col0)
+        start = 0
+        for scan in scans:
+            end = start + len(scan)
+            self._stamp(flat[start:end], offsets[start:end])
+            start = end
+
+    def _stamp(self, flat: IntArray, offsets: FloatArray) -> None:
+        """Raise the cells around hits, one a cell; ``flat`` indices and ``offsets`` (n, 2) in cells."""
         values = self.values.reshape(-1)
-        new = np.flatnonzero(values[flat] < self._config.new_surface)
-        flat, first = np.unique(flat[new], return_index=True)
-        if flat.size == 0:
+        new = np.flatnonzero(values[flat] < self._new_surface)
+        if new.size == 0:
             return
-        axis = np.arange(-reach, reach + 1)
-        centres = (np.floor(points[new[first]] / resolution) + 0.5) * resolution
+        flat, first = np.unique(flat[new], return_index=True)
+        axis = np.arange(-self._reach, self._reach + 1)
         # Distance of each cell of the stamp from the hit, along x and y: the Gaussian is their product.
-        distances = centres[:, :, None] + axis * resolution - points[new[first]][:, :, None]  # (k, 2, stamp)
-        weights = np.exp(distances**2 / (-2.0 * sigma**2)).astype(np.float32)
+        distances = axis - offsets[new[first]][:, :, None]  # (k, 2, stamp)
+        cells_sigma = self._sigma / self.lattice.resolution
+        weights = np.exp(distances * distances * (-0.5 / cells_sigma**2)).astype(np.float32)
         stamps = weights[:, 1, :, None] * weights[:, 0, None, :]  # (k, rows, cols)
         targets = flat[:, None, None] + (axis * self.lattice.cols)[:, None] + axis
         np.maximum.at(values, targets.ravel(), stamps.ravel())

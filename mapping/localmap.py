@@ -2,6 +2,9 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.keyframe import Keyframe
 from closedrooms.mapping.likelihood import LikelihoodField
@@ -21,26 +24,29 @@ class LocalMap:
 
     def __init__(self, config: MapperConfig) -> None:
         self._config = config
-        self._members: set[int] = set()
+        self._members: BoolArray = np.zeros(0, dtype=np.bool_)
         self.field = LikelihoodField(config.resolution, config.matcher)
 
-    def update(self, keyframes: Sequence[Keyframe], ways: dict[int, float]) -> None:
+    def update(self, keyframes: Sequence[Keyframe], ways: FloatArray, distances: FloatArray) -> None:
         """Bring the field up to date after a new keyframe, the last one.
 
         Args:
             keyframes: All of them.
-            ways: Way along the pose graph from the last keyframe [m] to those within ``HYSTERESIS`` horizons.
+            ways: Way along the pose graph from the last keyframe to each, shape (keyframes,) [m].
+            distances: The same as the crow flies.
         """
-        here, reach, horizon = keyframes[-1].pose, self._config.max_range, self._config.loops.horizon
-        stale = sum(1 for i in self._members if i not in ways and keyframes[i].pose.distance(here) < reach)
-        if stale > STALE_MEMBERS:
-            self.clear()
-        for i in sorted(ways):
-            if i not in self._members and ways[i] <= horizon and keyframes[i].pose.distance(here) < reach:
-                self.field.add(keyframes[i].pose.transform(keyframes[i].beams.points))
-                self._members.add(i)
+        horizon, near = self._config.loops.horizon, distances < self._config.max_range
+        members = np.zeros(len(keyframes), dtype=np.bool_)
+        members[: len(self._members)] = self._members
+        if np.count_nonzero(members & near & (ways > HYSTERESIS * horizon)) > STALE_MEMBERS:
+            self.field.clear()
+            members[:] = False
+        entering = near & (ways <= horizon) & ~members
+        chosen = (keyframes[i] for i in np.flatnonzero(entering).tolist())
+        self.field.add_scans([k.pose.transform(k.beams.points) for k in chosen])
+        self._members = members | entering
 
     def clear(self) -> None:
         """Forget all, because poses were corrected."""
-        self._members.clear()
+        self._members = np.zeros(0, dtype=np.bool_)
         self.field.clear()

@@ -35,14 +35,14 @@ class Loop:
 
 
 def find_loop(
-    keyframes: Sequence[Keyframe], graph: PoseGraph, consistent: set[int], config: MapperConfig
+    keyframes: Sequence[Keyframe], graph: PoseGraph, distances: FloatArray, config: MapperConfig
 ) -> Loop | None:
     """Match the latest keyframe, with the way that led to it, to the nearest older place beyond the horizon.
 
     Args:
         keyframes: All of them; the latest asks.
         graph: Says how far the drift may have come.
-        consistent: Keyframes within the horizon of the latest, which are no loop.
+        distances: From the latest keyframe to each as the crow flies, shape (keyframes,) [m].
         config: Windows and thresholds.
 
     Returns:
@@ -50,28 +50,23 @@ def find_loop(
     """
     loops = config.loops
     latest = keyframes[-1]
-    candidates = [
-        k for k in keyframes if k.index not in consistent and k.pose.distance(latest.pose) < loops.max_distance
-    ]
-    if not candidates:
+    inconsistent = graph.ways > loops.horizon
+    doubts = np.minimum(loops.window + loops.drift * graph.ways, loops.max_window)
+    near = np.flatnonzero(inconsistent & (distances < np.minimum(loops.max_distance, loops.overlap + doubts)))
+    if near.size == 0:
         return None
-    ways = graph.within(latest.index, float("inf"))
-
-    def doubt(keyframe: Keyframe) -> float:
-        return min(loops.window + loops.drift * ways.get(keyframe.index, 1e9), loops.max_window)
-
-    candidates = [k for k in candidates if k.pose.distance(latest.pose) < loops.overlap + doubt(k)]
-    if not candidates:
-        return None
-    view = latest.view
-    older = min(candidates, key=lambda k: (float(np.hypot(*(k.view - view))) + k.pose.distance(latest.pose), k.index))
+    views = np.array([keyframes[i].view for i in near.tolist()]) - latest.view
+    older = keyframes[int(near[np.argmin(np.hypot(views[:, 0], views[:, 1]) + distances[near])])]
     field = LikelihoodField(config.resolution, config.matcher)
-    for index in sorted(graph.within(older.index, loops.horizon)):
-        other = keyframes[index]
-        if index not in consistent and other.pose.distance(older.pose) < loops.surroundings:
-            field.add(other.pose.transform(other.beams.points))
+    surroundings = (keyframes[i] for i in sorted(graph.within(older.index, loops.horizon)) if inconsistent[i])
+    field.add_scans(
+        [k.pose.transform(k.beams.points) for k in surroundings if k.pose.distance(older.pose) < loops.surroundings]
+    )
     points = recent_points(keyframes, loops.recent_way, config)
-    window = Window(doubt(older), min(loops.window_angle + loops.drift_angle * ways[older.index], 0.5))
+    window = Window(
+        float(doubts[older.index]),
+        min(loops.window_angle + loops.drift_angle * float(graph.ways[older.index]), 0.5),
+    )
     found = search(field, points, latest.pose, window, coarse_cells=6, prior_sigmas=(window.distance, window.angle))
     if found.score < loops.min_score - 0.15:
         return None

@@ -15,7 +15,7 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.doors import fuse_doors
 from closedrooms.mapping.evidence import EvidenceGrid
 from closedrooms.mapping.keyframe import Keyframe
-from closedrooms.mapping.localmap import HYSTERESIS, LocalMap
+from closedrooms.mapping.localmap import LocalMap
 from closedrooms.mapping.loops import Loop, find_loop
 from closedrooms.mapping.matcher import Motion, match_scan
 from closedrooms.mapping.posegraph import Edge, PoseGraph, optimise
@@ -40,7 +40,8 @@ class Mapper:
         self._loops: list[Loop] = []
         self._hessian: FloatArray = np.zeros((3, 3))
         self._tied_at = self._tried_at = 0.0
-        self._outdated = False
+        self._places: FloatArray = np.empty((0, 2))
+        self._drawn = 0
         self._trusted = True
         self._evidence = EvidenceGrid(self._config)
         self._keyframes: list[Keyframe] = []
@@ -138,15 +139,17 @@ class Mapper:
         self._keyframes.append(keyframe)
         if keyframe.index > 0:
             self._tie_to_previous(keyframe)
-        ways = self._ways(keyframe)
-        self._tie_to_older(keyframe, ways)
-        if self._config.loops.enabled and self._close_loop(keyframe, ways):
-            ways = self._ways(keyframe)
-        self._local.update(self._keyframes, ways)
-        self._draw(keyframe)
+        self._places = np.vstack((self._places, (keyframe.pose.x, keyframe.pose.y)))
+        distances = self._distances(keyframe)
+        self._tie_to_older(keyframe, distances)
+        if self._config.loops.enabled and self._close_loop(keyframe, distances):
+            distances = self._distances(keyframe)
+        self._local.update(self._keyframes, self._graph.ways, distances)
 
-    def _ways(self, keyframe: Keyframe) -> dict[int, float]:
-        return self._graph.within(keyframe.index, HYSTERESIS * self._config.loops.horizon)
+    def _distances(self, keyframe: Keyframe) -> FloatArray:
+        """From a keyframe to each as the crow flies, shape (keyframes,) [m]."""
+        offsets = self._places - (keyframe.pose.x, keyframe.pose.y)
+        return np.asarray(np.hypot(offsets[:, 0], offsets[:, 1]))
 
     def _tie_to_previous(self, keyframe: Keyframe) -> None:
         previous = self._keyframes[keyframe.index - 1]
@@ -159,23 +162,22 @@ class Mapper:
         self._graph.add(Edge(previous.index, keyframe.index, a_T_b, information, max(way, 0.01)))
         self._hessian = np.zeros((3, 3))
 
-    def _tie_to_older(self, keyframe: Keyframe, ways: dict[int, float]) -> None:
+    def _tie_to_older(self, keyframe: Keyframe, distances: FloatArray) -> None:
         """The match was against older keyframes too: say so in the graph, or a loop would tear them apart."""
         loops = self._config.loops
         if keyframe.way - self._tied_at < loops.link_interval:
             return
-        older = [
-            (k.pose.distance(keyframe.pose), k)
-            for k in (self._keyframes[i] for i, way in ways.items() if way <= loops.horizon)
-            if keyframe.way - k.way > loops.horizon / 2
-        ]
-        near = min(older, key=lambda o: (o[0], o[1].index), default=None)
-        if near is None or near[0] > loops.link_distance:
+        ways = np.array([k.way for k in self._keyframes])
+        older = (keyframe.way - ways > loops.horizon / 2) & (self._graph.ways <= loops.horizon)
+        candidates = np.flatnonzero(older & (distances <= loops.link_distance))
+        if candidates.size == 0:
             return
+        near = self._keyframes[int(candidates[np.argmin(distances[candidates])])]
         match = refine(self._local.field, keyframe.points, keyframe.pose, iterations=1)
         information = self._information(match.hessian, keyframe.pose)
-        a_T_b = near[1].pose.inverse() @ keyframe.pose
-        self._graph.add(Edge(near[1].index, keyframe.index, a_T_b, information, max(near[0], 0.01), loop=True))
+        a_T_b = near.pose.inverse() @ keyframe.pose
+        length = max(near.pose.distance(keyframe.pose), 0.01)
+        self._graph.add(Edge(near.index, keyframe.index, a_T_b, information, length, loop=True))
         self._tied_at = keyframe.way
 
     def _information(self, hessian: FloatArray, pose: Pose2) -> FloatArray:
@@ -184,13 +186,12 @@ class Mapper:
         rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return np.asarray(self._config.loops.point_information * (rotation.T @ hessian @ rotation))
 
-    def _close_loop(self, keyframe: Keyframe, ways: dict[int, float]) -> bool:
+    def _close_loop(self, keyframe: Keyframe, distances: FloatArray) -> bool:
         loops = self._config.loops
         if keyframe.way - self._tried_at < loops.interval:
             return False
         self._tried_at = keyframe.way
-        consistent = {i for i, way in ways.items() if way <= loops.horizon}
-        loop = find_loop(self._keyframes, self._graph, consistent, self._config)
+        loop = find_loop(self._keyframes, self._graph, distances, self._config)
         if loop is None:
             return False
         information = self._information(loop.hessian, keyframe.pose)
@@ -210,9 +211,10 @@ class Mapper:
         """Move the keyframes; what hangs on them (way, doors, map) follows."""
         for keyframe, (x, y, theta) in zip(self._keyframes, poses, strict=True):
             keyframe.pose = Pose2(x, y, theta)
+        self._places = np.array(poses[:, :2])
         self._pose = self._keyframes[-1].pose
         self._local.clear()
-        self._outdated = True
+        self._drawn = 0
 
     def _draw(self, keyframe: Keyframe) -> None:
         if keyframe.drawn is not None:
@@ -227,10 +229,9 @@ class Mapper:
 
     def grid(self) -> OccupancyGrid:
         """The map so far, from the keyframes' present poses."""
-        if self._outdated:
-            for keyframe in self._keyframes:
-                self._draw(keyframe)
-            self._outdated = False
+        for keyframe in self._keyframes[self._drawn :]:
+            self._draw(keyframe)
+        self._drawn = len(self._keyframes)
         return self._evidence.grid()
 
     def doors(self) -> list[ClosedDoor]:

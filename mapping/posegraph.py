@@ -38,22 +38,49 @@ class Edge:
 
 @dataclass(slots=True)
 class PoseGraph:
-    """Edges, and who is near to whom along them."""
+    """Edges, and who is near to whom along them.
+
+    Attributes:
+        edges: In the order they were measured.
+        ways: Way along the graph [m] from the latest keyframe to each, shape (keyframes,).
+    """
 
     edges: list[Edge] = field(default_factory=list)
+    ways: FloatArray = field(default_factory=lambda: np.zeros(1))
     _neighbours: dict[int, list[tuple[int, float]]] = field(default_factory=dict)
 
     def add(self, edge: Edge) -> None:
-        """Add an edge."""
+        """Add an edge: from the latest keyframe to the next one, or from an older one to the latest."""
         self.edges.append(edge)
         self._neighbours.setdefault(edge.source, []).append((edge.target, edge.length))
         self._neighbours.setdefault(edge.target, []).append((edge.source, edge.length))
+        if edge.target == len(self.ways):
+            # Every way from the next keyframe leads over this one.
+            self.ways = np.append(self.ways + edge.length, 0.0)
+        else:
+            self._shorten(edge.source, edge.length)
 
     def drop_last(self) -> None:
         """Take the latest edge back."""
         edge = self.edges.pop()
         self._neighbours[edge.source].pop()
         self._neighbours[edge.target].pop()
+        self.ways = np.full(len(self.ways), np.inf)
+        self._shorten(len(self.ways) - 1, 0.0)
+
+    def _shorten(self, start: int, way: float) -> None:
+        """Spread a way from the latest keyframe to ``start`` as far as it makes others shorter (Dijkstra)."""
+        ways = self.ways.tolist()
+        queue = [(way, start)] if way < ways[start] else []
+        while queue:
+            way, node = heapq.heappop(queue)
+            if way >= ways[node]:
+                continue
+            ways[node] = way
+            for neighbour, length in self._neighbours.get(node, ()):
+                if way + length < ways[neighbour]:
+                    heapq.heappush(queue, (way + length, neighbour))
+        self.ways = np.array(ways)
 
     def within(self, start: int, limit: float) -> dict[int, float]:
         """Way along the graph [m] from ``start`` to each keyframe that is at most ``limit`` away (Dijkstra)."""

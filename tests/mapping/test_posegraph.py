@@ -3,6 +3,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
@@ -83,3 +85,19 @@ def test_ways_follow_the_shortest_edges_up_to_the_limit() -> None:
     graph.drop_last()
     assert 19 not in graph.within(0, 2.0)
     assert len(graph.edges) == 19
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.tuples(st.floats(0.1, 2.0), st.booleans(), st.integers(0, 1000), st.booleans()), max_size=25))
+def test_ways_from_the_latest_are_kept_as_a_fresh_search_finds_them(
+    steps: list[tuple[float, bool, int, bool]],
+) -> None:
+    graph = PoseGraph()
+    for i, (length, tied, older, taken_back) in enumerate(steps):
+        graph.add(Edge(i, i + 1, Pose2(), STRONG, length))
+        if tied:
+            graph.add(Edge(older % (i + 1), i + 1, Pose2(), STRONG, length / 2, loop=True))
+            if taken_back:
+                graph.drop_last()
+        fresh = graph.within(i + 1, math.inf)
+        assert graph.ways == pytest.approx([fresh[k] for k in range(i + 2)])
