@@ -32,14 +32,18 @@ class Metric:
 
     def walk(self, tour: list[int]) -> list[int]:
         """The closed walk over vertices of the graph that visits the positions of ``tour`` in turn and returns."""
-        walk = [tour[0]]
-        for a, b in pairwise([*tour, tour[0]]):
-            way, stop = [], b
+        return self.way([*tour, tour[0]])
+
+    def way(self, stops: list[int]) -> list[int]:
+        """The walk over vertices of the graph that visits the positions ``stops`` in turn."""
+        way = [stops[0]]
+        for a, b in pairwise(stops):
+            piece, stop = [], b
             while stop != a:
-                way.append(stop)
+                piece.append(stop)
                 stop = int(self.before[a, stop])
-            walk += reversed(way)
-        return [int(self.vertices[stop]) for stop in walk]
+            way += reversed(piece)
+        return [int(self.vertices[stop]) for stop in way]
 
 
 def metric(graph: TopologicalGraph, members: list[int]) -> Metric:

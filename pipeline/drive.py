@@ -110,7 +110,7 @@ def drive(
     for door in sorted(closed):
         sim.open_door(door)
     reopened = ReopenedMap(mapper, [door for door in doors if door.id in closed], mapping)
-    guide = TourGuide(prediction, tour.graph.vertices[tour.order], doors, config, predictor, coverage)
+    guide = TourGuide(prediction, tour, doors, config, predictor, coverage)
     watch = StepWatch()
     status: DriveStatus = "limit"
     stamps: list[float] = []
@@ -154,7 +154,7 @@ def drive(
         tour.length,
         driven,
         stamps[-1] - stamps[0],
-        guide.visited,
+        guide.stops.visited,
         np.array(guide.unreachable).reshape(-1, 2),
         guide.replans,
         tuple(guide.revisions),

@@ -8,7 +8,7 @@ import shapely
 
 from closedrooms.core.arrays import BoolArray
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.grid import UNKNOWN, OccupancyGrid
+from closedrooms.core.grid import UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.evidence import EvidenceGrid
@@ -45,7 +45,7 @@ class ReopenedMap:
             config: Weights of hits and passes, as in the mapper.
         """
         self._mapper = mapper
-        self._leaves = [shapely.LineString(door.segment) for door in doors if door.segment is not None]
+        self._doors = tuple(doors)
         self._first = len(mapper.keyframes)
         self._config = config or MapperConfig(resolution=mapper.grid().frame.resolution)
         self._since = EvidenceGrid(self._config)
@@ -54,11 +54,11 @@ class ReopenedMap:
     def grid(self) -> OccupancyGrid:
         """The map so far; leaves that no later scan has seen or passed are unknown."""
         grid = self._mapper.grid()
-        if not self._leaves:
+        if not self._doors:
             return grid
         self._draw()
         since = self._since.grid().on(grid.frame)
-        doorways = self._doorways(grid)
+        doorways = doorway_cells(self._doors, grid.frame, LEAF_REACH)
         cells = grid.cells.copy()
         cells[doorways & ~grid.free] = UNKNOWN
         fresh = doorways & since.known
@@ -75,16 +75,17 @@ class ReopenedMap:
                 self._since.add(keyframe.beams, keyframe.pose)
                 self._drawn[keyframe.index] = keyframe.pose
 
-    def _doorways(self, grid: OccupancyGrid) -> BoolArray:
-        """Cells whose middle lies where a closed leaf was, or before or behind it."""
-        frame = grid.frame
-        mask = np.zeros(frame.shape, dtype=np.bool_)
-        for leaf in self._leaves:
-            strip = leaf.buffer(LEAF_REACH, cap_style="flat")
-            corners = frame.to_cells(np.reshape(strip.bounds, (2, 2)))
-            corners[1] += 1
-            (r0, c0), (r1, c1) = np.clip(corners, 0, frame.shape).tolist()
-            cells = np.moveaxis(np.mgrid[r0:r1, c0:c1], 0, -1)
-            points = frame.to_points(cells)
-            mask[r0:r1, c0:c1] |= shapely.contains_xy(strip, points[..., 0], points[..., 1])
-        return mask
+
+def doorway_cells(doors: Sequence[ClosedDoor], frame: GridFrame, reach: float) -> BoolArray:
+    """Cells whose middle lies where a closed leaf was, or up to ``reach`` [m] before or behind it."""
+    mask = np.zeros(frame.shape, dtype=np.bool_)
+    for door in doors:
+        if door.segment is None:
+            continue
+        strip = shapely.LineString(door.segment).buffer(reach, cap_style="flat")
+        corners = frame.to_cells(np.reshape(strip.bounds, (2, 2)))
+        corners[1] += 1
+        (r0, c0), (r1, c1) = np.clip(corners, 0, frame.shape).tolist()
+        points = frame.to_points(np.moveaxis(np.mgrid[r0:r1, c0:c1], 0, -1))
+        mask[r0:r1, c0:c1] |= shapely.contains_xy(strip, points[..., 0], points[..., 1])
+    return mask

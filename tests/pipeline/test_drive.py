@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from closedrooms.coverage.config import CoverageConfig
-from closedrooms.pipeline.tour_guide import _open_tour
+from closedrooms.pipeline.itinerary import open_tour
 
 
 @settings(max_examples=20, deadline=None)
@@ -14,7 +14,7 @@ from closedrooms.pipeline.tour_guide import _open_tour
 def test_an_open_tour_runs_from_here_to_home_by_the_shortest_way(places: list[tuple[int, int]]) -> None:
     points = np.array(places, dtype=np.float64)
     distances = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
-    order = _open_tour(distances, CoverageConfig())
+    order = open_tour(distances, CoverageConfig())
     assert order[0] == 0
     assert order[-1] == 1
     assert sorted(order) == list(range(len(places)))
