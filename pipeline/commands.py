@@ -182,6 +182,15 @@ def _cover(words: Sequence[str]) -> int:
     return _report(lambda terminal: cover_map(config, progress=terminal))
 
 
+def _doors(words: Sequence[str]) -> int:
+    from closedrooms.pipeline.doors_config import DoorsConfig
+
+    config = _parse(DoorsConfig, "doors", words, COMMANDS["doors"][0])
+    from closedrooms.pipeline.doors_map import doors_map
+
+    return _report(lambda terminal: doors_map(config, progress=terminal))
+
+
 def _map(words: Sequence[str]) -> int:
     from closedrooms.pipeline.config import MapConfig
 
@@ -229,12 +238,26 @@ def _evaluate(words: Sequence[str]) -> int:
     return _report(lambda terminal: evaluate(config, progress=terminal), name_failures=True)
 
 
+def _robustness(words: Sequence[str]) -> int:
+    from closedrooms.pipeline.robustness.config import RobustnessConfig
+
+    config = _parse(RobustnessConfig, "robustness", words, COMMANDS["robustness"][0])
+    from closedrooms.pipeline.robustness.sweep import robustness
+
+    return _report(lambda terminal: robustness(config, progress=terminal), name_failures=True)
+
+
 COMMANDS: dict[str, tuple[str, Callable[[Sequence[str]], int]]] = {
     "run": ("Simulate a robot in a building with closed doors, map it, predict the closed rooms, plan a tour.", _run),
     "predict": ("Predict the rooms behind the closed doors of a ROS map.", _predict),
     "cover": ("Plan a coverage tour on a ROS map.", _cover),
     "map": ("Build the map of a recorded run.", _map),
+    "doors": ("Propose closed doors on a ROS map, from the map alone.", _doors),
     "worlds": ("List, show, generate and convert floor plans.", _worlds),
     "dataset": ("Make maps of many buildings with closed doors, and what is really behind them.", _dataset),
     "evaluate": ("Compare predictions with the truth over a dataset.", _evaluate),
+    "robustness": (
+        "Find at which noise the prediction starts to suffer, and which stage gives way first.",
+        _robustness,
+    ),
 }

@@ -1,0 +1,91 @@
+"""The faces of walls in an occupancy grid: where free cells meet occupied ones, and which ways they run."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.grid import OccupancyGrid
+
+# Blur with which the direction of a face is measured [m]: a few cells, so that the stairs of a slanted wall vanish.
+BLUR = 0.075
+# Steps over half a turn in which wall directions are counted, and the kernel that smooths the counts [steps].
+STEPS, KERNEL = 180, 2.5
+# Directions closer than this are one [steps]; weaker ones than this share of the strongest are corners and clutter.
+APART, WEAKEST, MOST = 8, 0.1, 8
+# Refined directions closer than this are one [rad].
+SAME = np.radians(4.0)
+# A direction is refined over this range at this step: the faces then fall into few lines [rad].
+REFINE_RANGE, REFINE_STEP, REFINE_NEAR = np.radians(4.0), np.radians(0.25), np.radians(12.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WallFaces:
+    """Sides of occupied cells that look at a free cell.
+
+    Attributes:
+        points: Middles of the sides, map frame, shape (n, 2) [m].
+        outward: Unit vectors to the free cell, along an axis of the grid, shape (n, 2).
+        angles: Direction in which the free space lies, measured over a few cells, shape (n,) [rad].
+    """
+
+    points: FloatArray
+    outward: FloatArray
+    angles: FloatArray
+
+
+def find_faces(grid: OccupancyGrid) -> WallFaces:
+    """Every side of an occupied cell that looks at a free one."""
+    frame, free, occupied = grid.frame, grid.free, grid.occupied
+    blurred = cv2.GaussianBlur(free.astype(np.float32), (0, 0), BLUR / frame.resolution)
+    slope_y, slope_x = np.gradient(blurred)
+    padded = np.pad(free, 1)
+    points, outward, angles = [], [], []
+    for d_row, d_col in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+        beside = padded[1 + d_row : 1 + d_row + frame.rows, 1 + d_col : 1 + d_col + frame.cols]
+        rows, cols = np.nonzero(occupied & beside)
+        way = np.array([d_col, d_row], dtype=np.float64)
+        points.append(frame.to_points(np.stack((rows, cols), axis=-1)) + way * frame.resolution / 2)
+        outward.append(np.tile(way, (rows.size, 1)))
+        angles.append(np.arctan2(slope_y[rows, cols], slope_x[rows, cols]).astype(np.float64))
+    return WallFaces(np.vstack(points), np.vstack(outward), np.concatenate(angles))
+
+
+def face_directions(faces: WallFaces, resolution: float) -> list[float]:
+    """Directions across the walls in [0, pi), the one with most wall first [rad].
+
+    Args:
+        faces: Of one map.
+        resolution: Metres per cell.
+    """
+    steps = np.floor(np.mod(faces.angles, np.pi) / np.pi * STEPS).astype(np.int64) % STEPS
+    counts = np.bincount(steps, minlength=STEPS).astype(np.float64)
+    reach = np.arange(-APART, APART + 1)
+    kernel = np.exp(-0.5 * (reach / KERNEL) ** 2)
+    smooth = np.convolve(np.concatenate((counts[-APART:], counts, counts[:APART])), kernel, "valid")
+    chosen: list[int] = []
+    for step in np.argsort(-smooth, kind="stable"):
+        if smooth[step] < WEAKEST * smooth.max() or len(chosen) == MOST:
+            break
+        if all(min(abs(step - other), STEPS - abs(step - other)) > APART for other in chosen):
+            chosen.append(int(step))
+    refined: list[float] = []
+    for step in chosen:
+        angle = _refined(faces, (step + 0.5) / STEPS * np.pi, resolution)
+        if all(abs((angle - other + np.pi / 2) % np.pi - np.pi / 2) > SAME for other in refined):
+            refined.append(angle)
+    return refined
+
+
+def _refined(faces: WallFaces, angle: float, resolution: float) -> float:
+    """The direction near ``angle`` across which the faces fall into the fewest lines."""
+    near = np.abs(np.mod(faces.angles - angle + np.pi / 2, np.pi) - np.pi / 2) < REFINE_NEAR
+    points = faces.points[near]
+    tries = angle + np.arange(-REFINE_RANGE, REFINE_RANGE + REFINE_STEP / 2, REFINE_STEP)
+    sharpness = []
+    for way in tries:
+        across = points @ np.array([np.cos(way), np.sin(way)])
+        counts = np.bincount(np.floor((across - across.min()) / resolution + 0.5).astype(np.int64))
+        sharpness.append(float((counts.astype(np.float64) ** 2).sum()))
+    return float(tries[int(np.argmax(sharpness))])
