@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from closedrooms.core.geojson import write_doors
 from closedrooms.core.random import stream
 from closedrooms.core.rosmap import write_map
 from closedrooms.coverage.cover import plan_coverage
@@ -74,6 +75,7 @@ def samples(world: str, seed: int, done: set[int], out: Path, noise: str) -> Ite
         }  # fmt: skip
         stem = f"{plan.name}-{seed}-{thirds}"
         write_map(out / stem, erased.grid)
+        write_doors(out / f"{stem}-doors.geojson", erased.doors)
         for preset in PRESETS:
             prediction = predict(erased.grid, erased.doors, PredictorConfig(preset=preset), trace=False)
             row[f"tsp_{preset}"] = round(plan_coverage(prediction.grid, start=START).length, 3)

@@ -61,7 +61,7 @@ def build_graph(
     voronoi = trace_skeleton(thin(space.mask))
     clearance = space.clearance / space.frame.resolution
     merged = merge_thin(voronoi, clearance, doorway=cells, corner_ratio=config.graph.corner_ratio)
-    draft = GraphDraft(space, merged)
+    draft = GraphDraft(space, merged, doorway=cells)
     unreached = add_doors(draft, doors, merged, config.graph)
     notes += [f"door {door} cannot be reached from the space that is covered" for door in unreached]
     return BuiltGraph(draft.finished(), _start_vertex(draft, start), tuple(unreached), tuple(notes))

@@ -20,8 +20,10 @@ LOOKS = 200
 class GraphDraft:
     """A topological graph while vertices and edges are added to it; positions are (row, col) in continuous cells."""
 
-    def __init__(self, space: FreeSpace, voronoi: VoronoiGraph) -> None:
+    def __init__(self, space: FreeSpace, voronoi: VoronoiGraph, *, doorway: float) -> None:
+        """Begin with a Voronoi graph; ``doorway`` [cells]: what is smaller each way may be passed on either side."""
         self.space = space
+        self._around = doorway**2
         self.points: list[FloatArray] = []
         self.kinds: list[VertexKind] = []
         self.edges: dict[tuple[int, int], FloatArray] = {}
@@ -51,7 +53,7 @@ class GraphDraft:
         Returns:
             The vertex at the chain's first cell.
         """
-        stops = split_where_blocked(chain, self.space.passable)
+        stops = split_where_blocked(chain, self.space.passable, around=self._around)
         vertices = [self._vertex_at(chain[stop], "bend") for stop in stops]
         for (u, v), (i, j) in zip(pairwise(vertices), pairwise(stops), strict=True):
             self.add_edge(u, v, chain[i : j + 1].astype(np.float64) + 0.5)

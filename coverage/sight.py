@@ -38,16 +38,18 @@ def is_clear(passable: BoolArray, a: FloatArray, b: FloatArray) -> bool:
     return bool(passable[rows, cols].all())
 
 
-def split_where_blocked(chain: IntArray, passable: BoolArray) -> list[int]:
+def split_where_blocked(chain: IntArray, passable: BoolArray, *, around: float = 0.0) -> list[int]:
     """Indices of a chain, first and last included, between which straight segments cross no obstacle.
 
     Where the segment between two ends is blocked, the cell of the chain farthest from it becomes a vertex, and both
-    halves are asked again; a step from cell to neighbouring cell is never split. A closed chain is split at the cell
-    farthest from its end.
+    halves are asked again; a step from cell to neighbouring cell is never split. So it does where the segment goes
+    another way than the chain, with a wall between the two: a chain that leads through a room with two doors is not the
+    corridor from one to the other. A closed chain is split at the cell farthest from its end.
 
     Args:
         chain: Cells (row, col), each a neighbour of the one before, shape (n, 2).
         passable: Cells that a segment may cross.
+        around: Obstacles between segment and chain up to this number of cells are passed on either side alike.
     """
     points = chain.astype(np.float64) + 0.5
     keep = [0]
@@ -56,12 +58,26 @@ def split_where_blocked(chain: IntArray, passable: BoolArray) -> list[int]:
         first, last = pending.pop()
         a, b = points[first], points[last]
         closed = bool((chain[first] == chain[last]).all()) and last - first > 1
-        if last - first <= 1 or (not closed and is_clear(passable, a, b)):
+        straight = not closed and is_clear(passable, a, b) and _between(chain[first : last + 1], passable) <= around
+        if last - first <= 1 or straight:
             keep.append(last)
             continue
         middle = first + 1 + int(np.argmax(_distances(points[first + 1 : last], a, b)))
         pending += [(middle, last), (first, middle)]
     return keep
+
+
+def _between(chain: IntArray, passable: BoolArray) -> int:
+    """Number of cells that are not passable between a chain and the straight segment from its first to its last."""
+    import cv2
+
+    low = chain.min(axis=0)
+    outline = np.ascontiguousarray((chain - low)[:, ::-1], dtype=np.int32)
+    rows, cols = (chain.max(axis=0) - low + 1).tolist()
+    inside = np.zeros((rows, cols), dtype=np.uint8)
+    cv2.fillPoly(inside, [outline], 1)
+    blocked = ~passable[low[0] : low[0] + rows, low[1] : low[1] + cols]
+    return int((blocked & (inside > 0)).sum())
 
 
 def _distances(points: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:

@@ -55,3 +55,22 @@ def test_a_chain_around_a_corner_gets_a_bend():
 def test_a_straight_chain_in_the_open_stays_whole():
     chain = np.array([(5, c) for c in range(2, 15)])
     assert split_where_blocked(chain, np.ones((20, 20), dtype=bool)) == [0, len(chain) - 1]
+
+
+def _corridor_beside_a_room() -> tuple[np.ndarray, np.ndarray]:
+    """A corridor along rows 2 to 4, a room below it with a door at both of its ends, and the chain through the room."""
+    passable = np.zeros((30, 40), dtype=bool)
+    passable[2:5, 2:38] = passable[8:28, 4:36] = True
+    passable[5:8, 6:9] = passable[5:8, 31:34] = True
+    down = [(r, 7) for r in range(3, 16)]
+    chain = down + [(15, c) for c in range(8, 32)] + [(r, 32) for r in range(15, 2, -1)]
+    return passable, np.array(chain)
+
+
+def test_a_chain_through_a_room_with_two_doors_is_not_the_corridor_between_them():
+    passable, chain = _corridor_beside_a_room()
+    assert is_clear(passable, chain[0] + 0.5, chain[-1] + 0.5)
+    stops = split_where_blocked(chain, passable)
+    assert any(8 <= chain[stop][0] < 28 for stop in stops)
+    # What is small enough may be passed on either side.
+    assert split_where_blocked(chain, passable, around=1000) == [0, len(chain) - 1]
