@@ -1,7 +1,7 @@
 """Run the main job on every floor of a folder of floor plans, unattended and resumable, and make one table.
 
     python benchmarks/all_floors.py ../shared/data/plans --out /tmp/floors [--noise medium] [--close 5] [--seed 0]
-                                    [--workers 1] [--limit 1200] [--only-table]
+                                    [--workers 1] [--limit 1200] [--smallest-first] [--only-table]
 
 Every file below the folder that an importer knows is a floor; a file with several levels is one floor a level. A floor
 is two processes: ``closedrooms run`` with the preset ``best``, then ``closedrooms predict`` with the preset ``paper``
@@ -234,6 +234,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--limit", type=float, default=1200.0, help="seconds that a process may take")
+    parser.add_argument("--smallest-first", action="store_true", help="run the small floors before the large ones")
     parser.add_argument("--only-table", action="store_true", help="run nothing")
     options = parser.parse_args()
     if options.workers < 1 or not math.isfinite(options.limit):
@@ -248,7 +249,8 @@ def main() -> None:
         sys.exit(f"no floor plans: {options.folder}")
     if not options.only_table:
         with ThreadPoolExecutor(options.workers) as pool:
-            for done in [pool.submit(run_floor, floor, options.out, options) for floor in floors]:
+            order = floors[::-1] if options.smallest_first else floors
+            for done in [pool.submit(run_floor, floor, options.out, options) for floor in order]:
                 done.result()
     write_tables(floors, broken, options.out)
     print(f"{len(floors)} floors, {time.perf_counter() - start:.0f} s", file=sys.stderr)
