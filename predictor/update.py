@@ -4,6 +4,7 @@ What was predicted and is now observed gives way to the observation; what contra
 nobody has looked into yet are predicted anew on the map that is now known.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -34,6 +35,8 @@ BELONGS = 0.6
 DOORWAY_DEPTH = 0.35
 # Observed space this far behind a doorway is what the door leads to [m].
 THRESHOLD = 0.15
+# Gaps in a wall up to this width lead nowhere [m]: less than any door, more than from one far beam to the next.
+GAP = 0.30
 SQUARE = np.ones((3, 3), dtype=np.uint8)
 
 
@@ -199,12 +202,20 @@ def _nearest_room(scene: _Scene) -> tuple[IntArray, Any]:
 
 def _observed_room(scene: _Scene, region: BoolArray, index: int) -> BoolArray:
     """What is observed of a room, and the part of its prediction that goes on from there into the unknown."""
-    left = scene.masks[index] & ~scene.now.occupied
+    # A wall seen from afar is a row of single hits: nothing goes on through the gaps between them.
+    walls: Any = cv2.morphologyEx(scene.now.occupied.astype(np.uint8), cv2.MORPH_CLOSE, _square(GAP, scene.frame))
+    left = scene.masks[index] & (walls == 0)
     left_image: Any = cv2.morphologyEx(left.astype(np.uint8), cv2.MORPH_OPEN, SQUARE)
     both = region | (left_image > 0)
     _, parts = cv2.connectedComponents(both.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
     joined: BoolArray = np.isin(np.asarray(parts), np.unique(np.asarray(parts)[region])) & both
     return joined
+
+
+def _square(side: float, frame: GridFrame) -> Any:
+    """A structuring element of a side [m]."""
+    cells = max(math.floor(side / frame.resolution + 1e-9), 1)
+    return np.ones((cells, cells), dtype=np.uint8)
 
 
 def _cut(scene: _Scene, observed: list[BoolArray], index: int, room: Room) -> Shape | None:

@@ -72,6 +72,16 @@ def test_of_a_room_seen_in_part_the_rest_of_the_prediction_stays() -> None:
     assert iou(after.rooms[0], 1.0, 2.1, 5.0, 6.0) > 0.9
 
 
+def test_behind_a_wall_of_single_hits_nothing_is_left_of_the_prediction() -> None:
+    before = predicted(Room(box(2.0, 2.15, 7.0, 5.0), ("d00",)))
+    cells = look_into(corridor(), 2.0, 2.15, 4.0, 5.0)
+    cells[45:98:3, 80] = cells[44:98:3, 80] = -1  # gaps of two cells in the wall at x = 4
+    cells[43:98, 81] = -1
+    after = update(before, OccupancyGrid(FRAME, cells), doors=[DOOR])
+    (room,) = after.rooms
+    assert room.polygon.bounds[2] < 4.2
+
+
 def test_a_neighbour_loses_what_turned_out_to_be_another_room() -> None:
     seen = OccupancyGrid(FRAME, look_into(corridor(), 1.0, 2.1, 6.5, 6.0))
     after = update(predicted(FIRST, SECOND), seen, doors=(DOOR, OTHER))
