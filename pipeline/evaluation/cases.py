@@ -45,7 +45,7 @@ def draw_worst(path: Path, scores: Sequence[Scores], samples: Mapping[str, Sampl
     if not worst:
         return False
     columns = min(4, len(worst))
-    figure, axes = _figure(-(-len(worst) // columns), columns, 4.2)
+    figure, axes = _figure(-(-len(worst) // columns), columns, 4.2, 4.2)
     for place, score in zip(axes.ravel(), worst, strict=False):
         try:
             sample = read_sample(samples[score["sample"]])
@@ -97,7 +97,7 @@ def draw_extremes(
         read.append((score, sample, predict_with(score["method"], sample)))
     if not read:
         return 0
-    figure, axes = _figure(len(read), 3, 5.0)
+    figure, axes = _figure(len(read), 3, 5.0, 3.6)
     for line, (score, sample, prediction) in zip(axes, read, strict=True):
         titles = (
             f"{score['sample']}: {score['closed_doors']} doors closed, {score['hidden_share']:.0%} hidden",
@@ -113,7 +113,7 @@ def draw_extremes(
     save_figure(figure, rooms_path)
     if not all("tour" in score for score, _, _ in read):
         return 1
-    figure, axes = _figure(len(read), 3, 5.0)
+    figure, axes = _figure(len(read), 3, 5.0, 3.6)
     for line, (score, sample, prediction) in zip(axes, read, strict=True):
         tour = score["tour"]
         grids = ((sample.observed, sample.doors), (prediction.grid, ()), (sample.truth, ()))
@@ -132,11 +132,11 @@ def draw_extremes(
     return 2
 
 
-def _figure(rows: int, columns: int, size: float) -> tuple[Any, Any]:
+def _figure(rows: int, columns: int, width: float, height: float) -> tuple[Any, Any]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(size * columns, size * rows), layout="constrained")
+    figure = Figure(figsize=(width * columns, height * rows), layout="constrained")
     FigureCanvasAgg(figure)
     axes = np.atleast_2d(figure.subplots(rows, columns, squeeze=False))
     for place in axes.ravel():

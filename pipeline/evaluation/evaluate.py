@@ -1,6 +1,5 @@
 """``closedrooms evaluate``: methods against the truth, over datasets (paper, section 4.1)."""
 
-import json
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -12,9 +11,10 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from closedrooms.core.errors import ClosedroomsError, OutputError
+from closedrooms.core.errors import ClosedroomsError
 from closedrooms.core.files import MANIFEST, PROGRAM, write_json
 from closedrooms.pipeline.evaluation.config import EvaluateConfig
+from closedrooms.pipeline.evaluation.folder import claim, one_thread
 from closedrooms.pipeline.evaluation.listing import SamplePath, find_samples
 from closedrooms.pipeline.evaluation.sample import Outcome, Scores, evaluate_sample
 from closedrooms.pipeline.manifest import resolved, versions
@@ -66,7 +66,7 @@ def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Eva
     """
     progress = progress or Silent()
     samples = find_samples(config.datasets)
-    _claim(config.out)
+    claim(config.out, "evaluate")
     progress.stage("evaluate", len(samples))
     scores: list[Scores] = []
     failures: dict[str, str] = {}
@@ -104,33 +104,13 @@ def _seconds(scores: Sequence[Scores]) -> dict[str, float]:
     return {method: round(median(values), 3) for method, values in sorted(times.items())}
 
 
-def _claim(folder: Path) -> None:
-    """Make the folder ours, or make sure that it is: an evaluation that goes on where it stopped."""
-    manifest = folder / MANIFEST
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"the output is a file; expected a folder: {folder}")
-    if folder.is_dir() and any(folder.iterdir()):
-        try:
-            ours = json.loads(manifest.read_text())["command"] == "evaluate"
-        except (OSError, ValueError, KeyError, TypeError):
-            ours = False
-        if not ours:
-            raise OutputError(f"the output folder holds files of something else; expected an empty one: {folder}")
-        return
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot write ({error.strerror}): {folder}") from error
-    write_json(manifest, {"program": PROGRAM, "command": "evaluate", "files": []})
-
-
 def _work(samples: Sequence[SamplePath], config: EvaluateConfig) -> Iterator[Outcome]:
     """What comes of the samples, as they are finished."""
     job = partial(evaluate_sample, methods=config.methods, out=config.out, tours=config.tours)
     if config.workers == 1 or len(samples) == 1:
         yield from map(job, samples)
         return
-    with ProcessPoolExecutor(config.workers, mp_context=get_context("spawn"), initializer=_one_thread) as pool:
+    with ProcessPoolExecutor(config.workers, mp_context=get_context("spawn"), initializer=one_thread) as pool:
         waiting = [pool.submit(job, sample) for sample in samples]
         try:
             for future in as_completed(waiting):
@@ -140,10 +120,3 @@ def _work(samples: Sequence[SamplePath], config: EvaluateConfig) -> Iterator[Out
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-
-
-def _one_thread() -> None:
-    """Workers share the processors: OpenCV's own threads would only get in each other's way."""
-    import cv2
-
-    cv2.setNumThreads(1)

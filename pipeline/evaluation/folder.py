@@ -1,0 +1,42 @@
+"""An output folder that a command fills bit by bit and goes on with."""
+
+import json
+from pathlib import Path
+
+from closedrooms.core.errors import OutputError
+from closedrooms.core.files import MANIFEST, PROGRAM, write_json
+
+
+def claim(folder: Path, command: str) -> None:
+    """Make the folder ours, or make sure that it is of the same command, which goes on where it stopped.
+
+    Args:
+        folder: To write into.
+        command: As its run.json names it.
+
+    Raises:
+        OutputError: The folder cannot be written, or holds something else.
+    """
+    manifest = folder / MANIFEST
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"the output is a file; expected a folder: {folder}")
+    if folder.is_dir() and any(folder.iterdir()):
+        try:
+            ours = json.loads(manifest.read_text())["command"] == command
+        except (OSError, ValueError, KeyError, TypeError):
+            ours = False
+        if not ours:
+            raise OutputError(f"the output folder holds files of something else; expected an empty one: {folder}")
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot write ({error.strerror}): {folder}") from error
+    write_json(manifest, {"program": PROGRAM, "command": command, "files": []})
+
+
+def one_thread() -> None:
+    """Begin a worker: workers share the processors, and OpenCV's own threads would only get in each other's way."""
+    import cv2
+
+    cv2.setNumThreads(1)

@@ -1,0 +1,44 @@
+"""Maps whose walls are made right while what is known stays as it is."""
+
+import numpy as np
+
+from closedrooms.core.arrays import BoolArray
+from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
+
+# A wall of the undisturbed map counts as shown by the disturbed one this near to what that knows [m].
+NEAR = 0.15
+
+
+def sampled(grid: OccupancyGrid, frame: GridFrame) -> OccupancyGrid:
+    """A grid on another frame of any lattice: each cell takes the value at its centre, unknown outside."""
+    rows, cols = np.meshgrid(np.arange(frame.rows), np.arange(frame.cols), indexing="ij")
+    cells = grid.frame.to_cells(frame.to_points(np.stack((rows, cols), axis=-1)))
+    inside = grid.frame.contains(cells)
+    values = np.full(frame.shape, UNKNOWN, dtype=np.int8)
+    values[inside] = grid.cells[cells[inside][:, 0], cells[inside][:, 1]]
+    return OccupancyGrid(frame, values)
+
+
+def with_clean_walls(disturbed: OccupancyGrid, clean: OccupancyGrid) -> OccupancyGrid:
+    """The walls of ``clean`` in the extent of ``disturbed``.
+
+    What both know is as in ``clean``. What only ``disturbed`` knows stays where it is free; occupied cells there are
+    noise. Walls of ``clean`` that stand at the edge of what ``disturbed`` knows are in it.
+
+    Args:
+        disturbed: A map.
+        clean: The same, from undisturbed sensors at true poses; any lattice.
+    """
+    import cv2
+
+    frame = disturbed.frame
+    clean = sampled(clean, frame)
+    radius = max(round(NEAR / frame.resolution), 1)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+    near: BoolArray = cv2.dilate(disturbed.known.astype(np.uint8), disc) > 0
+    cells = np.full(frame.shape, UNKNOWN, dtype=np.int8)
+    cells[disturbed.free] = FREE
+    both = disturbed.known & clean.known
+    cells[both & clean.free] = FREE
+    cells[near & clean.occupied] = OCCUPIED
+    return OccupancyGrid(frame, cells)
