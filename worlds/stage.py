@@ -12,13 +12,15 @@ from closedrooms.core.pose import Pose2
 from closedrooms.worlds.geometry import wall_area
 from closedrooms.worlds.passages import without_entrances
 from closedrooms.worlds.pieces import door_leaves, opened
-from closedrooms.worlds.plan import FloorPlan
+from closedrooms.worlds.plan import FloorPlan, Furniture
 from closedrooms.worlds.start import start_pose
 from closedrooms.worlds.truth import rasterise
 
 # Metres a pixel of the bitmap.
 RESOLUTION = 0.02
 MAX_PIXELS = 200_000_000
+# Tables and cupboards up to this height block a lidar [m].
+FURNITURE_HEIGHT = 0.8
 
 
 def write_stage(path: Path, plan: FloorPlan) -> None:
@@ -57,14 +59,7 @@ def _text(plan: FloorPlan, picture: str, bounds: tuple[float, float, float, floa
         for number, leaf in enumerate(door_leaves(plan, door))
         for box in [opened(leaf)]
     ]
-    things = [
-        f'thing ( name "{thing.id}" pose [0 0 0 0] block ( points {len(thing.polygon.exterior.coords) - 1} '
-        + " ".join(
-            f"point[{number}] [{x:.4f} {y:.4f}]" for number, (x, y) in enumerate(thing.polygon.exterior.coords[:-1])
-        )
-        + " z [0 0.8] ) )"
-        for thing in plan.furniture
-    ]
+    things = [_thing(thing) for thing in plan.furniture]
     lines = [
         f"# {' '.join(plan.name.split())}: metres, x right, y up; doors stand open, one model a leaf",
         "resolution 0.02",
@@ -82,3 +77,15 @@ def _text(plan: FloorPlan, picture: str, bounds: tuple[float, float, float, floa
         f'robot ( name "robot" pose [{start.x:.4f} {start.y:.4f} 0 {math.degrees(start.theta):.3f}] )',
     ]
     return "\n".join(lines) + "\n"
+
+
+def _thing(thing: Furniture) -> str:
+    """A piece of furniture: Stage fits a block's box into the size of its model, around the model's pose."""
+    x0, y0, x1, y1 = thing.polygon.bounds
+    x, y = (x0 + x1) / 2, (y0 + y1) / 2
+    corners = thing.polygon.exterior.coords[:-1]
+    points = " ".join(f"point[{number}] [{a - x:.4f} {b - y:.4f}]" for number, (a, b) in enumerate(corners))
+    return (
+        f'thing ( name "{thing.id}" size [{x1 - x0:.4f} {y1 - y0:.4f} {FURNITURE_HEIGHT}] pose [{x:.4f} {y:.4f} 0 0]'
+        f" block ( points {len(corners)} {points} z [0 {FURNITURE_HEIGHT}] ) )"
+    )

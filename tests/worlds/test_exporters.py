@@ -1,4 +1,5 @@
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,9 @@ from closedrooms.worlds.commands import convert_world
 from closedrooms.worlds.geometry import door_leaf, rectangles, wall_area
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.pieces import Box, door_leaves, opened, wall_boxes
-from closedrooms.worlds.plan import FloorPlan
+from closedrooms.worlds.plan import FloorPlan, Furniture
+from closedrooms.worlds.sdf import write_sdf
+from closedrooms.worlds.stage import write_stage
 
 
 def area_of(box: Box) -> Polygon:
@@ -87,3 +90,39 @@ def test_stage_gets_a_bitmap_cut_at_the_walls(tmp_path: Path) -> None:
     assert text.count("\nleaf (") == len(plan.doors)
     assert text.count("(") == text.count(")")
     assert text.count("[") == text.count("]")
+
+
+def test_sdf_names_are_unique_and_numbers_make_sense(small: FloorPlan, tmp_path: Path) -> None:
+    kinds = ("hinged", "double", "sliding")
+    for kind in kinds:
+        doors = tuple(replace(door, kind=kind) for door in small.doors)  # type: ignore[arg-type]
+        thing = Furniture("f00", Polygon([(1.0, 0.5), (2.0, 0.5), (2.0, 1.0)]))
+        write_sdf(tmp_path / "a.sdf", replace(small, doors=doors, furniture=(thing,)))
+        root = ElementTree.parse(tmp_path / "a.sdf").getroot()
+        assert (root.tag, root.get("version")) == ("sdf", "1.9")
+        for parent in root.iter():
+            names = [child.get("name") for child in parent if child.get("name") is not None]
+            assert len(names) == len(set(names)), f"{parent.tag} {parent.get('name')}: {names}"
+        for pose in root.iter("pose"):
+            assert len([float(v) for v in (pose.text or "").split()]) == 6
+        for size in root.iter("size"):
+            assert all(float(v) > 0.0 for v in (size.text or "").split())
+        for inertia in root.iter("inertia"):
+            moments = sorted(float(child.text or "") for child in inertia)
+            assert moments[0] > 0.0
+            # No body has a moment above the sum of the other two.
+            assert moments[2] <= moments[0] + moments[1] + 1e-9
+        for limit in root.iter("limit"):
+            assert float(limit.findtext("lower") or "") < float(limit.findtext("upper") or "")
+        assert len(list(root.iter("polyline"))) == 2
+
+
+def test_stage_furniture_fills_its_model(small: FloorPlan, tmp_path: Path) -> None:
+    # Stage scales a block to the size of its model and centres it there.
+    thing = Furniture("f00", Polygon([(1.0, 0.5), (2.0, 0.5), (2.0, 1.1)]))
+    write_stage(tmp_path / "a.world", replace(small, furniture=(thing,)))
+    (line,) = [line for line in (tmp_path / "a.world").read_text().splitlines() if line.startswith("thing (")]
+    assert "size [1.0000 0.6000 0.8] pose [1.5000 0.8000 0 0]" in line
+    corners = np.array(re.findall(r"point\[\d+\] \[(\S+) (\S+)\]", line), dtype=np.float64)
+    assert corners.min(axis=0) == pytest.approx([-0.5, -0.3])
+    assert corners.max(axis=0) == pytest.approx([0.5, 0.3])
