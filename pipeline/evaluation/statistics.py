@@ -128,4 +128,5 @@ def _wilcoxon(differences: FloatArray) -> float:
     if not np.abs(differences).max() > 0.0:
         return 1.0
     with np.errstate(invalid="ignore"):
-        return rounded(wilcoxon(differences, zero_method="pratt").pvalue)
+        # Three digits: a p of a large set may be very small.
+        return float(f"{wilcoxon(differences, zero_method='pratt').pvalue:.3g}")
