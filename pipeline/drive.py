@@ -134,8 +134,7 @@ def drive(
             observer.map(reopened.grid(), scan.stamp)
         if len(guide.revisions) != told or (told == 0 and len(stamps) == 1):
             for revision in guide.revisions[told:]:
-                names = ", ".join(revision.doors) or "the walls"
-                observer.note(f"looked behind {names}{': new tour' if revision.replanned else ''}", scan.stamp)
+                observer.note(_said(revision), scan.stamp)
             told = len(guide.revisions)
             observer.revision(guide.prediction, guide.way(), scan.stamp)
         watch.lap("observe")
@@ -164,3 +163,10 @@ def drive(
         np.array(stamps),
         watch.seconds,
     )
+
+
+def _said(revision: Revision) -> str:
+    """One line of the log."""
+    looked = f"looked behind {', '.join(revision.doors)}" if revision.doors else "prediction revised"
+    changed = f", other shape behind {', '.join(revision.changed)}" if revision.changed else ""
+    return f"{looked}{changed}{': new tour' if revision.replanned else ''}"
