@@ -99,10 +99,11 @@ class NavigationMap:
         row, col = self._offset
         own = self._cells[row : row + grid.frame.rows, col : col + grid.frame.cols]
         changed = own != grid.cells
-        at_rows, at_cols = changed.any(axis=1).nonzero()[0], changed.any(axis=0).nonzero()[0]
+        at_rows = changed.any(axis=1).nonzero()[0]
         if at_rows.size == 0:
             return
-        own[...] = grid.cells
+        at_cols = changed[at_rows[0] : at_rows[-1] + 1].any(axis=0).nonzero()[0]
+        own[at_rows[0] : at_rows[-1] + 1] = grid.cells[at_rows[0] : at_rows[-1] + 1]
         f = self._factors[1]
         r0, r1 = row + int(at_rows[0]), row + int(at_rows[-1]) + 1
         c0, c1 = col + int(at_cols[0]), col + int(at_cols[-1]) + 1

@@ -90,7 +90,9 @@ class EvidenceGrid:
             rows, cols = slice(row, row + n_rows), slice(col, col + n_cols)
             self._cells[rows, cols] = self._probabilities(self._hits[rows, cols], self._passes[rows, cols])
             self._dirty = None
-        return OccupancyGrid(self._lattice.frame, self._cells.copy())
+        cells = self._cells.copy()
+        cells.flags.writeable = False  # so that it is not copied again
+        return OccupancyGrid(self._lattice.frame, cells)
 
     def _probabilities(
         self,
@@ -98,13 +100,17 @@ class EvidenceGrid:
         passes: np.ndarray[tuple[int, ...], np.dtype[np.int32]],
     ) -> CellArray:
         config = self._config
-        odds = hits * np.float32(config.log_odds_hit) - passes * np.float32(config.log_odds_pass)
-        # Rounded to a thousandth: the table below is exact and quick, an exponential per cell is not.
-        steps = np.clip(np.rint(odds * 10.0), -10 * config.log_odds_limit, 10 * config.log_odds_limit).astype(np.int32)
+        odds = hits * np.float32(config.log_odds_hit)
+        odds -= passes * np.float32(config.log_odds_pass)
+        odds *= np.float32(10.0)
+        # Rounded to a tenth: the table below is exact and quick, an exponential per cell is not.
+        np.rint(odds, out=odds)
         limit = round(10 * config.log_odds_limit)
+        np.clip(odds, -limit, limit, out=odds)
+        odds += np.float32(limit)
         table = np.rint(100.0 / (1.0 + np.exp(-np.arange(-limit, limit + 1) / 10.0))).astype(np.int8)
-        cells = table[steps + limit]
-        cells[(hits == 0) & (passes == 0)] = UNKNOWN
+        cells: CellArray = table.take(odds.astype(np.int32))
+        cells[(hits | passes) == 0] = UNKNOWN
         return cells
 
 

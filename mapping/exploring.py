@@ -27,6 +27,10 @@ CHECK_AHEAD = 3.0
 SAME_PLACE = 0.5
 # Scan points this close to the footprint of a stuck robot are what holds it [m].
 TOUCHING = 0.12
+# Distance between the obstacles that stand for an unseen barrier [m]: a map cell.
+BARRIER_STEP = 0.05
+# A robot that gets stuck so many times on the way to one goal does not get through there.
+HELD_UP = 3
 # A robot that faces its goal waits this long for the map to take in what it sees [s].
 SETTLE = 0.4
 
@@ -105,6 +109,10 @@ class Explorer:
             self._facing_since = now
         elif driver.state == "stuck":
             self._map.add_obstacles(touching_points(pose, scan, self.config))
+            if driver.recoveries % HELD_UP == 0:
+                # What the scan does not show (glass, a sill) holds the robot: what lies behind is reached another way,
+                # or not at all, and the search goes on elsewhere.
+                self._map.add_obstacles(barrier(pose, driver.ahead(SAME_PLACE), self.config))
             self.goal = None
             if driver.recoveries > self.config.max_recoveries:
                 self.status = "stuck"
@@ -262,6 +270,27 @@ def touching_points(pose: Pose2, scan: LaserScan, config: NavigationConfig) -> F
     """What the scan shows at the footprint of a stuck robot, map frame, shape (n, 2) [m]: it blocks later paths."""
     points = near_points(scan)
     return pose.transform(points[np.hypot(*points.T) < config.required_clearance + TOUCHING])
+
+
+def barrier(pose: Pose2, ahead: FloatArray, config: NavigationConfig) -> FloatArray:
+    """Obstacles across the way of a robot that cannot go on, map frame, shape (n, 2) [m].
+
+    They stand right before the footprint and are as wide as the robot needs, so that no path passes beside them where
+    the robot has been held up.
+
+    Args:
+        pose: ``map_T_robot``.
+        ahead: The path from here on, shape (n, 2) [m].
+        config: Footprint.
+    """
+    way = ahead[-1] - (pose.x, pose.y) if len(ahead) else np.zeros(2)
+    length = float(np.hypot(*way))
+    forward = way / length if length > 1e-6 else np.array([math.cos(pose.theta), math.sin(pose.theta)])
+    reach = config.required_clearance
+    across = np.linspace(-reach, reach, 2 * math.ceil(reach / BARRIER_STEP) + 1)
+    left = np.array([-forward[1], forward[0]])
+    points: FloatArray = np.array([pose.x, pose.y]) + forward * (reach + BARRIER_STEP) + across[:, None] * left
+    return points
 
 
 def is_free(grid: OccupancyGrid, points: FloatArray, config: NavigationConfig) -> bool:

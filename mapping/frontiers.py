@@ -65,13 +65,16 @@ def find_frontiers(
         vain = np.zeros_like(border)
         vain[at[:, 0], at[:, 1]] = 1
         border[cv2.dilate(vain, SQUARE) > 0] = 0
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(border, connectivity=8, ltype=cv2.CV_32S)
-    long_enough = stats[:, cv2.CC_STAT_AREA] * frame.resolution >= config.min_frontier - 1e-9
+    # Few cells are border: those are counted, not the whole map.
+    cells = cv2.findNonZero(border)
+    cols, rows = np.empty((2, 0), dtype=np.int64) if cells is None else np.asarray(cells, dtype=np.int64).T
+    count, labels = cv2.connectedComponents(border, connectivity=8, ltype=cv2.CV_32S)
+    label = np.asarray(labels)[rows, cols]
+    long_enough = np.bincount(label, minlength=count) * frame.resolution >= config.min_frontier - 1e-9
     long_enough[0] = False
     number = np.full(count, -1, dtype=np.int64)
     number[long_enough] = np.arange(int(long_enough.sum()))
-    rows, cols = np.nonzero(border)
-    owner = number[labels[rows, cols]]
+    owner = number[label]
     rows, cols, owner = rows[owner >= 0], cols[owner >= 0], owner[owner >= 0]
     largest = np.zeros(int(long_enough.sum()))
     np.maximum.at(largest, owner, area[rows, cols])
@@ -82,10 +85,11 @@ def find_frontiers(
 def _unknown_area(free: Image, blocked: Image, resolution: float) -> npt.NDArray[np.float32]:
     """Area of the largest unknown patch in the four-neighbourhood of each cell [m2]."""
     unknown = (1 - (free | blocked)).astype(np.uint8)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(unknown, connectivity=4, ltype=cv2.CV_32S)
-    areas = stats[:, cv2.CC_STAT_AREA].astype(np.float32) * np.float32(resolution**2)
+    _, found = cv2.connectedComponents(unknown, connectivity=4, ltype=cv2.CV_32S)
+    labels: npt.NDArray[np.int32] = np.asarray(found, dtype=np.int32)
+    areas = np.bincount(labels.ravel()).astype(np.float32) * np.float32(resolution**2)
     areas[0] = 0.0
-    return np.asarray(cv2.dilate(areas[labels], CROSS), dtype=np.float32)
+    return np.asarray(cv2.dilate(areas.take(labels), CROSS), dtype=np.float32)
 
 
 def seen_from(navigation: NavigationMap, place: tuple[float, float], points: FloatArray, reach: float) -> FloatArray:
