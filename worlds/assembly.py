@@ -184,6 +184,8 @@ def without_gaps(
     closed = union.buffer(width / 2, join_style="mitre").buffer(-width / 2, join_style="mitre")
     narrow = [part for part in shapely.get_parts(areal(closed.difference(union))) if _is_narrow(part, width)]
     gaps = [piece for part in narrow for piece in (_branches(part, width) if branches else [part])]
+    # What a ring-shaped gap goes around are rooms and courtyards, not gaps.
+    gaps = [gap for gap in gaps if _is_narrow(gap, width, 0.0) and not union.contains(gap.representative_point())]
     rooms = list(polygons)
     tree = STRtree(rooms)
     filled = []
@@ -200,8 +202,8 @@ def without_gaps(
     return rooms, filled
 
 
-def _is_narrow(part: Polygon, width: float) -> bool:
-    return part.area > 1e-3 and shapely.maximum_inscribed_circle(part, tolerance=0.02).length < width / 2 + 0.05
+def _is_narrow(part: Polygon, width: float, least: float = 1e-3) -> bool:
+    return part.area > least and shapely.maximum_inscribed_circle(part, tolerance=0.02).length < width / 2 + 0.05
 
 
 def _branches(gap: Polygon, width: float) -> list[Polygon]:
