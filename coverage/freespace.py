@@ -47,6 +47,7 @@ def clean_free_space(grid: OccupancyGrid, config: GraphConfig) -> FreeSpace:
     margin = math.ceil(config.wall_thickness / grid.frame.resolution) + 1
     free, occupied, frame = _cropped(filtered, margin)
     resolution = frame.resolution
+    free = _without_hollows(free, occupied, grid.on(frame).occupied & free)
     free = _without_gaps(free, occupied, config.gap_width / resolution)
     passable = _without_specks(free, config.speck_area / resolution**2)
     mask = _opened(passable, config.opening_radius / resolution)
@@ -75,6 +76,23 @@ def _cropped(grid: OccupancyGrid, margin: int) -> tuple[BoolArray, BoolArray, Gr
     frame = grid.frame.cropped(r0 - margin, c0 - margin, r1 - r0 + 2 * margin, c1 - c0 + 2 * margin)
     window = grid.on(frame)
     return window.free, window.occupied, frame
+
+
+def _without_hollows(free: BoolArray, occupied: BoolArray, removed: BoolArray) -> BoolArray:
+    """Fill what no scan saw inside of furniture that the filter took out: its outline is gone, so is the rest of it."""
+    import cv2
+
+    if not removed.any():
+        return free
+    count, labels = cv2.connectedComponents((~free).astype(np.uint8), connectivity=8)
+    beside = cv2.dilate(removed.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    hollow = np.zeros(count, dtype=np.bool_)
+    hollow[labels[beside]] = True
+    hollow[labels[occupied]] = False
+    hollow[labels[0, 0]] = False  # what lies around the map
+    hollow[0] = False
+    filled: BoolArray = free | hollow[labels]
+    return filled
 
 
 def _without_gaps(free: BoolArray, occupied: BoolArray, width: float) -> BoolArray:

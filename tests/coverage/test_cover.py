@@ -8,7 +8,7 @@ import pytest
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.geojson import read_doors, read_features, write_features
-from closedrooms.core.grid import GridFrame, OccupancyGrid
+from closedrooms.core.grid import OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.rosmap import read_map
 from closedrooms.coverage.config import CoverageConfig, TourConfig
 from closedrooms.coverage.cover import plan_coverage
@@ -56,6 +56,19 @@ def test_the_map_goes_through_the_clutter_filter_unless_told_otherwise(draw, pla
     filtered, unfiltered = plan_coverage(furnished), plan_coverage(furnished, config=plain)
     assert len(unfiltered.graph.vertices) > len(filtered.graph.vertices)
     assert filtered.path.tobytes() == plan_coverage(empty, config=plain).path.tobytes()
+
+
+def test_what_no_scan_saw_inside_of_filtered_furniture_goes_with_it(draw, plain, monkeypatch):
+    boxes = [(1.0, 1.0, 12.0, 9.0), (12.2, 1.0, 18.0, 9.0), (11.9, 4.0, 12.4, 5.0)]
+    empty = draw(19.0, 10.0, boxes)
+    furnished, filtered = empty.cells.copy(), empty.cells.copy()
+    furnished[60:100, 60:100] = OCCUPIED
+    furnished[62:98, 62:98] = filtered[62:98, 62:98] = UNKNOWN  # a table of 2 m, seen from outside
+    monkeypatch.setattr("closedrooms.predictor.clutter.filter_clutter", lambda _: OccupancyGrid(empty.frame, filtered))
+    tour = plan_coverage(OccupancyGrid(empty.frame, furnished))
+    assert tour.path.tobytes() == plan_coverage(empty, config=plain).path.tobytes()
+    # What is unknown without furniture around it stays in the way.
+    assert len(plan_coverage(OccupancyGrid(empty.frame, filtered)).graph.vertices) > len(tour.graph.vertices)
 
 
 def test_an_empty_map_is_refused():
