@@ -86,9 +86,15 @@ def exporters() -> dict[str, Callable[[Path, FloorPlan], None]]:
 
 
 def write_ros_map(path: Path, plan: FloorPlan) -> None:
-    """Write the true map of a plan in the building frame, ``<stem>.yaml`` and ``<stem>.png``, at 0.05 m."""
+    """Write the true map of a plan in the building frame at 0.05 m, and its doors beside it.
+
+    ``<stem>.yaml`` and ``<stem>.png`` show all doors open; ``<stem>.doors.geojson`` lists them, so that the map can be
+    read as a plan again.
+    """
     import math
 
+    from closedrooms.core.door import ClosedDoor
+    from closedrooms.core.geojson import write_doors
     from closedrooms.core.grid import GridFrame
     from closedrooms.core.pose import Pose2
     from closedrooms.core.rosmap import write_map
@@ -100,3 +106,5 @@ def write_ros_map(path: Path, plan: FloorPlan) -> None:
     frame = GridFrame(MAP_RESOLUTION, round(col * MAP_RESOLUTION, 9), round(row * MAP_RESOLUTION, 9), rows, cols)
     stem = path.with_suffix("") if path.suffix in {".yaml", ".yml", ".png", ".pgm"} else path
     write_map(stem, rasterise(plan, frame, Pose2()))
+    doors = [ClosedDoor(door.id, door.midpoint, door.segment, door.width) for door in plan.doors]
+    write_doors(stem.with_name(f"{stem.name}.doors.geojson"), doors)

@@ -136,7 +136,17 @@ def test_houseexpo_without_rooms_is_refused(tmp_path: Path) -> None:
 @pytest.fixture
 def mapped(small: FloorPlan, tmp_path: Path) -> Path:
     write_ros_map(tmp_path / "map.yaml", small)
+    (tmp_path / "map.doors.geojson").unlink()
     return tmp_path / "map.yaml"
+
+
+def test_a_plan_written_as_a_map_is_read_with_its_doors(small: FloorPlan, tmp_path: Path) -> None:
+    write_ros_map(tmp_path / "map.yaml", small)
+    plan = load_world(str(tmp_path / "map.yaml"))
+    for made, given in zip(plan.doors, small.doors, strict=True):
+        assert made.id == given.id
+        assert made.midpoint == pytest.approx(given.midpoint, abs=0.1)
+        assert made.width == pytest.approx(given.width, abs=0.1)
 
 
 @pytest.mark.parametrize("with_segment", [True, False])
