@@ -32,6 +32,7 @@ def with_clean_walls(disturbed: OccupancyGrid, clean: OccupancyGrid) -> Occupanc
     import cv2
 
     frame = disturbed.frame
+    walls = _walls(clean, frame)
     clean = sampled(clean, frame)
     radius = max(round(NEAR / frame.resolution), 1)
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
@@ -40,5 +41,14 @@ def with_clean_walls(disturbed: OccupancyGrid, clean: OccupancyGrid) -> Occupanc
     cells[disturbed.free] = FREE
     both = disturbed.known & clean.known
     cells[both & clean.free] = FREE
-    cells[near & clean.occupied] = OCCUPIED
+    cells[near & walls] = OCCUPIED
     return OccupancyGrid(frame, cells)
+
+
+def _walls(clean: OccupancyGrid, frame: GridFrame) -> BoolArray:
+    """Cells of ``frame`` with an occupied cell of ``clean`` at their centre or in them: no wall falls between cells."""
+    walls = sampled(clean, frame).occupied
+    cells = frame.to_cells(clean.frame.to_points(np.argwhere(clean.occupied)))
+    cells = cells[frame.contains(cells)]
+    walls[cells[:, 0], cells[:, 1]] = True
+    return walls

@@ -146,6 +146,13 @@ def test_clean_walls_replace_noisy_ones_and_what_is_unknown_stays_so() -> None:
     assert repaired.free[12:48, 12:38].all()
     assert repaired.occupied[10, 10:40].all()
     assert repaired.unknown[12:48, 45:].all()
+    for resolution in (0.025, 0.2):
+        other = GridFrame(resolution, 0.0, 0.0, round(3.0 / resolution), round(3.0 / resolution))
+        blank = OccupancyGrid(other, np.full(other.shape, FREE, dtype=np.int8))
+        walls = with_clean_walls(blank, OccupancyGrid(frame, clean)).occupied
+        lower, upper = other.to_cells(np.array([[1.0, 0.525], [1.0, 2.475]]))[:, 0]
+        assert walls[lower].all()
+        assert walls[upper].all()
     coarse = sampled(repaired, GridFrame(0.1, 0.0, 0.0, 30, 40))
     assert coarse.free[7:23, 7:18].all()
     assert coarse.unknown[:, 31:].all()
