@@ -59,10 +59,12 @@ def test_a_tour_solved_again_leaves_out_what_was_in_sight_of_the_way(stops: Itin
     assert stops.solve_again(_grid(3), (2.0, 2.0), room[None], PLAIN, reach=1.2)
     assert np.hypot(*(stops.left - room).T).min() > 1.2
     assert (stops.left[:, 1] > 3.2).sum() >= 2
-    # The other side of a wall is not in sight: a way along the corridor leaves the rooms to be done.
-    beside = np.array([(x, 2.9) for x in np.arange(1.2, 13.8, 0.2)])
-    assert stops.solve_again(_grid(3), (2.0, 2.0), beside, PLAIN, reach=2.5)
-    assert (stops.left[:, 1] > 3.2).any()
+    # Along the wall between two rooms, only the one on the same side of it is done.
+    beside = np.array([(4.9, y) for y in np.arange(3.4, 7.0, 0.2)])
+    assert stops.solve_again(_grid(3), (2.0, 2.0), beside, PLAIN, reach=2.6)
+    rooms = stops.left[stops.left[:, 1] > 3.2]
+    assert not (rooms[:, 0] < 5.0).any()
+    assert (rooms[:, 0] < 9.3).any()
 
 
 def test_a_tour_from_home_to_home_is_a_closed_one(stops: Itinerary) -> None:
