@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.worlds.library import DEFAULT_WORLD, PLANS, bundled_names, load_world, read_world
 from closedrooms.worlds.plan import FloorPlan
 
@@ -42,7 +42,7 @@ def show_world(world: str, out_png: str | Path, *, level: str | None = None) -> 
     from closedrooms.worlds.picture import draw_plan
 
     plan = load_world(world, level=level)
-    draw_plan(plan, out_png)
+    draw_plan(plan, _file(out_png))
     return plan
 
 
@@ -57,7 +57,7 @@ def generate_world(kind: str, seed: int, out_json: str | Path, *, furniture: boo
     from closedrooms.worlds.jsonfile import write_plan
 
     plan = generate(kind, seed, furniture=furniture)
-    write_plan(out_json, plan)
+    write_plan(_file(out_json), plan)
     return plan
 
 
@@ -72,8 +72,19 @@ def convert_world(src: str, dst: str | Path, to: str, *, level: str | None = Non
     if to not in formats:
         raise InvalidInputError(f"unknown format {to!r}", expected=f"one of {', '.join(formats)}")
     plan = read_world(src, level=level)
-    formats[to](Path(dst), plan)
+    formats[to](_file(dst), plan)
     return plan
+
+
+def _file(path: str | Path) -> Path:
+    """A path that may become a file.
+
+    Raises:
+        OutputError: It is a folder.
+    """
+    if Path(path).is_dir():
+        raise OutputError(f"the output is a folder; expected a file: {path}")
+    return Path(path)
 
 
 def exporters() -> dict[str, Callable[[Path, FloorPlan], None]]:

@@ -27,12 +27,14 @@ class Importer:
         what: For messages.
         recognises: Whether a file is of this format, from its path and its first bytes as text.
         read: Reads and validates; the level is ``None`` but for formats with several floors a file.
+        levels: Whether a file may hold several floors.
     """
 
     name: str
     what: str
     recognises: Callable[[Path, str], bool]
     read: Callable[[Path, str | None], FloorPlan]
+    levels: bool = False
 
 
 def bundled_names() -> list[str]:
@@ -61,12 +63,21 @@ def read_world(name_or_path: str, *, level: str | None = None) -> FloorPlan:
     from closedrooms.worlds.jsonfile import read_plan
 
     if name_or_path in bundled_names():
+        _refuse_level(level, name_or_path)
         return read_plan(PLANS / f"{name_or_path}.json")
     path = Path(name_or_path)
     if not path.exists():
         names = ", ".join(bundled_names())
         raise InvalidInputError(f"unknown world {name_or_path!r}", expected=f"a floor plan file or one of {names}")
-    return importer_of(path).read(path, level)
+    importer = importer_of(path)
+    if not importer.levels:
+        _refuse_level(level, path)
+    return importer.read(path, level)
+
+
+def _refuse_level(level: str | None, where: str | Path) -> None:
+    if level is not None:
+        raise InvalidInputError(f"--level {level} of a world with one floor", expected="no level", where=where)
 
 
 def importer_of(path: Path) -> Importer:
@@ -104,7 +115,7 @@ def importers() -> list[Importer]:
         Importer("luperto", "Luperto XML", _is_luperto, lambda path, _: read_luperto(path)),
         Importer("houseexpo", "HouseExpo JSON", _is_houseexpo, lambda path, _: read_houseexpo(path)),
         Importer("json", "closedrooms JSON", _is_json, lambda path, _: read_plan(path)),
-        Importer("rmf", "RMF building.yaml", _has_keys("levels"), read_rmf),
+        Importer("rmf", "RMF building.yaml", _has_keys("levels"), read_rmf, levels=True),
         Importer("pyrobosim", "pyrobosim YAML", _has_keys("rooms"), lambda path, _: read_pyrobosim(path)),
         Importer("rosmap", "a ROS map (YAML)", _has_keys("image"), lambda path, _: read_raster(path)),
     ]

@@ -9,6 +9,8 @@ from closedrooms.worlds.commands import convert_world, exporters, generate_world
 from closedrooms.worlds.jsonfile import read_plan
 from closedrooms.worlds.library import bundled_names, load_world
 
+FIXTURES = Path(__file__).parents[1] / "fixtures"
+
 
 def test_the_list_has_a_line_a_world_with_its_name_first() -> None:
     lines = list_worlds()
@@ -47,3 +49,17 @@ def test_an_unknown_format_lists_the_valid_ones(tmp_path: Path) -> None:
         convert_world("office-01", tmp_path / "m", "dwg")
     assert {"json", "rosmap"} <= set(exporters())
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("form", ["json", "rosmap", "sdf", "stage"])
+def test_a_folder_is_no_file_to_convert_to(tmp_path: Path, form: str) -> None:
+    with pytest.raises(OutputError, match="the output is a folder"):
+        convert_world("office-01", tmp_path, form)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_level_of_a_world_with_one_floor_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="--level L1 of a world with one floor"):
+        load_world("office-01", level="L1")
+    with pytest.raises(InvalidInputError, match="--level L1 of a world with one floor"):
+        load_world(str(FIXTURES / "kth_small.xml"), level="L1")
