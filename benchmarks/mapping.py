@@ -4,7 +4,7 @@
 
 Every log is mapped with one set of parameters, the defaults, and compared with raw odometry; with ``small_gicp`` (scan
 to keyframe) and ``kiss-icp`` (without deskewing), both started from odometry, where they are installed; with the mapper
-without loop closure; and, where ``gtsam`` is installed, with the mapper whose pose graph gtsam solves. Errors are against
+without loops; and, where ``gtsam`` is installed, with the mapper whose pose graph gtsam solves. Errors are against
 the log's reference poses after SE(2) alignment. Speeds are scans a second of the process's own processor time, with
 wall-clock time in brackets, reading and importing left out. Simulated worlds: ``benchmarks/loop_closure.py``.
 """
