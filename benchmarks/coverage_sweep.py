@@ -146,7 +146,7 @@ def draw(rows: list[Row], picture: Path) -> None:
         places = np.array([counts[group].mean() for group in groups])
         axis.plot(places, middle, "o-", color=COLOURS[kind], label=NAMES[kind])
         axis.fill_between(places, np.maximum(middle - spread, 0.0), middle + spread, color=COLOURS[kind], alpha=0.12)
-    axis.set(xlabel="closed doors", ylabel="error of the length of the tour [%]", ylim=(0.0, None))
+    axis.set(xlabel="closed doors", ylabel="error of the length of the tour [%]", ylim=(0.0, 120.0))
     axis.set_title(f"{len(rows)} maps of {len({row['world'] for row in rows})} worlds: mean and standard deviation")
     axis.grid(alpha=0.3)
     axis.legend()
