@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -12,12 +12,12 @@ from closedrooms.core.door import Point
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.costmap import Costmap, NavigationMap, clearance_field, pooled
+from closedrooms.mapping.costmap import Costmap, NavigationMap, clearance_field, pooled, traversable
 from closedrooms.mapping.driving import Driver
 from closedrooms.mapping.following import near_points
 from closedrooms.mapping.frontiers import Frontiers, find_frontiers, seen_from, still_unknown
 from closedrooms.mapping.navigation_config import NavigationConfig
-from closedrooms.mapping.planning import Path, Search, reachable_cells
+from closedrooms.mapping.planning import Path, Search, reachable_cells, start_cell
 
 ExplorerStatus = Literal["exploring", "complete", "stuck"]
 
@@ -79,6 +79,7 @@ class Explorer:
         self._checked_at = -math.inf
         self._replanned_at = -math.inf
         self._facing_since: float | None = None
+        self._origin: Point | None = None
 
     def command(self, pose: Pose2, scan: LaserScan, grid: Callable[[], OccupancyGrid]) -> tuple[float, float]:
         """Speed [m/s] and turn rate [rad/s] for now.
@@ -93,6 +94,7 @@ class Explorer:
         """
         now = scan.stamp
         driver = self._driver
+        self._origin = (pose.x, pose.y) if self._origin is None else self._origin
         if self.status != "exploring":
             return (0.0, 0.0)
         if driver.state in {"stuck", "recovering"}:
@@ -173,19 +175,43 @@ class Explorer:
         costmap, here = self._map.costmap, (pose.x, pose.y)
         component = reachable_cells(costmap, here, config)
         self._enclosed = component is None
-        if component is None or len(found.points) == 0:
+        if len(found.points) == 0:
             return None
+        goal = None if component is None else self._reached(found, component, here, config)
+        if goal is not None or self._is_joined(component):
+            return goal
+        for margin in (0.0, -0.5 * grid.frame.resolution):
+            tight = replace(config, clearance_margin=margin)
+            wider = reachable_cells(costmap, here, tight)
+            goal = None if wider is None else self._reached(found, wider, here, tight)
+            if goal is not None:
+                return goal
+        return None
+
+    def _is_joined(self, component: BoolArray | None) -> bool:
+        """Whether the place where the search began is among the cells that the robot can reach.
+
+        A robot that squeezed through a gap may see it closed by a cell afterwards: walls thicken a little as they are
+        seen again. It has come through, so that it goes back with less room.
+        """
+        costmap, config = self._map.costmap, self.config
+        assert self._origin is not None
+        start = start_cell(costmap, traversable(costmap, config), self._origin)
+        return start is None or (component is not None and bool(component[start]))
+
+    def _reached(self, found: Frontiers, component: BoolArray, here: Point, config: NavigationConfig) -> Goal | None:
+        """The nearest frontier that can be looked at from one of the cells of ``component``."""
         for distance in (config.approach, config.far_approach):
-            goal = self._nearest(found, costmap, component, here, distance)
+            goal = self._nearest(found, component, here, distance, config)
             if goal is not None:
                 return goal
         return None
 
     def _nearest(
-        self, found: Frontiers, costmap: Costmap, component: BoolArray, here: Point, distance: float
+        self, found: Frontiers, component: BoolArray, here: Point, distance: float, config: NavigationConfig
     ) -> Goal | None:
         """The frontier whose way costs least, small patches of unknown only where they are worth the way."""
-        config = self.config
+        costmap = self._map.costmap
         is_large = found.unknown_area[found.labels] >= config.large_area
         large = _goal_cells(found.within(distance, is_large), costmap) & component
         small = _goal_cells(found.within(distance, ~is_large), costmap) & component
