@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
-from closedrooms.predictor.best.frame import DoorFrame, count
+from closedrooms.predictor.best.frame import DoorFrame, count, integral
 
 # Slack of a wall's thickness when known space is looked for behind it [cells].
 SLACK = 4
@@ -24,6 +24,16 @@ REACH, SURE = 400, 60.0
 # A rectangle may reach over known space up to this share: the room is what remains. Of 0.1, 0.15, 0.2 and 0.3 this one
 # lost nothing on a third of the authors' maps and gained most on the bundled worlds: larger ones reach round corners.
 MAX_OVERLAP = 0.15
+
+# Free space this many times longer than wide is a corridor: rooms are rarely longer than 3 to 1.
+CORRIDOR_RATIO = 3.5
+# Half the width of the room of a door behind which no other fits [cells], 1 m, and how many more it tries.
+NOOK, FEW = 20, 8
+# The strip behind the door's wall where known space must not cut into a room [cells], 0.2 to 1.2 m.
+FRONT = (4, 24)
+# Back walls beside a room are looked for this far to either side [cells], 5 m, from 1.5 m behind the door's wall to
+# 0.4 m before the room's own back.
+BESIDE, PASSED = 100, (30, 8)
 
 FEATURES = (
     "log area",
@@ -52,6 +62,12 @@ FEATURES = (
     "outside",
     "outside area",
     "lone outside",
+    "open",
+    "open area",
+    "front taken",
+    "front closed",
+    "beyond front",
+    "sticks out",
     "passage end",
     "width seen",
     "depth seen",
@@ -74,7 +90,8 @@ class Evidence:
     """What a frame says about every possible position of a side, as tables over the raster.
 
     Each is a running sum along the side, so that any stretch of it costs two look-ups: sums over v, shape
-    (rows + 1, cols + 1), for left and right; over u, shape (rows + 1, cols + 1), for the back.
+    (rows + 1, cols + 1), for left and right; over u, shape (rows + 1, cols + 1), for the back. ``outline`` sums the
+    outer back walls over both axes; ``enclosed_sum`` counts cells between known cells of their row or their column.
     """
 
     closed: dict[str, IntArray]
@@ -84,6 +101,8 @@ class Evidence:
     same: dict[str, IntArray]
     outer: dict[str, IntArray]
     seen: dict[str, FloatArray]
+    outline: IntArray
+    enclosed_sum: IntArray
 
 
 def gather(frame: DoorFrame, thickness: int) -> Evidence:
@@ -107,24 +126,56 @@ def gather(frame: DoorFrame, thickness: int) -> Evidence:
         closed[side], sliver[side] = _running(near, side), _running(wide, side)
         tight[side] = _running(_blurred(shifted, 3), side)
         same[side] = _running(_blurred(own, 2), side)
-    seen = {"width": _spans(frame.sharp, "left", "right"), "depth": _spans(frame.sharp, "bottom", "top")}
-    return Evidence(closed, sliver, gap, tight, same, outer, seen)
+    seen = {"width": _spans(frame, "left", "right"), "depth": _spans(frame, "bottom", "top")}
+    outline = np.cumsum(outer["top"], axis=1, dtype=np.int64)
+    return Evidence(closed, sliver, gap, tight, same, outer, seen, outline, integral(_enclosed(frame.known)))
 
 
-def _spans(faces: dict[str, BoolArray], start: str, end: str, *, longest: int = 500) -> FloatArray:
+def _enclosed(known: BoolArray) -> BoolArray:
+    """Cells between the first and the last known cell of their row or of their column."""
+    return _spanned(known) | _spanned(known.T).T
+
+
+def _spanned(known: BoolArray) -> BoolArray:
+    """Cells between the first and the last known cell of their row."""
+    length = known.shape[1]
+    first, last = known.argmax(axis=1), length - known[:, ::-1].argmax(axis=1)
+    last[~known.any(axis=1)] = 0
+    at = np.arange(length)
+    return np.asarray((at >= first[:, None]) & (at < last[:, None]))
+
+
+def _spans(frame: DoorFrame, start: str, end: str, *, longest: int = 500) -> FloatArray:
     """How usual each length of free space between two facing walls is, by cells, 0 to 1.
 
-    Lengths are counted once for each row of cells, so that a long room counts more than a narrow one.
+    Lengths are counted once for each row of cells, so that a long room counts more than a narrow one. Across a
+    corridor, free space goes on much longer than it is wide: it says nothing about rooms.
     """
-    first, second = (faces[name] if start == "left" else faces[name].T for name in (start, end))
+    upright = start == "left"
+    first, second = (frame.sharp[name] if upright else frame.sharp[name].T for name in (start, end))
+    free = frame.free if upright else frame.free.T
     cols = first.shape[1]
     starts, ends = (np.flatnonzero(np.ascontiguousarray(edges)) for edges in (first, second))
     before = np.searchsorted(starts, ends, side="right") - 1
-    ends, before = ends[before >= 0], before[before >= 0]
-    lengths = (ends - starts[before])[ends // cols == starts[before] // cols]
-    counts = np.bincount(lengths[(lengths >= 20) & (lengths < longest)], minlength=longest).astype(np.float64)
+    ends, starts = ends[before >= 0], starts[before[before >= 0]]
+    row = ends // cols
+    whole = (row == starts // cols) & (ends - starts >= 20) & (ends - starts < longest)
+    row, ends, starts = row[whole], ends[whole], starts[whole]
+    middle = np.minimum((starts % cols + ends % cols) // 2, free.shape[1] - 1)
+    lengths = ends - starts
+    rooms = _run_along(free, row, middle) <= CORRIDOR_RATIO * lengths
+    counts = np.bincount(lengths[rooms], minlength=longest).astype(np.float64)
     smooth = np.convolve(counts, np.array([1, 2, 3, 4, 5, 4, 3, 2, 1]) / 5.0, mode="same")
     return np.asarray(smooth / (smooth + 0.5 * smooth.max(initial=0.0) + 1.0))
+
+
+def _run_along(free: BoolArray, row: IntArray, col: IntArray) -> IntArray:
+    """Length of the run of free cells up and down the column through each of the cells."""
+    rows = free.shape[0]
+    at = np.arange(rows, dtype=np.int32)[:, None]
+    last = np.maximum.accumulate(np.where(free, -1, at), axis=0)
+    next_ = np.minimum.accumulate(np.where(free, rows, at)[::-1], axis=0)[::-1]
+    return np.asarray(next_[row, col] - last[row, col] - 1)
 
 
 def _canonical(mask: BoolArray, side: str) -> BoolArray:
@@ -182,6 +233,8 @@ class Entry:
         left: Doors of the same wall to the left and right: position along the wall [cells], ``None`` where none is.
         right: See ``left``.
         others: Points that belong to rooms of other doors, ``(u, v)`` [cells], shape (k, 2).
+        row: Doors of the same wall, this one included.
+        front: First and last edge of the free space before the door, along the wall [cells].
     """
 
     u: float
@@ -189,6 +242,8 @@ class Entry:
     left: float | None
     right: float | None
     others: FloatArray
+    row: int
+    front: tuple[int, int]
 
 
 def propose(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int, limits: Sequence[float]) -> Candidates:
@@ -203,25 +258,39 @@ def propose(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int, 
     """
     narrow, wide, shallow, deep = limits
     v0 = entry.v0
-    right = _positions(evidence, entry, thickness, "right", wide)
-    left = _positions(evidence, entry, thickness, "left", wide)
+    cut = frame.taken[v0 + FRONT[0] : v0 + FRONT[1]]
+    cut_at = np.flatnonzero(cut.mean(axis=0) > 0.5) if cut.size else np.zeros(0, dtype=np.int64)
+    right = _positions(evidence, entry, thickness, "right", wide, also=cut_at[cut_at > entry.u + 4][:1])
+    left = _positions(evidence, entry, thickness, "left", wide, also=cut_at[cut_at < entry.u - 4][-1:] + 1)
     back = _positions(evidence, entry, thickness, "top", deep)
     u0, u1, v1 = (grid.ravel() for grid in np.meshgrid(left, right, back, indexing="ij"))
     fits = (u1 - u0 >= narrow) & (u1 - u0 <= wide) & (v1 - v0 >= shallow) & (v1 - v0 <= deep)
     boxes = np.stack((u0, np.full_like(u0, v0), u1, v1), axis=-1)[fits]
     taken = count(frame.taken_sum, boxes[:, 1], boxes[:, 0], boxes[:, 3], boxes[:, 2])
     size = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1])
-    boxes = boxes[taken <= MAX_OVERLAP * size]
+    clear = taken <= MAX_OVERLAP * size
     for pu, pv in entry.others:
-        inside = (boxes[:, 0] < pu) & (pu < boxes[:, 2]) & (boxes[:, 1] < pv) & (pv < boxes[:, 3])
-        boxes = boxes[~inside]
+        clear &= ~((boxes[:, 0] < pu) & (pu < boxes[:, 2]) & (boxes[:, 1] < pv) & (pv < boxes[:, 3]))
+    if clear.any():
+        boxes = boxes[clear]
+    else:
+        # A nook: every door that opens to unknown space has some room, here what known space leaves of a small one.
+        least = np.array([[round(entry.u) - NOOK, v0, round(entry.u) + NOOK, v0 + 2 * NOOK]])
+        boxes = np.concatenate((least, boxes[np.argsort(taken / np.maximum(size, 1), kind="stable")[:FEW]]))
     return Candidates(boxes, describe(frame, evidence, entry, thickness, boxes))
 
 
 def _positions(
-    evidence: Evidence, entry: Entry, thickness: int, side: str, reach: float, *, keep: int = 12
+    evidence: Evidence,
+    entry: Entry,
+    thickness: int,
+    side: str,
+    reach: float,
+    *,
+    keep: int = 12,
+    also: Sequence[float] | IntArray = (),
 ) -> IntArray:
-    """Plausible positions of one side, at most about ``keep`` + a few, ascending."""
+    """Plausible positions of one side, at most about ``keep`` + a few and those of ``also`` in reach, ascending."""
     v0, u = entry.v0, entry.u
     if side == "top":
         low, high = v0 + 20, int(v0 + reach)
@@ -239,7 +308,7 @@ def _positions(
     strength = total(evidence.same[side], along) + total(evidence.tight[side], along)
     strength += 2.0 * (total(evidence.same[side], near) + total(evidence.tight[side], near))
     found = _peaks(positions, strength, keep)
-    extra: list[float] = []
+    extra: list[float] = [float(at) for at in also]
     # Where known space begins, less a wall.
     share = total(evidence.closed[side], near) / max(near[1] - near[0], 1)
     order = positions if side != "left" else positions[::-1]
@@ -312,11 +381,41 @@ def describe(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int,
     columns["depth seen"] = evidence.seen["depth"][np.clip(v1 - v0, 0, last)]
     columns["log depth squared"] = np.log(depth * cell / 6.0) ** 2
     columns["outside"] = _outside(frame, boxes)
-    # A row of doors announces a row of rooms; a lone door in the outline leads to a porch, stairs or a closet.
+    # A row of doors announces a row of rooms, which may well lie outside all that is known; a lone door in the
+    # outline leads to a porch, stairs or a closet.
     lone = entry.left is None and entry.right is None
     columns["lone outside"] = columns["outside"] * np.log(area / 4.0) * lone
-    columns["outside area"] = columns["outside"] * np.maximum(np.log(area / 4.0), 0.0)
+    columns["outside area"] = columns["outside"] * np.maximum(np.log(area / 4.0), 0.0) / entry.row
+    # Space with nothing known beyond it along either axis: the building may end anywhere in it. A row of doors
+    # announces a row of rooms there.
+    columns["open"] = 1.0 - count(evidence.enclosed_sum, v0, u0, v1, u1) / (width * depth)
+    columns["open area"] = columns["open"] * np.maximum(np.log(area / 4.0), 0.0) / entry.row
+    # The wall of the door: known space that cuts into it from behind, known space before it, and how far the room
+    # reaches past the ends of the corridor that the door opens to.
+    strip = count(frame.taken_sum, v0 + FRONT[0], u0, v0 + FRONT[1], u1)
+    columns["front taken"] = strip / (width * (FRONT[1] - FRONT[0]))
+    before = frame.known[max(entry.v0 - thickness - SLACK, 0) : max(entry.v0, 0)].any(axis=0)
+    running = np.concatenate(([0], np.cumsum(before)))
+    last = len(running) - 1
+    columns["front closed"] = (running[np.clip(u1, 0, last)] - running[np.clip(u0, 0, last)]) / width
+    columns["beyond front"] = (np.maximum(entry.front[0] - u0, 0) + np.maximum(u1 - entry.front[1], 0)) / width
+    columns["sticks out"] = _sticks_out(evidence, boxes)
     return np.stack([columns[name] for name in FEATURES], axis=-1)
+
+
+def _sticks_out(evidence: Evidence, boxes: IntArray) -> FloatArray:
+    """How sure the back walls of the building beside each rectangle end before its own, 0 to 1."""
+    u0, v0, u1, v1 = boxes.T
+    table = evidence.outline
+    rows, cols = table.shape[0] - 1, table.shape[1] - 1
+    first, last = np.clip(v0 + PASSED[0], 0, cols), np.clip(v1 - PASSED[1], 0, cols)
+    last = np.maximum(first, last)
+    total = np.zeros(len(boxes))
+    for low, high in ((u0 - BESIDE, u0), (u1, u1 + BESIDE)):
+        a, b = np.clip(low, 0, rows), np.clip(high, 0, rows)
+        total += table[b, last] - table[a, last] - table[b, first] + table[a, first]
+    # An outer wall counts at five positions (blurred by 2 cells to either side).
+    return np.asarray(1.0 - np.exp(-total / 5.0 / (SURE / 2)))
 
 
 def _outside(frame: DoorFrame, boxes: IntArray) -> FloatArray:

@@ -17,6 +17,9 @@ SAME_WALL = 30
 FACE_ALONG, FACE_BEFORE = 50, 12
 # Where the room of another door begins [cells]: 0.8 m behind it, beyond any wall.
 BEHIND = 16
+# Free space before a door is looked for between these distances from its wall [cells], 0.25 to 0.9 m, and goes on
+# over gaps up to GAP_ALONG.
+CORRIDOR, GAP_ALONG = (5, 18), 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,13 +111,29 @@ def enter(frame: DoorFrame, facing: Facing, facings: Sequence[Facing], thickness
     v0 = round(v + max(min(face + thickness, thickness / 2), 0.5))
     left = right = None
     others = []
+    row = 1
     for other in facings:
         if other is facing:
             continue
         ou, ov = (float(x) for x in frame.to_frame(np.array(other.door.midpoint)))
         if other.angle == facing.angle and other.quarter == facing.quarter and abs(ov - v) < SAME_WALL:
+            row += 1
             left = ou if ou < u and (left is None or ou > left) else left
             right = ou if ou > u and (right is None or ou < right) else right
         behind = np.array(other.door.midpoint) + BEHIND * frame.resolution * other.inward
         others.append(frame.to_frame(behind))
-    return Entry(u, v0, left, right, np.array(others).reshape(-1, 2)), v
+    return Entry(u, v0, left, right, np.array(others).reshape(-1, 2), row, _front(frame.free, u, v)), v
+
+
+def _front(free: BoolArray, u: float, v: float) -> tuple[int, int]:
+    """Ends of the free space before a door, along its wall; gaps up to half a metre do not end it [cells]."""
+    low, high = max(int(v) - CORRIDOR[1], 0), max(int(v) - CORRIDOR[0], 0)
+    seen = np.flatnonzero(free[low:high].any(axis=0)) if high > low else np.zeros(0, dtype=np.int64)
+    if not seen.size:
+        return int(u), int(u) + 1
+    start = int(np.abs(seen - u).argmin())
+    cuts = np.flatnonzero(np.diff(seen) > GAP_ALONG)
+    first = int(cuts[cuts < start].max(initial=-1)) + 1
+    after = cuts[cuts >= start]
+    last = int(after.min()) if after.size else len(seen) - 1
+    return int(seen[first]), int(seen[last]) + 1

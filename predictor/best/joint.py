@@ -16,6 +16,10 @@ SHORTLIST = 60
 ROUNDS = 20
 # Doors further apart than this share depth and width by a factor 1/e less [cells], 10 m.
 DEPTH_REACH = 200.0
+# Scores apart by this are e times as likely as each other: the weights were found as those of a log-linear model.
+TEMPERATURE = 1.0
+# A safer rectangle may overlap its neighbours by this share more.
+CROWDING = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +45,9 @@ class Suspect:
     v: float
 
 
-def choose(suspects: list[Suspect], thickness: int, same_wall: float) -> tuple[list[int], list[float], bool]:
+def choose(
+    suspects: list[Suspect], thickness: int, same_wall: float, *, safe: bool = False
+) -> tuple[list[int], list[float], bool]:
     """The rectangle of each door that is best together with the others'.
 
     Coordinate ascent over doors and over pairs of doors from two starts; the better end wins. Each step raises the
@@ -51,6 +57,8 @@ def choose(suspects: list[Suspect], thickness: int, same_wall: float) -> tuple[l
         suspects: One a door.
         thickness: Usual thickness of walls [cells].
         same_wall: Doors closer than this across the wall are in one [cells].
+        safe: Each door then takes the rectangle that agrees best with all of its rectangles, weighed by their scores
+            beside the others' rooms: where the evidence is even, a middling room loses less than either extreme.
 
     Returns:
         Index of the rectangle by door, its score by itself and with the others, whether the search was cut.
@@ -60,6 +68,8 @@ def choose(suspects: list[Suspect], thickness: int, same_wall: float) -> tuple[l
     surest, second_cut = search.ascend(search.surest_first())
     better = search.total(surest) > search.total(alone) + 1e-9
     done = surest if better else alone
+    if safe:
+        done = [search.safest(i, done) for i in range(len(suspects))]
     scores = [float(search.seen_by(i, done)[at]) for i, at in enumerate(done)]
     return done, scores, second_cut if better else first_cut
 
@@ -71,8 +81,12 @@ class _Search:
         self.suspects = suspects
         self.pairs: dict[tuple[int, int], FloatArray] = {}
         self.links: list[list[tuple[int, FloatArray]]] = [[] for _ in suspects]
+        self.overlaps: list[list[tuple[int, FloatArray]]] = [[] for _ in suspects]
         for i, j in itertools.combinations(range(len(suspects)), 2):
-            table = _pair(suspects[i], suspects[j], thickness, same_wall)
+            table, overlap = pair_scores(suspects[i], suspects[j], thickness, same_wall)
+            if overlap.max(initial=0.0) > 0.0:
+                self.overlaps[i].append((j, overlap))
+                self.overlaps[j].append((i, overlap.T))
             if np.abs(table).max(initial=0.0) > 1e-6:
                 self.pairs[i, j] = table
                 self.links[i].append((j, table))
@@ -85,6 +99,18 @@ class _Search:
             if j != skip and chosen[j] >= 0:
                 score += table[:, chosen[j]]
         return score
+
+    def safest(self, i: int, chosen: list[int]) -> int:
+        """The rectangle of a door with the largest expected overlap (IoU), given what the others have chosen."""
+        score = self.seen_by(i, chosen) / TEMPERATURE
+        weight = np.exp(score - score.max())
+        expected = np.round(_overlaps(self.suspects[i].boxes) @ (weight / weight.sum()), 9)
+        # Not further into a neighbour than the best by score.
+        crowd = np.zeros(len(expected))
+        for j, table in self.overlaps[i]:
+            crowd += table[:, chosen[j]]
+        expected[crowd > crowd[chosen[i]] + CROWDING] = -1.0
+        return int(expected.argmax())
 
     def total(self, chosen: list[int]) -> float:
         """Score of all rooms together."""
@@ -122,11 +148,27 @@ class _Search:
         return changed
 
 
-def _pair(a: Suspect, b: Suspect, thickness: int, same_wall: float) -> FloatArray:
-    """What every pair of rectangles of two doors counts, shape (n, m)."""
+def _overlaps(boxes: IntArray) -> FloatArray:
+    """Intersection over union of every two rectangles, shape (n, n)."""
+    sizes = (boxes[:, 2:] - boxes[:, :2]).prod(axis=-1)
+    low, high = np.maximum(boxes[:, None, :2], boxes[None, :, :2]), np.minimum(boxes[:, None, 2:], boxes[None, :, 2:])
+    shared = np.maximum(high - low, 0).prod(axis=-1)
+    return np.asarray(shared / (sizes[:, None] + sizes[None, :] - shared))
+
+
+def pair_scores(a: Suspect, b: Suspect, thickness: int, same_wall: float) -> tuple[FloatArray, FloatArray]:
+    """What every pair of rectangles of two doors counts, and how much they overlap, both of shape (n, m).
+
+    Args:
+        a: One door.
+        b: Another door.
+        thickness: Usual thickness of walls [cells].
+        same_wall: Doors closer than this across the wall are in one [cells].
+    """
     weights = weights_of(PAIR_WEIGHTS, PAIR_FEATURES)
     if a.angle != b.angle:
-        return float(weights[0]) * _slanted_overlap(a.corners, b.corners)
+        overlap = _slanted_overlap(a.corners, b.corners)
+        return float(weights[0]) * overlap, overlap
     back = None
     if a.quarter == b.quarter and abs(a.v - b.v) < same_wall:
         column = (3, 0, 1, 2)[a.quarter]
@@ -135,7 +177,7 @@ def _pair(a: Suspect, b: Suspect, thickness: int, same_wall: float) -> FloatArra
     if back is not None:
         for column in (PAIR_FEATURES.index("same depth"), PAIR_FEATURES.index("same width")):
             features[..., column] *= np.exp(-abs(a.u - b.u) / DEPTH_REACH)
-    return np.asarray(features @ weights)
+    return np.asarray(features @ weights), np.asarray(features[..., PAIR_FEATURES.index("overlap")])
 
 
 def _slanted_overlap(a: FloatArray, b: FloatArray) -> FloatArray:

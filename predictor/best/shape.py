@@ -18,7 +18,9 @@ SIMPLIFY = 2.0
 NARROW = 7
 
 
-def room_shape(turned: TurnedMap, corners: FloatArray, thickness: int, facing: Facing) -> Polygon | None:
+def room_shape(
+    turned: TurnedMap, corners: FloatArray, thickness: int, facing: Facing, *, narrow: int = NARROW
+) -> Polygon | None:
     """The free interior of a room, or ``None`` where nothing is left.
 
     Args:
@@ -26,6 +28,7 @@ def room_shape(turned: TurnedMap, corners: FloatArray, thickness: int, facing: F
         corners: Of the rectangle in the map frame [m], shape (4, 2).
         thickness: Usual thickness of walls [cells].
         facing: Its door: of several pieces the one at the door stays.
+        narrow: Strips narrower than this are no room [cells].
     """
     c, s = math.cos(turned.angle), math.sin(turned.angle)
     to_turned = np.array([[c, -s], [s, c]])
@@ -43,8 +46,8 @@ def room_shape(turned: TurnedMap, corners: FloatArray, thickness: int, facing: F
     if open_.mean() > 1.0 - CLEAN:
         return Polygon(corners)
     smooth = cv2.morphologyEx(
-        np.pad(open_.astype(np.uint8), NARROW), cv2.MORPH_OPEN, np.ones((NARROW, NARROW), np.uint8)
-    )[NARROW:-NARROW, NARROW:-NARROW]
+        np.pad(open_.astype(np.uint8), narrow), cv2.MORPH_OPEN, np.ones((narrow, narrow), np.uint8)
+    )[narrow:-narrow, narrow:-narrow]
     number, labels = cv2.connectedComponents(smooth, connectivity=4)
     if number < 2:
         return None

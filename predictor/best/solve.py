@@ -6,22 +6,23 @@ sides is scored by its evidence; the rectangles of all doors are then chosen tog
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
-from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room, RoomKind
-from closedrooms.predictor.best.candidates import FEATURES, gather, propose
 from closedrooms.predictor.best.directions import WallDirections, find_wall_directions
-from closedrooms.predictor.best.entry import SAME_WALL, Facing, enter, face_door
-from closedrooms.predictor.best.frame import DoorFrame, TurnedMap, door_frame, turn_map
-from closedrooms.predictor.best.joint import SHORTLIST, Suspect, choose
+from closedrooms.predictor.best.entry import SAME_WALL, Facing, face_door
+from closedrooms.predictor.best.frame import TurnedMap, turn_map
+from closedrooms.predictor.best.joint import Suspect, choose
 from closedrooms.predictor.best.shape import room_shape
+from closedrooms.predictor.best.shared import merge
+from closedrooms.predictor.best.suspects import Suspects, suspect
 from closedrooms.predictor.best.thickness import wall_thickness
-from closedrooms.predictor.best.weights import SIDE_WEIGHTS, weights_of
 from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.inpaint import inpaint, passage
 from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
@@ -32,8 +33,6 @@ from closedrooms.predictor.window import at_resolution, known_window
 RESOLUTION = 0.05
 # Unknown cells around a turned map [m]: what lies further out reads as its edge.
 MARGIN = 1.0
-# Narrowest and widest, shallowest and deepest room [cells]: 0.8 m to 24 m.
-LIMITS = (16, 480, 16, 480)
 
 
 def predict_best(
@@ -61,42 +60,39 @@ def predict_best(
     turned, facings, failures = _face_all(working, doors, directions, config)
     # 2. Rectangles and their evidence, door by door.
     thickness = wall_thickness(turned[float(directions.angles[0])])
-    suspects = _suspect_all(turned, facings, thickness)
-    for facing in facings:
-        if facing.door.id not in suspects:
-            failures[facing.door.id] = "no room fits behind it"
-    facings = [facing for facing in facings if facing.door.id in suspects]
-    # 3. The joint choice.
-    kept = [suspects[facing.door.id] for facing in facings]
-    order = sorted(range(len(kept)), key=lambda i: facings[i].door.midpoint)
-    chosen, scores, cut = choose([kept[i] for i in order], thickness, SAME_WALL)
-    choice = {order[k]: (index, score) for k, (index, score) in enumerate(zip(chosen, scores, strict=True))}
+    suspects = suspect(turned, facings, thickness)
+    # 3. The joint choice, and two doors to one room where that scores better.
+    groups, cut = _choose_all(facings, suspects, thickness)
     # 4. Rooms are what known space and its walls leave of the rectangles.
     rooms, passages = [], []
-    for i, facing in enumerate(facings):
-        index, score = choice[i]
-        corners = kept[i].corners[index]
-        shape = room_shape(turned[facing.angle], corners, thickness, facing)
+    for group in groups:
+        facing = facings[group.doors[0]]
+        shape = room_shape(turned[facing.angle], group.corners, thickness, facing)
         if shape is None:
-            failures[facing.door.id] = "no room fits behind it"
+            # A nook narrower than the usual walls around it.
+            shape = room_shape(turned[facing.angle], group.corners, 1, facing, narrow=3)
+        names = tuple(facings[i].door.id for i in group.doors)
+        if shape is None:
+            failures |= dict.fromkeys(names, "no room fits behind it")
             continue
-        others = [kept[j].corners[choice[j][0]] for j in range(len(kept)) if j != i]
-        kind = _kind(corners, others, working, thickness)
-        rooms.append(Room(shape, (facing.door.id,), kind, round(score, 9), cut))
-        cleared = passage(
-            working,
-            shape,
-            np.array(facing.door.midpoint),
-            facing.along,
-            facing.inward,
-            width=config.door_width,
-            reach=config.door_reach,
-        )
-        if not cleared.is_empty:
-            passages.append(cleared)
+        kind = _kind(group.corners, [other.corners for other in groups if other is not group], working, thickness)
+        rooms.append(Room(shape, names, kind, round(group.score, 9), cut))
+        for i in group.doors:
+            facing = facings[i]
+            cleared = passage(
+                working,
+                shape,
+                np.array(facing.door.midpoint),
+                facing.along,
+                facing.inward,
+                width=config.door_width,
+                reach=config.door_reach,
+            )
+            if not cleared.is_empty:
+                passages.append(cleared)
     completed = inpaint(grid, [room.polygon for room in rooms], passages)
     wanted = config.keep_trace if trace is None else trace
-    record = _trace(facings, kept, rooms) if wanted else None
+    record = _trace(facings, suspects.alone, rooms) if wanted else None
     ordered = {door.id: failures[door.id] for door in doors if door.id in failures}
     return Prediction(completed, tuple(rooms), ordered, record)
 
@@ -122,51 +118,33 @@ def _face_all(
     return turned, facings, failures
 
 
-def _suspect_all(turned: dict[float, TurnedMap], facings: list[Facing], thickness: int) -> dict[str, Suspect]:
-    """Rectangles of every door, frame by frame: one frame's tables are in memory at a time."""
-    weights = weights_of(SIDE_WEIGHTS, FEATURES)
-    suspects = {}
-    for angle, quarter in sorted({(facing.angle, facing.quarter) for facing in facings}):
-        frame = door_frame(turned[angle], quarter, thickness)
-        evidence = gather(frame, thickness)
-        for facing in facings:
-            if (facing.angle, facing.quarter) != (angle, quarter):
-                continue
-            entry, across = enter(frame, facing, facings, thickness)
-            candidates = propose(frame, evidence, entry, thickness, LIMITS)
-            if len(candidates.boxes) == 0:
-                continue
-            scores = np.round(candidates.features @ weights, 9)
-            order = np.lexsort((*candidates.boxes.T, -scores))[:SHORTLIST]
-            boxes = candidates.boxes[order]
-            suspects[facing.door.id] = Suspect(
-                _in_turned(boxes, turned[angle], quarter),
-                _corners(frame, boxes),
-                scores[order],
-                angle,
-                quarter,
-                entry.u,
-                across,
-            )
-    return suspects
+@dataclass(frozen=True, slots=True, eq=False)
+class _Group:
+    """A room to be: the indices of its doors, the corners of its rectangle in the map frame [m], its score."""
+
+    doors: tuple[int, ...]
+    corners: FloatArray
+    score: float
 
 
-def _in_turned(boxes: IntArray, turned: TurnedMap, quarter: int) -> IntArray:
-    """Rectangles of a door's frame in the turned map, ``x0, y0, x1, y1`` [cells]."""
-    rows, cols = turned.free.shape
-    u0, v0, u1, v1 = boxes.T
-    columns = (
-        (u0, v0, u1, v1),
-        (cols - v1, u0, cols - v0, u1),
-        (cols - u1, rows - v1, cols - u0, rows - v0),
-        (v0, rows - u1, v1, rows - u0),
-    )[quarter]
-    return np.stack(columns, axis=-1)
-
-
-def _corners(frame: DoorFrame, boxes: IntArray) -> FloatArray:
-    """Corners in the map frame [m], shape (n, 4, 2)."""
-    return frame.to_map(boxes[:, [[0, 1], [2, 1], [2, 3], [0, 3]]].astype(np.float64))
+def _choose_all(facings: list[Facing], suspects: Suspects, thickness: int) -> tuple[list[_Group], bool]:
+    """One rectangle a door or for two doors, in the order of the doors, and whether the search was cut."""
+    alone = suspects.alone
+    # By place, so that the order of the doors changes nothing.
+    order = sorted(range(len(alone)), key=lambda i: facings[i].door.midpoint)
+    places, values, cut = choose([alone[i] for i in order], thickness, SAME_WALL, safe=True)
+    chosen = {i: (place, value) for i, place, value in zip(order, places, values, strict=True)}
+    mergers = merge(suspects.shared, alone, [chosen[i][0] for i in range(len(alone))], thickness, SAME_WALL)
+    groups = []
+    for i in range(len(alone)):
+        merger = next((m for m in mergers if i in (m.first, m.second)), None)
+        if merger is None:
+            groups.append(_Group((i,), alone[i].corners[chosen[i][0]], chosen[i][1]))
+        elif i == min(merger.first, merger.second):
+            both = suspects.shared[merger.first, merger.second]
+            doors = (merger.first, merger.second)
+            groups.append(_Group(tuple(sorted(doors)), both.corners[merger.index], merger.score))
+    return groups, cut
 
 
 def _kind(corners: FloatArray, others: list[FloatArray], grid: OccupancyGrid, thickness: int) -> RoomKind:
@@ -185,8 +163,8 @@ def _trace(facings: list[Facing], suspects: list[Suspect], rooms: list[Room]) ->
     """Two levels: each door's best rectangle by itself, and the rooms chosen together."""
     alone = {f.door.id: shapely.Polygon(s.corners[0]) for f, s in zip(facings, suspects, strict=True)}
     first = {f.door.id: float(s.scores[0]) for f, s in zip(facings, suspects, strict=True)}
-    together = {room.doors[0]: room.polygon for room in rooms}
-    last = {room.doors[0]: room.score or 0.0 for room in rooms}
+    together = {door: room.polygon for room in rooms for door in room.doors}
+    last = {door: room.score or 0.0 for room in rooms for door in room.doors}
     none = np.zeros(0, dtype=np.bool_)
     return PredictionTrace(
         segments=np.zeros((0, 4)),

@@ -12,6 +12,7 @@ from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyG
 from closedrooms.core.pose import Pose2
 from closedrooms.predictor.best.solve import predict_best
 from closedrooms.predictor.config import preset
+from closedrooms.predictor.prediction import Prediction
 
 CONFIG = preset("best")
 WALL = 0.2
@@ -83,6 +84,50 @@ def test_parts_three_closed_rooms_in_a_row_at_the_middle_between_their_doors() -
     assert [room.doors[0] for room in prediction.rooms] == [door.id for door in doors]
     for room in prediction.rooms:
         assert _iou(room.polygon, _truth(room.doors[0])) > 0.8, room.doors
+
+
+@pytest.mark.parametrize("apart", [1.2, 1.8, 3.0])
+def test_two_doors_into_a_gap_too_narrow_for_two_rooms_share_a_room(apart: float) -> None:
+    grid, doors = _building({"d2a"})
+    x, y = doors[0].midpoint
+    two = [ClosedDoor("left", (x - apart / 2, y)), ClosedDoor("right", (x + apart / 2, y))]
+    for order in (two, two[::-1]):
+        prediction = predict_best(grid, order, CONFIG)
+        assert not prediction.failures
+        (room,) = prediction.rooms
+        assert set(room.doors) == {"left", "right"}
+        assert _iou(room.polygon, _truth("d2a")) > 0.85
+        for door in two:
+            assert prediction.grid.free[tuple(grid.frame.to_cells(np.array(door.midpoint)) - _shift(prediction, grid))]
+
+
+def _shift(prediction: Prediction, grid: OccupancyGrid) -> np.ndarray:
+    """Cells between the lower left corners of the completed map and of the map."""
+    a, b = prediction.grid.frame, grid.frame
+    return np.round(np.array([a.origin_y - b.origin_y, a.origin_x - b.origin_x]) / b.resolution).astype(int)
+
+
+def test_two_doors_into_a_gap_as_wide_as_two_rooms_have_a_room_each() -> None:
+    grid, doors = _building({"d1a", "d2a"})
+    rooms = predict_best(grid, doors, CONFIG).rooms
+    assert [room.doors for room in rooms] == [(door.id,) for door in doors]
+
+
+def test_a_door_to_a_nook_too_small_for_a_room_gets_what_is_left() -> None:
+    grid, doors = _building({"d2a"})
+    cells = grid.cells.copy()
+    truth = _truth("d2a")
+    x0, y0, x1, y1 = truth.bounds
+    rows, cols = np.meshgrid(np.arange(grid.frame.rows), np.arange(grid.frame.cols), indexing="ij")
+    points = grid.frame.to_points(np.stack((rows, cols), axis=-1))
+    filled = box(x0, y0 + 1.0, x1, y1)
+    inside = shapely.contains_xy(filled, points[..., 0], points[..., 1])
+    near = shapely.contains_xy(filled.buffer(0.075), points[..., 0], points[..., 1])
+    cells[near] = OCCUPIED
+    cells[inside] = FREE
+    prediction = predict_best(OccupancyGrid(grid.frame, cells), doors, CONFIG)
+    assert not prediction.failures
+    assert _iou(prediction.rooms[0].polygon, truth.difference(filled.buffer(0.1))) > 0.4
 
 
 def test_predicted_rooms_hardly_overlap_and_stay_off_known_space() -> None:
