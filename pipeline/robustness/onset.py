@@ -151,19 +151,29 @@ Keyed = dict[tuple[str, int], Row]
 
 
 def _shares(own: Keyed, first: Keyed, resamples: int, label: str) -> dict[str, Difference]:
-    """What each stage loses: the IoU that comes back with its repair, and for the last what is still missing then."""
+    """What each stage loses more than at the first level: what its repair brings back, and what stays lost in the end.
+
+    A repair may change a little at the first level too; less that, the losses add up to the loss of the IoU.
+    """
     shares: dict[str, Difference] = {}
-    steps = [*itertools.pairwise(CHAIN), (CHAIN[-1], None)]
+    steps: list[tuple[str, str | None]] = [*itertools.pairwise(CHAIN), (CHAIN[-1], None)]
     for stage, (before, after) in zip(STAGES, steps, strict=True):
-        values = {}
+        values: dict[tuple[str, int], float] = {}
         for key in own.keys() & first.keys():
-            repaired = first[key]["iou"] if after is None else own[key][after]
-            if repaired is not None and own[key][before] is not None:
-                values[key] = repaired - own[key][before]
+            lost, usual = _lost(own[key], before, after), _lost(first[key], before, after)
+            if lost is not None and usual is not None:
+                values[key] = lost - usual
         interval = _interval(values, resamples, f"{label} {stage}")
         if interval is not None:
             shares[stage] = interval
     return shares
+
+
+def _lost(row: Row, before: str, after: str | None) -> float | None:
+    """What a repair brings back; of the last stage, what is missing after all repairs, up to a constant."""
+    if row[before] is None or (after is not None and row[after] is None):
+        return None
+    return float((row[after] if after is not None else 0.0) - row[before])
 
 
 def _difference(own: Keyed, first: Keyed, name: str, resamples: int, label: str) -> Difference | None:
