@@ -50,7 +50,7 @@ def clean_free_space(grid: OccupancyGrid, config: GraphConfig) -> FreeSpace:
     free = _without_hollows(free, occupied, grid.on(frame).occupied & free)
     free = _without_gaps(free, occupied, config.gap_width / resolution)
     passable = _without_specks(free, config.speck_area / resolution**2)
-    mask = _opened(passable, config.opening_radius / resolution)
+    mask = _without_corner_contacts(_opened(passable, config.opening_radius / resolution))
     parts, areas = _parts(mask, resolution, least=config.doorway**2)
     mask = parts > 0
     if not mask.any():
@@ -130,6 +130,21 @@ def _opened(free: BoolArray, radius: float) -> BoolArray:
     disc = (rows**2 + cols**2 <= radius**2).astype(np.uint8)
     opened: BoolArray = cv2.morphologyEx(free.astype(np.uint8), cv2.MORPH_OPEN, disc, borderValue=0) > 0
     return opened
+
+
+def _without_corner_contacts(free: BoolArray) -> BoolArray:
+    """Part free cells that touch at a corner only: a slanted wall one cell wide must hold.
+
+    Thinning joins cells over corners, and such a wall is a row of cells that touch at corners.
+    """
+    free = free.copy()
+    while True:
+        a, b, c, d = free[:-1, :-1], free[:-1, 1:], free[1:, :-1], free[1:, 1:]
+        falling, rising = a & d & ~b & ~c, b & c & ~a & ~d
+        if not (falling.any() or rising.any()):
+            return free
+        a[falling] = False
+        b[rising] = False
 
 
 def _parts(mask: BoolArray, resolution: float, *, least: float) -> tuple[IntArray, FloatArray]:

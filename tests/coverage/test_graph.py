@@ -157,3 +157,14 @@ def test_a_shifted_origin_shifts_the_graph(draw, plain):
 def test_senseless_widths_are_refused(field, value):
     with pytest.raises(InvalidInputError, match=field):
         GraphConfig(**{field: value})
+
+
+def test_a_slanted_wall_one_cell_wide_parts_two_rooms(draw, plain):
+    grid = draw(14.0, 10.0, [(1.0, 1.0, 13.0, 9.0)])
+    cells = grid.cells.copy()
+    steps = np.arange(20, 180)
+    cells[steps, 60 + steps // 2] = 100
+    cells[steps, 61 + steps] = 100  # at 45 degrees the cells touch at corners only
+    built = build_graph(OccupancyGrid(grid.frame, cells), (), plain, start=(1.5, 5.0))
+    assert len(built.graph.vertices) < 12
+    assert any("3 unconnected parts" in note for note in built.notes)
