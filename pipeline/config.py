@@ -149,6 +149,10 @@ class CoverConfig:
     doors: Path | None = None
     """Closed doors whose positions the tour shall visit too: GeoJSON in the map frame, metres."""
 
+    start: tuple[float, float] | None = None
+    """Where the robot is, x and y in the map frame [m]: of several parts that are not connected, its own is covered;
+    without it, all parts."""
+
     coverage: CoverageConfig = field(default_factory=CoverageConfig)
     """Graph and tour."""
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.door import ClosedDoor
+from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
 from closedrooms.core.geojson import read_doors, write_doors, write_features
 from closedrooms.core.rosmap import read_map, write_map
@@ -74,7 +75,10 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Cover
     }
     with watch.stage("cover"):
         progress.stage("cover")
-        tour = plan_coverage(grid, doors, config.coverage)
+        try:
+            tour = plan_coverage(grid, doors, config.coverage, start=config.start)
+        except InvalidInputError as error:
+            raise InvalidInputError(str(error), where=config.map) from error
     missed = {door.id: "no free space to reach it from" for door in doors if door.id not in tour.graph.door_vertices}
     missed |= dict.fromkeys(tour.unreached_doors, "no free space to reach it from")
     with output_folder(config.out, manifest) as folder:

@@ -51,7 +51,7 @@ def drive_rows(drive: dict[str, Any] | None) -> Rows:
     ]
     for revision in drive["revisions"]:
         for door, before in revision["iou_before"].items():
-            rows.append((f"IoU behind {door} when looked into", f"{before:.3f} to {revision['iou_after'][door]:.3f}"))
+            rows.append((f"IoU behind {door} as more was seen", f"{before:.3f} to {revision['iou_after'][door]:.3f}"))
     if drive["room_iou_mean_end"] is not None:
         rows.append(("IoU mean after the drive", f"{drive['room_iou_mean_end']:.3f}"))
     return rows

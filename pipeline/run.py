@@ -220,9 +220,10 @@ def _drive(
     """Open the doors, drive the tour of the predicted map, and judge it."""
     driven = drive(
         witness, mapper, prediction, tours["predicted"], survey.doors, config.navigation,
-        closed=closed, predictor=predictor_config(config), coverage=config.coverage, observer=observer,
+        closed=closed, predictor=predictor_config(config), coverage=config.coverage, mapping=config.mapper,
+        observer=observer, period=1.0 / config.sim.lidar.rate,
     )  # fmt: skip
-    seen, sim = mapper.grid(), witness.sim
+    seen, sim = driven.grid, witness.sim
     start = sim.world_T_map
     cells = reachable(sim.plan, (), seen.frame, start.inverse(), (start.x, start.y))
     return driven, drive_metrics(driven, truth.rooms, seen, cells, tours.get("truth"))
