@@ -151,7 +151,7 @@ class CoverConfig:
 
     start: tuple[float, float] | None = None
     """Where the robot is, x and y in the map frame [m]: of several parts that are not connected, its own is covered;
-    without it, all parts."""
+    without it, the largest (``--coverage.parts all`` covers every one)."""
 
     coverage: CoverageConfig = field(default_factory=CoverageConfig)
     """Graph and tour."""
