@@ -119,6 +119,10 @@ class LoopConfig:
     min_score: float = 0.60
     """Mean likelihood [0..1] of the recent way on the older surfaces that a loop must reach."""
 
+    max_rival: float = 0.9
+    """Score of the best other place in the window, as a share of the loop's, above which the loop is ambiguous and not
+    taken: loops of the aces log have 0.52 to 0.83, a wrong one in a row of 25 equal rooms had 0.97."""
+
     kernel: float = 4.0
     """Mahalanobis error at which a loop has half its weight."""
 

@@ -43,6 +43,7 @@ def search(
     *,
     coarse_cells: int = 4,
     prior_sigmas: tuple[float, float] | None = None,
+    away_from: tuple[Pose2, float] | None = None,
 ) -> Found:
     """Find the pose in the window with the highest mean likelihood, exactly on the lattice of candidate poses.
 
@@ -56,9 +57,10 @@ def search(
         window: Half widths.
         coarse_cells: Width of a block in cells.
         prior_sigmas: Standard deviations ``(distance [m], angle [rad])`` of the guess; lowers the score far from it.
+        away_from: A pose, and the distance [m] within which of it none is taken: finds its rivals.
 
     Returns:
-        The best pose; its score without the prior.
+        The best pose; its score without the prior, 0 where ``away_from`` leaves none.
     """
     lattice = field.lattice
     points = points[:: -(-len(points) // MAX_POINTS)]
@@ -88,6 +90,10 @@ def search(
         penalised = scores.ravel() - _penalty(
             np.repeat(turns[angles], inner.size // 2), flat_fine, 1, lattice.resolution, prior_sigmas
         )
+        if away_from is not None:
+            pose, radius = away_from
+            at = flat_fine[:, ::-1] * lattice.resolution + (guess.x - pose.x, guess.y - pose.y)
+            penalised[np.hypot(at[:, 0], at[:, 1]) < radius] = -math.inf
         k = int(np.argmax(penalised))
         if penalised[k] > best + TIE:
             best, best_score = float(penalised[k]), float(scores.ravel()[k])

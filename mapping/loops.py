@@ -14,6 +14,10 @@ from closedrooms.mapping.likelihood import LikelihoodField
 from closedrooms.mapping.posegraph import PoseGraph
 from closedrooms.mapping.refinement import refine
 
+RIVAL_DISTANCE = 1.0
+"""Distance [m] from the best place of a window beyond which another is a rival: beyond its own peak, nearer than the
+next door."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loop:
@@ -72,6 +76,13 @@ def find_loop(
         return None
     match = refine(field, points, found.pose, iterations=12)
     if match.score < loops.min_score or match.pose.distance(found.pose) > 0.3:
+        return None
+    # Rooms of one size in a row fit one room further nearly as well: what has a rival is no evidence.
+    rival = search(
+        field, points, latest.pose, window, coarse_cells=6, prior_sigmas=(window.distance, window.angle),
+        away_from=(found.pose, RIVAL_DISTANCE),
+    )  # fmt: skip
+    if rival.score > loops.max_rival * found.score:
         return None
     return Loop(older.index, latest.index, older.pose.inverse() @ match.pose, match.score, match.hessian)
 

@@ -137,3 +137,25 @@ def test_a_scan_of_a_room_is_matched_to_a_centimetre(office) -> None:  # type: i
     assert match is not None
     assert match.pose.distance(moved) < 0.02
     assert abs(match.pose.theta - moved.theta) < 0.008
+
+
+@pytest.mark.parametrize(("repeated", "least", "most"), [(True, 0.95, 1.05), (False, 0.0, 0.7)])
+def test_a_place_that_repeats_has_a_rival(repeated: bool, least: float, most: float) -> None:
+    corner = np.vstack(
+        (
+            np.column_stack((np.arange(-1.5, 1.5, 0.1), np.full(30, 1.0))),
+            np.column_stack((np.full(20, 1.0), np.arange(-1.0, 1.0, 0.1))),
+        )
+    )
+    field = LikelihoodField(0.05, MatcherConfig())
+    field.add(corner)
+    if repeated:
+        field.add(corner + np.array((0.0, 2.5)))
+    window = Window(3.0, 0.1)
+    best = search(field, corner, Pose2(0.2, 0.1, 0.0), window, prior_sigmas=(3.0, 0.1))
+    rival = search(field, corner, Pose2(0.2, 0.1, 0.0), window, prior_sigmas=(3.0, 0.1), away_from=(best.pose, 1.0))
+    assert best.pose.distance(Pose2()) < 0.06
+    assert rival.pose.distance(best.pose) >= 1.0
+    assert least <= rival.score / best.score <= most
+    if repeated:
+        assert rival.pose.distance(Pose2(0.0, 2.5, 0.0)) < 0.06
