@@ -2,23 +2,20 @@
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
 from typing import Any
 
-from closedrooms.core.errors import ClosedroomsError
 from closedrooms.core.files import MANIFEST, PROGRAM, write_json
 from closedrooms.pipeline.evaluation.config import EvaluateConfig
-from closedrooms.pipeline.evaluation.folder import claim, one_thread
+from closedrooms.pipeline.evaluation.folder import claim
 from closedrooms.pipeline.evaluation.listing import SamplePath, find_samples
 from closedrooms.pipeline.evaluation.sample import Outcome, Scores, evaluate_sample
 from closedrooms.pipeline.manifest import resolved, versions
 from closedrooms.pipeline.terminal import Progress, Silent
+from closedrooms.pipeline.workers import Crew, Lost
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,16 +104,6 @@ def _seconds(scores: Sequence[Scores]) -> dict[str, float]:
 def _work(samples: Sequence[SamplePath], config: EvaluateConfig) -> Iterator[Outcome]:
     """What comes of the samples, as they are finished."""
     job = partial(evaluate_sample, methods=config.methods, out=config.out, tours=config.tours)
-    if config.workers == 1 or len(samples) == 1:
-        yield from map(job, samples)
-        return
-    with ProcessPoolExecutor(config.workers, mp_context=get_context("spawn"), initializer=one_thread) as pool:
-        waiting = [pool.submit(job, sample) for sample in samples]
-        try:
-            for future in as_completed(waiting):
-                yield future.result()
-        except BrokenProcessPool as error:
-            raise ClosedroomsError("a worker process was killed; the same command goes on where it stopped") from error
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    crew: Crew[SamplePath, Outcome] = Crew(min(config.workers, len(samples)))
+    for sample, outcome in crew.do(job, samples):
+        yield Outcome([], {sample.name: outcome.reason}) if isinstance(outcome, Lost) else outcome
