@@ -6,10 +6,12 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon, mapping, shape
 from shapely.geometry.base import BaseGeometry
 
+from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import read_json, write_bytes
@@ -20,29 +22,24 @@ MAX_FEATURES = 1_000_000
 
 
 def write_features(path: Path, features: Iterable[Feature]) -> None:
-    """Write geometries [m, map frame] with their properties, coordinates rounded to 0.1 mm.
+    """Write geometries [m, map frame] with their properties, a line each, coordinates rounded to 0.1 mm.
 
     Raises:
         OutputError: The folder cannot be written.
     """
-    collection = {
-        "type": "FeatureCollection",
-        "frame": "map",
-        "units": "m",
-        "features": [
-            {"type": "Feature", "properties": properties, "geometry": _rounded(mapping(geometry))}
-            for geometry, properties in features
-        ],
-    }
-    write_bytes(path, (json.dumps(collection, indent=1, allow_nan=False) + "\n").encode())
+    lines = [
+        json.dumps(
+            {"type": "Feature", "properties": properties, "geometry": mapping(shapely.transform(geometry, _rounded))},
+            allow_nan=False,
+        )
+        for geometry, properties in features
+    ]
+    head = '{"type": "FeatureCollection", "frame": "map", "units": "m", "features": ['
+    write_bytes(path, ("\n".join([head, ",\n".join(lines), "]}"]) + "\n").encode())
 
 
-def _rounded(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_rounded(item) for item in value]
-    return round(value, 4) + 0.0 if isinstance(value, float) else value
+def _rounded(coordinates: FloatArray) -> FloatArray:
+    return np.round(coordinates, 4) + 0.0
 
 
 def read_features(path: Path, *, what: str = "a GeoJSON FeatureCollection") -> list[Feature]:

@@ -1,9 +1,11 @@
 """The log-odds grid: evidence of hits and passes per cell, from which scans can be taken back exactly."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
-from closedrooms.core.arrays import CellArray, FloatArray
+from closedrooms.core.arrays import CellArray, FloatArray, IntArray
 from closedrooms.core.grid import UNKNOWN, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
@@ -13,6 +15,26 @@ from closedrooms.mapping.lattice import Lattice
 SUBCELL_BITS = 6
 """Fraction bits of OpenCV's fixed-point polygon corners: 1/64 cell."""
 Window = tuple[int, int, int, int]
+Mask = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Imprint:
+    """What one scan at one pose counts, so that it can be counted out, or in again, without drawing it anew.
+
+    Attributes:
+        row: First row of its window, on the lattice (not in the array, which grows).
+        col: First column.
+        shape: Rows and columns of the window.
+        passes: Which cells were crossed: the window's mask, eight cells a byte.
+        hits: Cells that were hit, as flat indices in the window, each once.
+    """
+
+    row: int
+    col: int
+    shape: tuple[int, int]
+    passes: Mask
+    hits: IntArray
 
 
 class EvidenceGrid:
@@ -37,9 +59,31 @@ class EvidenceGrid:
         Free are the cells wholly inside the outline of what the beams crossed; the boundary itself is not, so that
         a wall which is seen at a grazing angle is not worn away by the beams along it.
         """
+        drawn = self._draw(beams, map_T_robot)
+        if drawn is not None:
+            self._count(*drawn, sign)
+
+    def imprint(self, beams: Beams, map_T_robot: Pose2) -> Imprint | None:
+        """What :meth:`add` would count, to be counted by :meth:`stamp`; ``None`` for a scan that crossed nothing."""
+        drawn = self._draw(beams, map_T_robot)
+        if drawn is None:
+            return None
+        (row, col, rows, cols), mask, hits = drawn
+        lattice = self._lattice
+        return Imprint(row + lattice.row0, col + lattice.col0, (rows, cols), np.packbits(mask), hits)
+
+    def stamp(self, imprint: Imprint, *, sign: int = 1) -> None:
+        """Count a scan that :meth:`imprint` of this very grid drew, in (``sign`` 1) or out again (-1)."""
+        rows, cols = imprint.shape
+        mask = np.unpackbits(imprint.passes, count=rows * cols).reshape(rows, cols)
+        window = (imprint.row - self._lattice.row0, imprint.col - self._lattice.col0, rows, cols)
+        self._count(window, mask, imprint.hits, sign)
+
+    def _draw(self, beams: Beams, map_T_robot: Pose2) -> tuple[Window, Mask, IntArray] | None:
+        """The window of a scan (the arrays grow to hold it), its crossed cells and flat indices of those hit."""
         outline, points = map_T_robot.transform(beams.outline), map_T_robot.transform(beams.points)
         if len(outline) == 0:
-            return
+            return None
         low, high = outline.min(axis=0), outline.max(axis=0)
         if len(points):
             low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
@@ -47,22 +91,25 @@ class EvidenceGrid:
         lattice = self._lattice
         (row_low, row_high), (col_low, col_high) = lattice.cells(np.vstack((low, high)))
         window = (int(row_low), int(col_low), int(row_high - row_low + 1), int(col_high - col_low + 1))
-        rows, cols = slice(window[0], window[0] + window[2]), slice(window[1], window[1] + window[3])
         mask = self._crossed(outline, window)
+        flat = np.zeros(0, dtype=np.int64)
         if len(points):
             hit_rows, hit_cols = lattice.cells(points)
             flat = np.unique((hit_rows - window[0]) * window[3] + hit_cols - window[1])
             mask.ravel()[flat] = 0
-            hits = self._hits[rows, cols]
-            hits[flat // window[3], flat % window[3]] += sign
-        passes = self._passes[rows, cols]
+        return window, mask, flat
+
+    def _count(self, window: Window, mask: Mask, flat: IntArray, sign: int) -> None:
+        rows, cols = slice(window[0], window[0] + window[2]), slice(window[1], window[1] + window[3])
+        hits, passes = self._hits[rows, cols], self._passes[rows, cols]
+        hits[flat // window[3], flat % window[3]] += sign
         if sign > 0:
             passes += mask
         else:
             passes -= mask
         self._dirty = window if self._dirty is None else _union(self._dirty, window)
 
-    def _crossed(self, outline: FloatArray, window: Window) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+    def _crossed(self, outline: FloatArray, window: Window) -> Mask:
         lattice = self._lattice
         # OpenCV puts integer coordinates on cell centres.
         corner = np.array([lattice.col0 + window[1], lattice.row0 + window[0]]) + 0.5

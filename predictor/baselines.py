@@ -13,27 +13,34 @@ from closedrooms.core.room import Room
 from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.inpaint import inpaint, passage
 from closedrooms.predictor.prediction import Prediction, Shape
-from closedrooms.predictor.start import Start, start_rooms
+from closedrooms.predictor.start import Start, Started, start_rooms
 
 # Rays a baseline casts around a door: half a degree, 0.17 m apart at 20 m.
 RAYS = 720
+# Steps along the rays that are taken at once.
+STRETCH = 64
 
 
-def line_of_sight(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PredictorConfig) -> Prediction:
+def line_of_sight(
+    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PredictorConfig, *, started: Started | None = None
+) -> Prediction:
     """What can be seen from each door through unknown cells, up to known ones or the bounding box of the map.
 
     Args:
         grid: The map.
         doors: Closed doors in its frame.
         config: Structure (the door's direction is that of its edge) and passages.
+        started: What ``start_rooms`` gave for the same, where it is at hand.
 
     Returns:
         Rooms that may overlap each other, and the map completed with them.
     """
-    return _each(grid, doors, config, _seen)
+    return _each(grid, doors, config, _seen, started)
 
 
-def geometric(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PredictorConfig) -> Prediction:
+def geometric(
+    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PredictorConfig, *, started: Started | None = None
+) -> Prediction:
     """All unknown faces in line of sight of each door, until faces on the border are met.
 
     A face is in sight when its centre is: the straight line to the door crosses unknown faces only that are not on
@@ -43,11 +50,12 @@ def geometric(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: Predicto
         grid: The map.
         doors: Closed doors in its frame.
         config: Structure and passages.
+        started: What ``start_rooms`` gave for the same, where it is at hand.
 
     Returns:
         Rooms that may overlap each other, and the map completed with them.
     """
-    return _each(grid, doors, config, _faces_in_sight)
+    return _each(grid, doors, config, _faces_in_sight, started)
 
 
 def _each(
@@ -55,9 +63,11 @@ def _each(
     doors: Sequence[ClosedDoor],
     config: PredictorConfig,
     shape_of: Callable[[Start, int], Shape],
+    started: Started | None,
 ) -> Prediction:
     """Predict each room for itself with ``shape_of``."""
-    start, failures = start_rooms(grid, doors, config)
+    start, reasons = started or start_rooms(grid, doors, config)
+    failures = dict(reasons)
     if start is None:
         return Prediction(grid, (), failures)
     rooms, passages = [], []
@@ -94,16 +104,32 @@ def _seen(start: Start, room: int) -> Shape:
     box[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1] = True
     open_ = grid.unknown & box
     reach = np.hypot(rows[-1] - rows[0] + 1, cols[-1] - cols[0] + 1) * resolution
-    steps = np.arange(0.0, reach, resolution)
-    cells = grid.frame.to_cells(eye + steps[:, None, None] * rays)  # (steps, RAYS, 2)
-    inside = grid.frame.contains(cells)
-    passes = np.zeros(inside.shape, dtype=np.bool_)
-    passes[inside] = open_[cells[inside, 0], cells[inside, 1]]
-    reached = np.where(passes.all(axis=0), steps[-1], steps[passes.argmin(axis=0)])
+    reached = _reach(grid, open_, eye, rays, np.arange(0.0, reach, resolution))
     ends = eye + reached[:, None] * rays
     star = Polygon(np.vstack((eye, ends))).buffer(0)
     parts = [part for part in shapely.get_parts(star).tolist() if part.area > resolution**2]
     return max(parts, key=lambda part: part.area) if parts else Polygon()
+
+
+def _reach(grid: OccupancyGrid, open_: BoolArray, eye: FloatArray, rays: FloatArray, steps: FloatArray) -> FloatArray:
+    """The step [m] at which each ray, shape (n, 2), first meets a cell that is not open; the last one if it never does.
+
+    A stretch at a time: most rays end on their first metres.
+    """
+    reached = np.full(len(rays), steps[-1])
+    going = np.arange(len(rays))
+    for first in range(0, len(steps), STRETCH):
+        part = steps[first : first + STRETCH]
+        cells = grid.frame.to_cells(eye + part[:, None, None] * rays[going])  # (steps, rays, 2)
+        inside = grid.frame.contains(cells)
+        passes = np.zeros(inside.shape, dtype=np.bool_)
+        passes[inside] = open_[cells[inside, 0], cells[inside, 1]]
+        ended = ~passes.all(axis=0)
+        reached[going[ended]] = part[passes.argmin(axis=0)[ended]]
+        going = going[~ended]
+        if not len(going):
+            break
+    return reached
 
 
 def _behind_wall(start: Start, room: int) -> FloatArray:

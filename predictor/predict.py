@@ -10,12 +10,17 @@ from closedrooms.predictor.inpaint import inpaint
 from closedrooms.predictor.joint import swap_faces
 from closedrooms.predictor.prediction import Level, Prediction
 from closedrooms.predictor.rooms import finish_rooms
-from closedrooms.predictor.start import start_rooms
+from closedrooms.predictor.start import Started, start_rooms
 from closedrooms.predictor.trace import level_of, trace_of
 
 
 def predict(
-    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PredictorConfig, *, trace: bool | None = None
+    grid: OccupancyGrid,
+    doors: Sequence[ClosedDoor],
+    config: PredictorConfig,
+    *,
+    trace: bool | None = None,
+    started: Started | None = None,
 ) -> Prediction:
     """Predict the rooms behind closed doors and complete the map with them.
 
@@ -29,6 +34,8 @@ def predict(
         doors: Closed doors in the frame of the map.
         config: Settings, from :func:`closedrooms.predictor.config.preset`.
         trace: Keep every stage in the result; ``None`` leaves it to ``config.keep_trace``.
+        started: What ``start_rooms`` gave for this map, these doors and this configuration, where it is at hand;
+            ``best`` has no use for it.
 
     Returns:
         The completed map on the lattice of the input, the rooms in the order of the doors, failures by door id.
@@ -39,7 +46,8 @@ def predict(
         return predict_best(grid, doors, config, trace)
     wanted = config.keep_trace if trace is None else trace
     # 3.1, 3.2: lines, faces, and the face behind each door.
-    start, failures = start_rooms(grid, doors, config)
+    start, reasons = started or start_rooms(grid, doors, config)
+    failures = dict(reasons)
     if start is None:
         return Prediction(grid, (), failures)
     levels: list[Level] = []

@@ -44,10 +44,12 @@ class Start:
         return np.array([-along[1], along[0]])
 
 
-def start_rooms(
-    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PredictorConfig
-) -> tuple[Start | None, dict[str, str]]:
-    """Structure, faces and initial faces of a map.
+# A start, ``None`` where the map shows no structure at all, and why doors have no room, by door id.
+Started = tuple[Start | None, dict[str, str]]
+
+
+def start_rooms(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PredictorConfig) -> Started:
+    """Structure, faces and initial faces of a map: the same for every method with the same structure.
 
     Returns:
         The start, ``None`` where the map shows no structure at all, and why doors have no room, by door id.

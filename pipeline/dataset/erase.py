@@ -6,8 +6,10 @@ Rays that ended on the leaf where it stood open are cast anew in the plan. The m
 estimated poses, as the mapper draws it.
 """
 
+from collections import OrderedDict
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from hashlib import blake2b
 
 import numpy as np
 import shapely
@@ -20,7 +22,7 @@ from closedrooms.core.random import stream
 from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.beams import clean
 from closedrooms.mapping.doors import fuse_doors
-from closedrooms.mapping.evidence import EvidenceGrid
+from closedrooms.mapping.evidence import EvidenceGrid, Imprint
 from closedrooms.mapping.keyframe import Keyframe
 from closedrooms.pipeline.dataset.open_survey import OpenSurvey
 from closedrooms.pipeline.dataset.rays import first_hits
@@ -33,6 +35,9 @@ from closedrooms.worlds.geometry import areal
 # A ray counts as ended on an open leaf when it went this far, less so many standard deviations of the range [m]. Rays
 # that ended just before it come along: they are cast anew, which gives what they measured but for the noise.
 NEAR_LEAF, SIGMAS = 0.02, 4.0
+# Drawn scans that are remembered, most of them with some doors closed: about 30 kB each.
+KEPT_KEYFRAMES = 8000
+NOBODY = np.full(1, -1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,9 +73,7 @@ class _Drawn:
     scan: LaserScan
     keyframe: Keyframe
     doors: tuple[str, ...]
-
-    def shows(self, ranges: FloatArray, doors: tuple[str, ...]) -> bool:
-        return self.doors == doors and np.array_equal(self.scan.ranges, ranges, equal_nan=True)
+    imprint: Imprint | None
 
 
 class Eraser:
@@ -99,11 +102,15 @@ class Eraser:
         self._noise = config.noise.range_sd * draws
         self._shut: dict[str, _Crossings] = {}
         self._stood_open: dict[str, _Crossings] = {}
+        # How far the beams that ended on one open door go before they meet another one, open or closed: ``None``
+        # where none does, which is the rule.
+        self._behind: dict[tuple[str, str, bool], FloatArray | None] = {}
         # The drawing as it is now: counts are sums, so that going from one set of closed doors to the next only takes
         # out and puts in the scans that differ, and the way there leaves no trace. It begins with all doors open and
         # so keeps the frame of the whole survey.
         self._grid = EvidenceGrid(survey.mapper)
         self._drawn: list[_Drawn | None] = [None] * len(survey.poses)
+        self._known: OrderedDict[tuple[int, tuple[str, ...], bytes], _Drawn] = OrderedDict()
         self._draw(np.arange(len(survey.poses)), self._ranges, np.full(self._ranges.shape, -1), ())
 
     def erase(self, closed: Collection[str]) -> ErasedMap:
@@ -126,23 +133,31 @@ class Eraser:
     def _draw(self, kept: IntArray, ranges: FloatArray, owner: IntArray, closed: tuple[str, ...]) -> None:
         """Bring the drawing to these scans: keyframes ``kept``, ranges and owners of all keyframes."""
         wanted = set(kept.tolist())
+        cut = owner.max(axis=1) >= 0
         for number, before in enumerate(self._drawn):
+            after = None
             if number in wanted:
-                seen = np.unique(owner[number][np.isfinite(ranges[number])])
+                seen = np.unique(owner[number][np.isfinite(ranges[number])]) if cut[number] else NOBODY
                 doors = tuple(closed[int(index)] for index in seen[seen >= 0])
-                if before is not None and before.shows(ranges[number], doors):
-                    continue
-                self._drawn[number] = self._keyframe(number, ranges[number], doors)
-            else:
-                self._drawn[number] = None
-            after = self._drawn[number]
-            if before is not None:
-                self._grid.add(before.keyframe.beams, before.keyframe.pose, sign=-1)
-            if after is not None:
-                self._grid.add(after.keyframe.beams, after.keyframe.pose)
+                after = self._keyframe(number, ranges[number], doors)
+            if after is before:
+                continue
+            self._drawn[number] = after
+            if before is not None and before.imprint is not None:
+                self._grid.stamp(before.imprint, sign=-1)
+            if after is not None and after.imprint is not None:
+                self._grid.stamp(after.imprint)
 
-    def _keyframe(self, number: int, ranges: FloatArray, doors: tuple[str, ...]) -> "_Drawn":
-        """A keyframe of the survey with other ranges, that sees ``doors``."""
+    def _keyframe(self, number: int, ranges: FloatArray, doors: tuple[str, ...]) -> _Drawn:
+        """A keyframe of the survey with other ranges, that sees ``doors``; remembered, as few doors show in one."""
+        key = (number, doors, blake2b(ranges.tobytes(), digest_size=16).digest())
+        drawn = self._known.pop(key, None) or self._new_keyframe(number, ranges, doors)
+        self._known[key] = drawn
+        if len(self._known) > KEPT_KEYFRAMES:
+            self._known.popitem(last=False)
+        return drawn
+
+    def _new_keyframe(self, number: int, ranges: FloatArray, doors: tuple[str, ...]) -> _Drawn:
         survey = self.survey
         scan = survey.keyframes.scans[number]
         if not np.array_equal(ranges, self._ranges[number], equal_nan=True):
@@ -151,7 +166,7 @@ class Eraser:
         keyframe = Keyframe(number, scan.stamp, pose, beams, np.zeros((0, 2)), 0.0)
         for name in doors:
             keyframe.remember(self._sighting(name, number), Pose2())
-        return _Drawn(scan, keyframe, doors)
+        return _Drawn(scan, keyframe, doors, self._grid.imprint(beams, pose))
 
     def _outside(self, closed: Collection[str], poses_map: FloatArray) -> IntArray:
         """Indices of the true poses, shape (n, 3), map frame, that are not behind a closed door."""
@@ -189,12 +204,8 @@ class Eraser:
             return
         lidar = self.survey.sim.lidar
         ended = [self._ended_on(name) for name in closed]
-        scan, beam, solid = (
-            np.concatenate([getattr(met, part) for met in ended]) for part in ("scan", "beam", "distance")
-        )
-        leaves = [leaf.at(0.0 if name in closed else leaf.travel) for name, own in self._leaves.items() for leaf in own]
-        edges = np.concatenate([np.array(leaf_edges(corners)) for corners in leaves])
-        true = np.minimum(solid, first_hits(self._places[scan], self._directions(scan, beam), edges))
+        scan, beam = (np.concatenate([getattr(met, part) for met in ended]) for part in ("scan", "beam"))
+        true = np.concatenate([self._past(name, frozenset(closed)) for name in closed])
         seen = true + self._noise[scan, beam]
         seen = np.where(seen < lidar.range_min, np.nan, np.where(seen >= lidar.range_max, np.inf, seen))
         ranges[scan, beam] = seen
@@ -206,9 +217,27 @@ class Eraser:
             measured = self._ranges[met.scan, met.beam]
             near = measured >= met.distance - NEAR_LEAF - SIGMAS * self.survey.sim.noise.range_sd
             scan, beam = met.scan[near], met.beam[near]
-            solid = first_hits(self._places[scan], self._directions(scan, beam), self._edges)
-            self._stood_open[name] = _Crossings(scan, beam, solid)
+            beams = _Crossings(scan, beam, np.full(len(scan), np.inf))
+            self._stood_open[name] = replace(beams, distance=self._first_hits(beams, self._edges))
         return self._stood_open[name]
+
+    def _past(self, name: str, closed: frozenset[str]) -> FloatArray:
+        """How far beams that ended on the open leaves of ``name`` go with ``closed`` doors closed, shape (n,) [m]."""
+        met = self._ended_on(name)
+        distance = met.distance
+        for other, leaves in self._leaves.items():
+            key = (name, other, other in closed)
+            if key not in self._behind:
+                corners = [leaf.at(0.0 if other in closed else leaf.travel) for leaf in leaves]
+                found = self._first_hits(met, np.concatenate([np.array(leaf_edges(leaf)) for leaf in corners]))
+                self._behind[key] = found if np.isfinite(found).any() else None
+            behind = self._behind[key]
+            if behind is not None:
+                distance = np.minimum(distance, behind)
+        return distance
+
+    def _first_hits(self, beams: _Crossings, edges: FloatArray) -> FloatArray:
+        return first_hits(self._places[beams.scan], self._directions(beams.scan, beams.beam), edges)
 
     def _directions(self, scan: IntArray, beam: IntArray) -> FloatArray:
         angles = self._angles[scan, beam]

@@ -94,7 +94,7 @@ def draw_extremes(
     read = []
     for score in cases:
         sample = read_sample(samples[score["sample"]])
-        read.append((score, sample, predict_with(score["method"], sample)))
+        read.append((score, sample, predict_with(score["method"], sample)[0]))
     if not read:
         return 0
     figure, axes = _figure(len(read), 3, 5.0, 3.6)

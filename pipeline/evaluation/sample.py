@@ -31,7 +31,9 @@ from closedrooms.pipeline.evaluation.scores import (
 from closedrooms.pipeline.evaluation.tours import Tour, code_digest, kept_tour, plan_tour, tour_code, tour_figures
 from closedrooms.pipeline.manifest import versions
 from closedrooms.pipeline.metrics import room_iou
+from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.prediction import Prediction
+from closedrooms.predictor.start import Started
 
 AUTHORS = "authors"
 RESULT = "scores.json"
@@ -87,6 +89,7 @@ def evaluate_sample(sample: SamplePath, methods: Sequence[str], out: Path, *, to
         try:
             read = read_sample(sample)
             hidden = _hidden(read)
+            starts = Starts(read)
         except ClosedroomsError as error:
             outcome.problems[sample.name] = str(error)
             return outcome
@@ -97,7 +100,7 @@ def evaluate_sample(sample: SamplePath, methods: Sequence[str], out: Path, *, to
             _make(folder)
             head = _head(read, sample.name, method, keys[method], hidden)
             try:
-                scores = head | _score(read, method, folder, hidden, out, tours=tours)
+                scores = head | _score(read, method, folder, hidden, out, starts, tours=tours)
             except OutputError:
                 raise
             except ClosedroomsError as error:
@@ -146,20 +149,51 @@ def _kept(path: Path, key: str) -> Scores | None:
     return scores if isinstance(scores, dict) and scores.get("key") == key else None
 
 
-def predict_with(method: str, sample: Sample) -> Prediction:
-    """The prediction of one method (``paper``, ``best``, ``rose``, ``line-of-sight``, ``geometric``) on one sample."""
+class Starts:
+    """Lines and faces of one sample, found once for all methods that begin with the same ones."""
+
+    def __init__(self, sample: Sample) -> None:
+        self._sample = sample
+        self._found: dict[str, tuple[Started, float]] = {}
+
+    def of(self, config: PredictorConfig) -> tuple[Started, float]:
+        """What a method starts from, and the seconds that this took when it was done."""
+        from closedrooms.predictor.start import start_rooms
+
+        if config.structure not in self._found:
+            begin = time.perf_counter()
+            started = start_rooms(self._sample.observed, self._sample.doors, config)
+            self._found[config.structure] = started, time.perf_counter() - begin
+        return self._found[config.structure]
+
+
+def predict_with(method: str, sample: Sample, starts: Starts | None = None) -> tuple[Prediction, float]:
+    """The prediction of one method on one sample, and how long it took.
+
+    Args:
+        method: ``paper``, ``best``, ``rose``, ``line-of-sight`` or ``geometric``.
+        sample: The sample.
+        starts: What methods share on this sample; the time that it took counts for each.
+
+    Returns:
+        The prediction and seconds.
+    """
     from closedrooms.predictor.baselines import geometric, line_of_sight
     from closedrooms.predictor.config import preset
     from closedrooms.predictor.predict import predict
 
-    if method == "line-of-sight":
-        return line_of_sight(sample.observed, sample.doors, preset("paper"))
-    if method == "geometric":
-        return geometric(sample.observed, sample.doors, preset("paper"))
-    config = preset("best" if method == "best" else "paper")
+    grid, doors, config = sample.observed, sample.doors, preset("best" if method == "best" else "paper")
     if method == "rose":
         config = replace(config, structure="rose")
-    return predict(sample.observed, sample.doors, config)
+    started, shared = (None, 0.0) if method == "best" else (starts or Starts(sample)).of(config)
+    begin = time.perf_counter()
+    if method == "line-of-sight":
+        prediction = line_of_sight(grid, doors, config, started=started)
+    elif method == "geometric":
+        prediction = geometric(grid, doors, config, started=started)
+    else:
+        prediction = predict(grid, doors, config, started=started)
+    return prediction, shared + time.perf_counter() - begin
 
 
 def _hidden(sample: Sample) -> _Hidden:
@@ -182,14 +216,14 @@ def _head(sample: Sample, name: str, method: str, key: str, hidden: _Hidden) -> 
     }
 
 
-def _score(sample: Sample, method: str, folder: Path, hidden: _Hidden, out: Path, *, tours: bool) -> Scores:
+def _score(
+    sample: Sample, method: str, folder: Path, hidden: _Hidden, out: Path, starts: Starts, *, tours: bool
+) -> Scores:
     if method == AUTHORS:
         assert sample.authors is not None, "only samples with authors.yaml come here"
         masks = added_rooms(sample.observed, sample.authors)
         return _hidden_scores(hidden, masks) | {"by_door": {}, "not_seen": []}
-    begin = time.perf_counter()
-    prediction = predict_with(method, sample)
-    seconds = time.perf_counter() - begin
+    prediction, seconds = predict_with(method, sample, starts)
     write_rooms(folder / "rooms.geojson", prediction.rooms)
     unknown = sample.observed.unknown
     masks = [mask & unknown for mask in room_masks(prediction.rooms, sample.observed.frame)]
