@@ -103,10 +103,8 @@ class EvidenceGrid:
         rows, cols = slice(window[0], window[0] + window[2]), slice(window[1], window[1] + window[3])
         hits, passes = self._hits[rows, cols], self._passes[rows, cols]
         hits[flat // window[3], flat % window[3]] += sign
-        if sign > 0:
-            passes += mask
-        else:
-            passes -= mask
+        # In place; NumPy would convert the mask first.
+        (cv2.add if sign > 0 else cv2.subtract)(passes, mask, passes, dtype=cv2.CV_32S)
         self._dirty = window if self._dirty is None else _union(self._dirty, window)
 
     def _crossed(self, outline: FloatArray, window: Window) -> Mask:

@@ -71,16 +71,17 @@ def find_loop(
         float(doubts[older.index]),
         min(loops.window_angle + loops.drift_angle * float(graph.ways[older.index]), 0.5),
     )
-    found = search(field, points, latest.pose, window, coarse_cells=6, prior_sigmas=(window.distance, window.angle))
-    if found.score < loops.min_score - 0.15:
+    sigmas, least = (window.distance, window.angle), loops.min_score - 0.15
+    found = search(field, points, latest.pose, window, coarse_cells=6, prior_sigmas=sigmas, floor=least)
+    if found.score < least:
         return None
     match = refine(field, points, found.pose, iterations=12)
     if match.score < loops.min_score or match.pose.distance(found.pose) > 0.3:
         return None
     # Rooms of one size in a row fit one room further nearly as well: what has a rival is no evidence.
     rival = search(
-        field, points, latest.pose, window, coarse_cells=6, prior_sigmas=(window.distance, window.angle),
-        away_from=(found.pose, RIVAL_DISTANCE),
+        field, points, latest.pose, window, coarse_cells=6, prior_sigmas=sigmas,
+        away_from=(found.pose, RIVAL_DISTANCE), floor=loops.max_rival * found.score,
     )  # fmt: skip
     if rival.score > loops.max_rival * found.score:
         return None

@@ -108,24 +108,30 @@ class _Slopes:
         self._inner = (reach, lattice.cols - 1.001 - reach, lattice.rows - 1.001 - reach)
         # Slope along x, y and theta, residual, and ones: their products with each other yield every sum that is needed.
         self._terms = np.ones((5, len(points)))
+        self._rotation, self._shift = np.empty((2, 2)), np.empty((2, 1))
+        self._turned, self._uv, self._floors = np.empty((3, 2, len(points)))
 
     def at(self, x: float, y: float, theta: float) -> FloatArray:
         """Sums of the products of the five terms at a pose (cells, radians), shape (5, 5)."""
         c, s = math.cos(theta), math.sin(theta)
         u0, v0 = x - self._origin[0], y - self._origin[1]
-        turned = np.array(((c, -s), (s, c))) @ self._points
-        uv = turned + np.array(((u0,), (v0,)))
+        rotation, shift, turned, uv, floors = self._rotation, self._shift, self._turned, self._uv, self._floors
+        rotation[0, 0] = rotation[1, 1] = c
+        rotation[0, 1], rotation[1, 0] = -s, s
+        shift[0, 0], shift[1, 0] = u0, v0
+        np.matmul(rotation, self._points, out=turned)
+        np.add(turned, shift, out=uv)
         least, most_u, most_v = self._inner
         if not (least <= u0 <= most_u and least <= v0 <= most_v):
             np.maximum(uv, 0.0, out=uv)
             np.minimum(uv, self._most, out=uv)
-        cells = uv.astype(np.int64)
-        uv -= cells
+        np.floor(uv, out=floors)
+        np.subtract(uv, floors, out=uv)
         u, v = uv
-        flat = cells[1]
+        flat = floors[1]
         flat *= self._cols
-        flat += cells[0]
-        corners = self._values.take(flat + self._corners)  # (4, n)
+        flat += floors[0]
+        corners = self._values.take(flat.astype(np.int64) + self._corners)  # (4, n)
         right = corners[1::2] - corners[::2]
         low, high = corners[::2] + right * u
         along_x, along_y, turning, residual, _ = self._terms

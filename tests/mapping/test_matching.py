@@ -159,3 +159,20 @@ def test_a_place_that_repeats_has_a_rival(repeated: bool, least: float, most: fl
     assert least <= rival.score / best.score <= most
     if repeated:
         assert rival.pose.distance(Pose2(0.0, 2.5, 0.0)) < 0.06
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8), st.floats(-0.2, 0.2), st.floats(0.0, 1.0))
+def test_a_floor_hides_only_what_lies_below_it(dx: float, dy: float, turn: float, floor: float) -> None:
+    guess, window = Pose2(dx, dy, turn), Window(0.6, 0.1)
+    best = search(FIELD, shape(120), guess, window, prior_sigmas=(0.6, 0.1))
+    found = search(FIELD, shape(120), guess, window, prior_sigmas=(0.6, 0.1), floor=floor)
+    if best.score >= floor:
+        assert found == best
+    else:
+        assert found.score < floor
+
+
+def test_nothing_is_found_where_nothing_reaches_the_floor() -> None:
+    found = search(FIELD, shape(120), Pose2(30.0, 0.0, 0.0), Window(0.6, 0.1), floor=0.3)
+    assert found.score == 0.0
