@@ -1,7 +1,10 @@
 """Furniture and noise out of a map, walls left in (ROSE's filter; paper, sections 4.2 and 5.1)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from closedrooms.core.door import Point
 from closedrooms.core.grid import FREE, OccupancyGrid
 from closedrooms.predictor.rose import find_rose
 from closedrooms.predictor.window import known_window
@@ -33,3 +36,36 @@ def filter_clutter(grid: OccupancyGrid) -> OccupancyGrid:
     cells[window.occupied & ~wall[pieces]] = FREE
     cleaned = OccupancyGrid(window.frame, cells).on(grid.frame)
     return OccupancyGrid(grid.frame, np.where(grid.known, cleaned.cells, grid.cells))
+
+
+def free_islands(grid: OccupancyGrid, area: float, doors: Sequence[Point], reach: float) -> OccupancyGrid:
+    """The same map with small pieces that free space surrounds turned free, hollows and all.
+
+    A table in the middle of a room has straight sides as long as a wall's; its lines part rooms. Where walls are
+    looked for it is better gone. A closed closet in the middle of a hall looks the same from outside: what is near a
+    door stays.
+
+    Args:
+        grid: A map, cropped to what is known with unknown cells around it.
+        area: What is smaller goes [m2].
+        doors: Midpoints of closed doors [m].
+        reach: What is nearer than this to a door stays [m].
+    """
+    import cv2
+
+    if area <= 0.0:
+        return grid
+    _, pieces, figures, _ = cv2.connectedComponentsWithStats((~grid.free).astype(np.uint8), connectivity=8)
+    small = figures[:, cv2.CC_STAT_AREA] < area / grid.frame.resolution**2
+    small[0] = False  # what is free
+    edge = np.concatenate((pieces[0], pieces[-1], pieces[:, 0], pieces[:, -1]))
+    small[edge] = False
+    if doors and small.any():
+        places = np.argwhere(small[pieces])
+        points = grid.frame.to_points(places)
+        for door in doors:
+            near = places[np.hypot(*(points - door).T) <= reach]
+            small[pieces[near[:, 0], near[:, 1]]] = False
+    if not small.any():
+        return grid
+    return OccupancyGrid(grid.frame, np.where(small[pieces], np.int8(FREE), grid.cells))

@@ -125,6 +125,9 @@ class PredictorConfig:
     weights: Weights = field(default_factory=Weights)
     """Weights of the evaluation functions."""
 
+    clutter_area: float = 4.0
+    """What free space surrounds and covers less than this counts as free where walls are looked for [m2]: furniture."""
+
     min_unknown: float = 0.30
     """A face is unknown when at least this share of it is unknown, or ``max_free`` holds."""
 

@@ -9,6 +9,7 @@ from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.arrangement import Arrangement, arrange
+from closedrooms.predictor.clutter import free_islands
 from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.initial import Entrance, along_edge, find_entrance, splits_between
 from closedrooms.predictor.structure import WallLines, find_structure
@@ -60,6 +61,7 @@ def start_rooms(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: Predic
     if not window.free.any():
         return None, {door.id: "the map holds no free cell" for door in doors}
     working = at_resolution(window, config.lines.resolution)
+    working = free_islands(working, config.clutter_area, [door.midpoint for door in doors], config.door_reach)
     structure = find_structure(working, config)
     if structure is None:
         return None, {door.id: "the map holds no wall line" for door in doors}

@@ -23,6 +23,7 @@ from closedrooms.predictor.best.shape import room_shape
 from closedrooms.predictor.best.shared import merge
 from closedrooms.predictor.best.suspects import Suspects, suspect
 from closedrooms.predictor.best.thickness import wall_thickness
+from closedrooms.predictor.clutter import free_islands
 from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.inpaint import inpaint, passage
 from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
@@ -53,6 +54,7 @@ def predict_best(
     if window is None:
         return Prediction(grid, (), {door.id: "the map is all unknown" for door in doors})
     working = at_resolution(window, RESOLUTION)
+    working = free_islands(working, config.clutter_area, [door.midpoint for door in doors], config.door_reach)
     directions = find_wall_directions(working)
     if directions is None:
         return Prediction(grid, (), {door.id: "the map holds no wall line" for door in doors})

@@ -7,9 +7,10 @@ from shapely.geometry import box
 
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.predictor.baselines import geometric, line_of_sight
-from closedrooms.predictor.clutter import filter_clutter
+from closedrooms.predictor.clutter import filter_clutter, free_islands
 from closedrooms.predictor.config import preset
 from closedrooms.predictor.inpaint import inpaint, passage
+from closedrooms.predictor.predict import predict
 from closedrooms.predictor.rose import find_rose
 from closedrooms.predictor.thickness import free_interior, measure_thickness
 
@@ -42,6 +43,42 @@ def test_a_map_without_directions_keeps_its_clutter():
     cells[40, 40] = OCCUPIED
     grid = OccupancyGrid(GridFrame(0.05, 0, 0, 80, 80), cells)
     assert filter_clutter(grid) is grid
+
+
+def _with_boxes(grid, *boxes):
+    """Outlines of boxes [m] drawn into a map, their insides unknown, as a robot sees tables and cupboards."""
+    cells = grid.cells.copy()
+    for shape in boxes:
+        (col0, row0), (col1, row1) = (grid.frame.to_corners(np.array(p)).round().astype(int) for p in shape)
+        cells[row0:row1, col0:col1] = OCCUPIED
+        cells[row0 + 1 : row1 - 1, col0 + 1 : col1 - 1] = UNKNOWN
+    return OccupancyGrid(grid.frame, cells)
+
+
+def test_small_pieces_that_free_space_surrounds_are_freed_with_their_hollows(mapped):
+    grid = mapped().grid
+    table, beside_wall, large = ((0.5, 3.5), (2.0, 5.0)), ((9.0, 2.15), (10.0, 3.0)), ((13.0, 3.5), (15.5, 6.0))
+    cleaned = free_islands(_with_boxes(grid, table, beside_wall, large), 4.0, (), 1.0)
+    assert (cleaned.cells == _with_boxes(grid, beside_wall, large).cells).all()
+    assert free_islands(grid, 4.0, (), 1.0) is grid
+
+
+def test_a_closet_with_a_door_in_the_middle_of_a_hall_is_no_furniture(mapped):
+    grid = _with_boxes(mapped().grid, ((0.5, 3.5), (2.0, 5.0)))
+    assert free_islands(grid, 4.0, [(0.5, 4.2)], 1.0) is grid
+    assert free_islands(grid, 4.0, [(4.0, 4.2)], 1.0) is not grid
+
+
+@pytest.mark.parametrize("name", ["paper", "best"])
+def test_tables_in_a_known_room_change_nothing_behind_the_doors(mapped, iou, name):
+    scene = mapped(closed=("t1", "t3"))
+    tables = [((9.2 + x, 3.0 + y), (10.6 + x, 4.0 + y)) for x in (0.0, 1.7) for y in (0.0, 2.0)]
+    furnished = _with_boxes(scene.grid, *tables)
+    bare, full = (predict(grid, scene.doors, preset(name)) for grid in (scene.grid, furnished))
+    for before, after in zip(bare.rooms, full.rooms, strict=True):
+        assert iou(before.polygon, after.polygon) > 0.99
+    kept = full.grid.on(furnished.frame)
+    assert (kept.occupied >= furnished.occupied)[furnished.known & (scene.grid.cells == FREE)].all()
 
 
 def test_line_of_sight_fills_a_gap_and_ends_at_the_bounds_of_the_map(mapped, iou):
