@@ -55,7 +55,8 @@ def read_features(path: Path, *, what: str = "a GeoJSON FeatureCollection") -> l
         or data.get("type") != "FeatureCollection"
         or not isinstance(data.get("features"), list)
     ):
-        raise InvalidInputError("no FeatureCollection", expected=what, where=path)
+        kind = data.get("type") if isinstance(data, dict) else type(data).__name__
+        raise InvalidInputError(f"no FeatureCollection but {kind!r}", expected=what, where=path)
     if data.get("units", "m") != "m":
         raise InvalidInputError(f"units {data['units']!r}", expected="metres in the map frame ('m')", where=path)
     if len(data["features"]) > MAX_FEATURES:
@@ -70,7 +71,11 @@ def _read_feature(number: int, feature: Any, path: Path) -> Feature:
         finite = all(math.isfinite(v) for v in shapely.get_coordinates(geometry).ravel())
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, shapely.errors.ShapelyError) as error:
         raise InvalidInputError(f"feature {number} has no readable geometry", expected="GeoJSON", where=path) from error
-    if not isinstance(properties, dict) or geometry.is_empty or not finite:
+    if not isinstance(properties, dict):
+        raise InvalidInputError(
+            f"feature {number} with properties {str(properties)[:40]!r}", expected="names and values", where=path
+        )
+    if geometry.is_empty or not finite:
         raise InvalidInputError(f"feature {number} is empty or not finite", expected="finite metres", where=path)
     return geometry, properties
 
@@ -94,13 +99,20 @@ def read_doors(path: Path) -> list[ClosedDoor]:
     Doors whose ``state`` says ``open`` are left out.
 
     Raises:
-        InvalidInputError: Another geometry, two doors of one id, a width that is no positive number.
+        InvalidInputError: Another geometry, an id that is no text or number, two doors of one id, a width that is no
+            positive number.
     """
     doors: list[ClosedDoor] = []
     seen: set[str] = set()
-    features = read_features(path, what="closed doors (GeoJSON Points or LineStrings)")
+    features = read_features(path, what="a GeoJSON FeatureCollection of closed doors (Points or LineStrings)")
     given = {str(properties["id"]) for _, properties in features if properties.get("id") is not None}
     for number, (geometry, properties) in enumerate(features):
+        if not isinstance(properties.get("id"), str | int | float | None):
+            raise InvalidInputError(
+                f"feature {number} with the id {str(properties['id'])[:40]!r}",
+                expected="a text or a number",
+                where=path,
+            )
         if properties.get("id") is None:
             numbers = range(number, number + len(features) + len(given) + 1)
             name = next(n for n in map("d{:02d}".format, numbers) if n not in given | seen)
@@ -153,7 +165,9 @@ def read_rooms(path: Path) -> list[Room]:
         InvalidInputError: Another geometry than Polygon or MultiPolygon, ``doors`` that is no list.
     """
     rooms = []
-    for number, (read, properties) in enumerate(read_features(path, what="rooms (GeoJSON Polygons)")):
+    for number, (read, properties) in enumerate(
+        read_features(path, what="a GeoJSON FeatureCollection of rooms (Polygons)")
+    ):
         doors = properties.get("doors", [])
         if not isinstance(doors, list):
             raise InvalidInputError(f"room {number} with doors {doors!r}", expected="a list of ids", where=path)

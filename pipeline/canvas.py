@@ -25,6 +25,8 @@ COURSE_START, COURSE_END = np.array([48, 18, 140]), np.array([250, 150, 20])
 COURSE_PIECES = 240
 # OpenCV takes coordinates as fixed-point numbers with this many bits behind the point.
 SHIFT = 4
+# Further out than this nothing is drawn where it is [pixels]: what a user gives may lie anywhere.
+FAR = 1e6
 
 
 class Canvas:
@@ -123,7 +125,8 @@ class Canvas:
         x0, _, _, y1 = self._bounds
         points = np.asarray(points, dtype=np.float64)
         u, v = (points[:, 0] - x0) * self.scale - 0.5, (y1 - points[:, 1]) * self.scale - 0.5
-        fixed: npt.NDArray[np.int32] = np.rint(np.column_stack((u, v)) * 2**SHIFT).astype(np.int32)
+        pixels = np.clip(np.column_stack((u, v)), -FAR, FAR)
+        fixed: npt.NDArray[np.int32] = np.rint(pixels * 2**SHIFT).astype(np.int32)
         return fixed
 
 

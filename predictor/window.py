@@ -3,11 +3,14 @@
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, CellArray, FloatArray
+from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, FREE_BELOW, OCCUPIED, OCCUPIED_ABOVE, UNKNOWN, GridFrame, OccupancyGrid
 
 # What of an interpolated cell must be occupied to stay so: below a half, as slanted walls one cell thick touch at
 # corners only.
 STAYS = 0.4
+# 10,000 x 10,000 cells are 25 ha in cells of 0.05 m, well within 1 GB; a map in metres for millimetres is beyond.
+MAX_CELLS = 100_000_000
 # Width of the Gaussian that evens out staircases [coarse cells].
 SMOOTH = 0.5
 
@@ -36,6 +39,9 @@ def at_resolution(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:
 
     A coarser cell is occupied when any of the cells whose centre it holds is, else free when any is free. Finer cells
     interpolate, so that a slanted wall does not become a staircase, which has no direction.
+
+    Raises:
+        InvalidInputError: More than :data:`MAX_CELLS` cells of ``resolution``.
     """
     frame = grid.frame
     if abs(frame.resolution - resolution) < 1e-6 * resolution:
@@ -43,6 +49,11 @@ def at_resolution(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:
     x_min, y_min, x_max, y_max = frame.bounds
     rows = max(int(np.ceil((y_max - y_min) / resolution - 1e-9)), 1)
     cols = max(int(np.ceil((x_max - x_min) / resolution - 1e-9)), 1)
+    if rows * cols > MAX_CELLS:
+        raise InvalidInputError(
+            f"a known area of {x_max - x_min:g} x {y_max - y_min:g} m in cells of {frame.resolution:g} m",
+            expected=f"at most {MAX_CELLS} cells of {resolution:g} m",
+        )
     target = GridFrame(resolution, x_min, y_min, rows, cols)
     cells = np.full(target.shape, UNKNOWN, dtype=np.int8)
     if resolution > frame.resolution:

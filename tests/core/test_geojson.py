@@ -74,7 +74,15 @@ def test_a_bow_tie_is_repaired(tmp_path: Path) -> None:
             {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, 1], [0, 0]]]}},
             "Polygon",
         ),
+        ({"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": []}}, "empty"),
+        (
+            {"type": "Feature", "properties": {}, "geometry": {"type": "MultiPoint", "coordinates": [[0, 0]]}},
+            "MultiPoint",
+        ),
+        (point(0, 0) | {"properties": ["a"]}, "properties"),
+        (point(0, 0, id={"a": 1}), "id"),
         (point(0, 0, width=-1), "width"),
+        (point(0, 0, width="wide"), "width"),
         (3, "geometry"),
     ],
 )
@@ -91,6 +99,10 @@ def test_rejects_two_doors_of_one_id_and_other_json(tmp_path: Path) -> None:
     (tmp_path / "x").write_text("[1, 2]")
     with pytest.raises(InvalidInputError, match="FeatureCollection"):
         read_doors(tmp_path / "x")
+    for alone in (point(0, 0), point(0, 0)["geometry"]):
+        (tmp_path / "x").write_text(json.dumps(alone))
+        with pytest.raises(InvalidInputError, match=f"no FeatureCollection but '{alone['type']}'"):
+            read_doors(tmp_path / "x")
     (tmp_path / "x").write_text("{")
     with pytest.raises(InvalidInputError, match="broken JSON"):
         read_doors(tmp_path / "x")

@@ -90,6 +90,67 @@ def test_the_same_command_writes_the_same_bytes(corridor: Path) -> None:
     assert written[0] == written[1]
 
 
+def test_doors_far_off_in_free_space_and_twice_the_same_are_named_and_the_others_predicted(
+    corridor: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    places = {"free": (1.5, 2.0), "twin": (6.65, 0.0), "far": (60.0, 60.0), "galaxy": (1e12, -1e300)}
+    content = json.loads((corridor / "doors.geojson").read_text())
+    for name, place in places.items():
+        geometry = {"type": "Point", "coordinates": place}
+        content["features"].append({"type": "Feature", "properties": {"id": name}, "geometry": geometry})
+    (corridor / "doors.geojson").write_text(json.dumps(content))
+    for preset in ("paper", "best"):
+        out = corridor / preset
+        words = ("predict", corridor / "map.yaml", "--doors", corridor / "doors.geojson", "--preset", preset)
+        assert call(*words, "--out", out) == 3
+        assert "1 of 5 doors predicted" in capsys.readouterr().out
+        assert json.loads((out / "run.json").read_text())["doors"]["failures"].keys() == places.keys()
+        rooms = json.loads((out / "rooms.geojson").read_text())["features"]
+        assert [room["properties"]["doors"] for room in rooms] == [["d1"]]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"image": "gone.png"}, "map image 'gone.png' is missing; expected a PGM or PNG beside the YAML"),
+        ({"image": "map.yaml"}, "a picture that cannot be read"),
+        ({"image": "absurd.pgm"}, "a picture of 200000 x 200000; expected at most"),
+        ({"image": "short.pgm"}, "a picture that cannot be read"),
+        ({"origin": "[0.0, 0.0, 0.3]"}, "map origin with yaw 0.3; expected yaw 0"),
+        ({"resolution": "0.0"}, "grid resolution 0.0"),
+        ({"resolution": "90.0"}, "in cells of 90 m; expected at most 100000000 cells of 0.05 m"),
+    ],
+)
+@pytest.mark.parametrize("preset", ["paper", "best"])
+def test_a_map_that_cannot_be_used_is_one_line_and_leaves_nothing(
+    corridor: Path, preset: str, change: dict[str, str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (corridor / "absurd.pgm").write_bytes(b"P5\n200000 200000\n255\n\0")
+    (corridor / "short.pgm").write_bytes(b"P5\n400 400\n255\n\0")
+    lines = (line.split(":", 1) for line in (corridor / "map.yaml").read_text().splitlines())
+    fields = {key: value.strip() for key, value in lines} | change
+    (corridor / "map.yaml").write_text("\n".join(f"{key}: {value}" for key, value in fields.items()))
+    out = corridor / "out"
+    words = ("predict", corridor / "map.yaml", "--doors", corridor / "doors.geojson", "--preset", preset)
+    assert call(*words, "--out", out) == 1
+    assert message in one_line(capsys)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("preset", ["paper", "best"])
+@pytest.mark.parametrize("fill", [UNKNOWN, FREE, OCCUPIED])
+def test_a_map_of_one_kind_is_written_as_it_is_with_the_reason_for_every_door(
+    tmp_path: Path, corridor: Path, preset: str, fill: int
+) -> None:
+    frame = GridFrame(0.05, 0.0, -3.0, 200, 200)
+    write_map(tmp_path / "plain", OccupancyGrid(frame, np.full(frame.shape, fill, dtype=np.int8)))
+    out = tmp_path / "out"
+    words = ("predict", tmp_path / "plain.yaml", "--doors", corridor / "doors.geojson", "--preset", preset)
+    assert call(*words, "--out", out) == 3
+    assert set(json.loads((out / "run.json").read_text())["doors"]["failures"]) == {"d1"}
+    assert (read_map(out / "predicted.yaml").cells == fill).all()
+
+
 @pytest.mark.parametrize("command", ["predict", "cover"])
 def test_a_missing_map_is_one_line_and_status_1(
     tmp_path: Path, command: str, capsys: pytest.CaptureFixture[str]
