@@ -127,12 +127,19 @@ def search_heading(field: LikelihoodField, points: FloatArray, guess: Pose2, sig
     step = _angle_step(field, points)
     count = math.ceil(reach * sigma / step)
     turns: FloatArray = np.arange(-count, count + 1, dtype=np.float64) * step
-    rows, cols = _cells(field, points, guess, turns)
     lattice = field.lattice
-    # What lies outside reads the border, which is zero.
-    rows = np.clip(rows - lattice.row0, 0, lattice.rows - 1)
-    cols = np.clip(cols - lattice.col0, 0, lattice.cols - 1)
-    likelihoods = field.values.reshape(-1).take(rows * lattice.cols + cols)
+    cells = _exact_cells(field, points, guess, turns)
+    np.floor(cells, out=cells)
+    rows, cols = cells[:, 1::2], cells[:, ::2]
+    middle, far = (guess.x / lattice.resolution, guess.y / lattice.resolution), _farthest(points) / lattice.resolution
+    if not lattice.holds(middle, far + 1.0):
+        # What lies outside reads the border, which is zero.
+        rows = np.clip(rows, lattice.row0, lattice.row0 + lattice.rows - 1)
+        cols = np.clip(cols, lattice.col0, lattice.col0 + lattice.cols - 1)
+    flat = rows * lattice.cols
+    flat += cols
+    flat -= lattice.row0 * lattice.cols + lattice.col0
+    likelihoods = field.values.reshape(-1).take(flat.astype(np.int64))
     scores = likelihoods.mean(axis=1, dtype=np.float64) - PRIOR_COST * (turns / sigma) ** 2
     # From the middle outwards, so that the odometry wins ties.
     order = np.argsort(np.abs(turns), kind="stable")
@@ -169,12 +176,23 @@ def _surroundings(
 
 def _cells(field: LikelihoodField, points: FloatArray, guess: Pose2, turns: FloatArray) -> tuple[IntArray, IntArray]:
     """Rows and columns of the unbounded lattice that the points fall in for each turn, shape (turns, n) each."""
-    cell = field.lattice.resolution
+    cells = np.floor(_exact_cells(field, points, guess, turns)).astype(np.int64)
+    return cells[:, 1::2], cells[:, ::2]
+
+
+def _exact_cells(field: LikelihoodField, points: FloatArray, guess: Pose2, turns: FloatArray) -> FloatArray:
+    """Where the points lie on the unbounded lattice for each turn, in cells: ``x, y, x, y, ...``, shape (turns, 2n)."""
     # As complex numbers, a turn is one product.
     at = np.exp(1j * (guess.theta + turns))[:, None] * np.ascontiguousarray(points).view(np.complex128)[:, 0]
     at += complex(guess.x, guess.y)
-    cells = np.floor(at.view(np.float64) * (1.0 / cell)).astype(np.int64)
-    return cells[:, 1::2], cells[:, ::2]
+    cells: FloatArray = at.view(np.float64)
+    cells *= 1.0 / field.lattice.resolution
+    return cells
+
+
+def _farthest(points: FloatArray) -> float:
+    """Distance of the farthest point from the origin [m], 0 without points."""
+    return math.sqrt(float(np.einsum("ij,ij->i", points, points).max(initial=0.0)))
 
 
 def _bounds(values: Float32Array, rows: IntArray, cols: IntArray, half: int, cells: int) -> FloatArray:

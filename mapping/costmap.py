@@ -68,6 +68,7 @@ class NavigationMap:
         self.config = config
         self.free: Image = np.zeros((0, 0), dtype=np.uint8)
         self.blocked: Image = np.zeros((0, 0), dtype=np.uint8)
+        self._grid: OccupancyGrid | None = None
         self._grid_frame: GridFrame | None = None
         self._cells: CellArray = np.zeros((0, 0), dtype=np.int8)
         self._extra: Image = np.zeros((0, 0), dtype=np.uint8)
@@ -91,6 +92,9 @@ class NavigationMap:
 
     def update(self, grid: OccupancyGrid) -> None:
         """Take over the map as it is now."""
+        if self._grid is grid and self._grid_frame is not None:
+            return
+        self._grid = grid
         if self._grid_frame != grid.frame:
             self._begin(grid)
             rows, cols = self._cells.shape

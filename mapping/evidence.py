@@ -52,6 +52,8 @@ class EvidenceGrid:
         self._passes = np.zeros(shape, dtype=np.int32)
         self._cells: CellArray = np.full(shape, UNKNOWN, dtype=np.int8)
         self._dirty: Window | None = None
+        self._grid: OccupancyGrid | None = None
+        self._percent: CellArray = self._probabilities(1, 1)
 
     def add(self, beams: Beams, map_T_robot: Pose2, *, sign: int = 1) -> None:
         """Count a scan in (``sign`` 1) or out again (-1, at the very pose it was added at).
@@ -130,33 +132,38 @@ class EvidenceGrid:
 
     def grid(self) -> OccupancyGrid:
         """The map: probability in percent where anything was observed, else unknown."""
+        if self._dirty is None and self._grid is not None:
+            return self._grid
         if self._dirty is not None:
             row, col, n_rows, n_cols = self._dirty
             rows, cols = slice(row, row + n_rows), slice(col, col + n_cols)
-            self._cells[rows, cols] = self._probabilities(self._hits[rows, cols], self._passes[rows, cols])
+            hits, passes = self._hits[rows, cols], self._passes[rows, cols]
+            most_hits, most_passes = self._percent.shape
+            if hits.max() >= most_hits or passes.max() >= most_passes:
+                most_hits = max(most_hits, 16 + int(1.25 * hits.max()))
+                most_passes = max(most_passes, 16 + int(1.25 * passes.max()))
+                self._percent = self._probabilities(most_hits, most_passes)
+            places = hits * self._percent.shape[1]
+            places += passes
+            self._cells[rows, cols] = self._percent.ravel().take(places)
             self._dirty = None
         cells = self._cells.copy()
         cells.flags.writeable = False  # so that it is not copied again
-        return OccupancyGrid(self._lattice.frame, cells)
+        self._grid = OccupancyGrid(self._lattice.frame, cells)
+        return self._grid
 
-    def _probabilities(
-        self,
-        hits: np.ndarray[tuple[int, ...], np.dtype[np.int32]],
-        passes: np.ndarray[tuple[int, ...], np.dtype[np.int32]],
-    ) -> CellArray:
+    def _probabilities(self, hits: int, passes: int) -> CellArray:
+        """Probability in percent for each number of hits (rows) and passes (columns): a look-up is quicker."""
         config = self._config
-        odds = hits * np.float32(config.log_odds_hit)
-        odds -= passes * np.float32(config.log_odds_pass)
-        odds *= np.float32(10.0)
-        # Rounded to a tenth: the table below is exact and quick, an exponential per cell is not.
-        np.rint(odds, out=odds)
+        odds = np.arange(hits)[:, None] * np.float32(config.log_odds_hit)
+        odds = odds - np.arange(passes) * np.float32(config.log_odds_pass)
+        # Rounded to a tenth: the table below is exact on every machine, an exponential per cell is not.
+        odds = np.rint(odds * np.float32(10.0))
         limit = round(10 * config.log_odds_limit)
-        np.clip(odds, -limit, limit, out=odds)
-        odds += np.float32(limit)
         table = np.rint(100.0 / (1.0 + np.exp(-np.arange(-limit, limit + 1) / 10.0))).astype(np.int8)
-        cells: CellArray = table.take(odds.astype(np.int32))
-        cells[(hits | passes) == 0] = UNKNOWN
-        return cells
+        percent: CellArray = table.take(np.clip(odds, -limit, limit).astype(np.int64) + limit)
+        percent[0, 0] = UNKNOWN
+        return percent
 
 
 def _union(a: Window, b: Window) -> Window:

@@ -10,6 +10,7 @@ from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.mapping.costmap import Image, NavigationMap
 from closedrooms.mapping.navigation_config import NavigationConfig
+from closedrooms.mapping.planning import nonzero_cells
 
 CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 SQUARE = np.ones((3, 3), dtype=np.uint8)
@@ -35,12 +36,21 @@ class Frontiers:
 
     def within(self, distance: float, chosen: BoolArray) -> BoolArray:
         """Free cells that lie within a way of ``distance`` [m] from a chosen point; ``chosen`` has shape (n,)."""
+        near = np.zeros(self.frame.shape, dtype=np.bool_)
         cells = self.frame.to_cells(self.points[chosen])
-        grown = np.zeros(self.frame.shape, dtype=np.uint8)
-        grown[cells[:, 0], cells[:, 1]] = 1
-        for _ in range(round(distance / self.frame.resolution)):
-            grown = np.asarray(cv2.dilate(grown, CROSS), dtype=np.uint8) & self.free | grown
-        return grown.view(np.bool_)
+        if len(cells) == 0:
+            return near
+        steps = round(distance / self.frame.resolution)
+        # So far from the outermost cells nothing is reached.
+        row, col = np.maximum(cells.min(axis=0) - steps, 0)
+        last_row, last_col = cells.max(axis=0) + steps + 1
+        free = self.free[row:last_row, col:last_col]
+        grown = np.zeros(free.shape, dtype=np.uint8)
+        grown[cells[:, 0] - row, cells[:, 1] - col] = 1
+        for _ in range(steps):
+            grown = np.asarray(cv2.dilate(grown, CROSS), dtype=np.uint8) & free | grown
+        near[row:last_row, col:last_col] = grown.view(np.bool_)
+        return near
 
 
 def find_frontiers(
@@ -57,17 +67,18 @@ def find_frontiers(
         The frontiers; their arrays are empty when there is none.
     """
     frame, free = navigation.frontier_frame, navigation.free
-    area = _unknown_area(free, navigation.blocked, frame.resolution)
-    border = ((area >= config.min_unknown_area) & (free > 0)).astype(np.uint8)
+    # Few cells are border: those are looked at, not the whole map.
+    cells, area = _edge(free, navigation.blocked, frame.resolution)
+    worth = area >= config.min_unknown_area
     if given_up is not None and len(given_up):
         at = frame.to_cells(given_up)
         at = at[frame.contains(at)]
-        vain = np.zeros_like(border)
+        vain = np.zeros_like(free)
         vain[at[:, 0], at[:, 1]] = 1
-        border[cv2.dilate(vain, SQUARE) > 0] = 0
-    # Few cells are border: those are counted, not the whole map.
-    cells = cv2.findNonZero(border)
-    cols, rows = np.empty((2, 0), dtype=np.int64) if cells is None else np.asarray(cells, dtype=np.int64).T
+        worth &= np.asarray(cv2.dilate(vain, SQUARE))[cells[:, 0], cells[:, 1]] == 0
+    (rows, cols), area = cells[worth].T, area[worth]
+    border = np.zeros_like(free)
+    border[rows, cols] = 1
     count, labels = cv2.connectedComponents(border, connectivity=8, ltype=cv2.CV_32S)
     label = np.asarray(labels)[rows, cols]
     long_enough = np.bincount(label, minlength=count) * frame.resolution >= config.min_frontier - 1e-9
@@ -75,21 +86,39 @@ def find_frontiers(
     number = np.full(count, -1, dtype=np.int64)
     number[long_enough] = np.arange(int(long_enough.sum()))
     owner = number[label]
-    rows, cols, owner = rows[owner >= 0], cols[owner >= 0], owner[owner >= 0]
+    rows, cols, area, owner = rows[owner >= 0], cols[owner >= 0], area[owner >= 0], owner[owner >= 0]
     largest = np.zeros(int(long_enough.sum()))
-    np.maximum.at(largest, owner, area[rows, cols])
+    np.maximum.at(largest, owner, area)
     points = frame.to_points(np.stack((rows, cols), axis=-1))
     return Frontiers(frame, points, owner, largest, free)
 
 
-def _unknown_area(free: Image, blocked: Image, resolution: float) -> npt.NDArray[np.float32]:
-    """Area of the largest unknown patch in the four-neighbourhood of each cell [m2]."""
+def _edge(free: Image, blocked: Image, resolution: float) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float32]]:
+    """Free cells beside unknown ones, and the area of the largest unknown patch that each is beside.
+
+    Returns:
+        Cells ``(row, col)`` in their order, shape (n, 2), and areas [m2], shape (n,).
+    """
     unknown = (1 - (free | blocked)).astype(np.uint8)
     _, found = cv2.connectedComponents(unknown, connectivity=4, ltype=cv2.CV_32S)
     labels: npt.NDArray[np.int32] = np.asarray(found, dtype=np.int32)
-    areas = np.bincount(labels.ravel()).astype(np.float32) * np.float32(resolution**2)
+    # Counted by runs of one label: few, where there are many cells.
+    flat = labels.ravel()
+    ends = np.append(np.flatnonzero(flat[1:] != flat[:-1]), flat.size - 1)
+    counts = np.bincount(flat[ends], np.diff(ends, prepend=-1))
+    areas = counts.astype(np.float32) * np.float32(resolution**2)
     areas[0] = 0.0
-    return np.asarray(cv2.dilate(areas.take(labels), CROSS), dtype=np.float32)
+    beside_unknown = np.asarray(cv2.dilate(unknown, CROSS), dtype=np.uint8)
+    cells = nonzero_cells((beside_unknown & free).view(np.bool_))
+    rows, cols = cells.T
+    last_row, last_col = free.shape[0] - 1, free.shape[1] - 1
+    beside = (
+        labels[np.maximum(rows - 1, 0), cols],
+        labels[np.minimum(rows + 1, last_row), cols],
+        labels[rows, np.maximum(cols - 1, 0)],
+        labels[rows, np.minimum(cols + 1, last_col)],
+    )
+    return cells, np.asarray(areas[np.stack(beside)].max(axis=0))
 
 
 def seen_from(navigation: NavigationMap, place: tuple[float, float], points: FloatArray, reach: float) -> FloatArray:

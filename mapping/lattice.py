@@ -37,6 +37,11 @@ class Lattice:
         cells = np.floor(points * (1.0 / self.resolution)).astype(np.int64)
         return cells[:, 1] - self.row0, cells[:, 0] - self.col0
 
+    def holds(self, middle: tuple[float, float], reach: float) -> bool:
+        """Whether the window holds all that is within ``reach`` of a place ``(x, y)``; both in cells."""
+        (x, y), right, top = middle, self.col0 + self.cols, self.row0 + self.rows
+        return self.col0 <= x - reach and x + reach < right and self.row0 <= y - reach and y + reach < top
+
     def cover(self, low: FloatArray, high: FloatArray, margin: int) -> tuple[tuple[int, int], tuple[int, int]] | None:
         """Grow the window until it holds the box from ``low`` to ``high``, ``(x, y)`` [m], and ``margin`` cells.
 

@@ -41,6 +41,7 @@ class Mapper:
         self._hessian: FloatArray = np.zeros((3, 3))
         self._tied_at = self._tried_at = 0.0
         self._places: FloatArray = np.empty((0, 2))
+        self._driven: FloatArray = np.empty(0)
         self._drawn = 0
         self._trusted = True
         self._evidence = EvidenceGrid(self._config)
@@ -140,6 +141,7 @@ class Mapper:
         if keyframe.index > 0:
             self._tie_to_previous(keyframe)
         self._places = np.vstack((self._places, (keyframe.pose.x, keyframe.pose.y)))
+        self._driven = np.append(self._driven, keyframe.way)
         distances = self._distances(keyframe)
         self._tie_to_older(keyframe, distances)
         if self._config.loops.enabled and self._close_loop(keyframe, distances):
@@ -167,8 +169,7 @@ class Mapper:
         loops = self._config.loops
         if keyframe.way - self._tied_at < loops.link_interval:
             return
-        ways = np.array([k.way for k in self._keyframes])
-        older = (keyframe.way - ways > loops.horizon / 2) & (self._graph.ways <= loops.horizon)
+        older = (keyframe.way - self._driven > loops.horizon / 2) & (self._graph.ways <= loops.horizon)
         candidates = np.flatnonzero(older & (distances <= loops.link_distance))
         if candidates.size == 0:
             return

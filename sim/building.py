@@ -72,6 +72,7 @@ class Building:
         self.obstacles = Obstacles(edges_of(solids), Drive.reach(config.robot))
         self.solids = solids
         self.doors: dict[str, Door] = {}
+        self._opening = 0
         for plan_door in inner:
             leaves = door_leaves(plan, plan_door, solids, config.swing)
             body = physics.add_moving([_part(leaf) for leaf in leaves])
@@ -90,12 +91,12 @@ class Building:
         """
         _check_doors(self.plan, [door_id], list(self.doors))
         door = self.doors[door_id]
-        door.opens = door.opening < 1.0
+        self._set_out(door, door.opening < 1.0)
 
     @property
     def moving(self) -> bool:
         """Whether a door is on its way."""
-        return any(door.opens for door in self.doors.values())
+        return self._opening > 0
 
     def advance(self, duration: float, x: float, y: float, radius: float) -> None:
         """Move the doors that open.
@@ -115,7 +116,11 @@ class Building:
             if any(Polygon(corners).distance(robot) <= radius + 1e-3 for corners in door.corners(opening)):
                 continue
             self._put(door, opening)
-            door.opens = opening < 1.0
+            self._set_out(door, opening < 1.0)
+
+    def _set_out(self, door: Door, opens: bool) -> None:
+        self._opening += int(opens) - int(door.opens)
+        door.opens = opens
 
     def _put(self, door: Door, opening: float) -> None:
         door.opening = opening
