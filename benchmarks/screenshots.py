@@ -66,8 +66,16 @@ def _tabs(blueprint: dict[str, Any]) -> tuple[str, dict[str, str]]:
     containers = {
         path: content["ContainerBlueprint"] for path, content in blueprint.items() if "ContainerBlueprint" in content
     }
-    root = max((p for p in containers if "active_tab" in containers[p]), key=lambda p: len(containers[p]["contents"]))
-    return root, {containers[f"/{tab}"]["display_name"]: tab for tab in containers[root]["contents"]}
+    inner = {f"/{path}" for container in containers.values() for path in container["contents"]}
+    root = next(path for path in containers if path not in inner and "active_tab" in containers[path])
+    return root, {_name(blueprint[f"/{tab}"]): tab for tab in containers[root]["contents"]}
+
+
+def _name(content: dict[str, Any]) -> str:
+    """What a tab that holds a container or a single view is called."""
+    return str(
+        next(content[kind]["display_name"] for kind in ("ContainerBlueprint", "ViewBlueprint") if kind in content)
+    )
 
 
 if __name__ == "__main__":
