@@ -74,7 +74,7 @@ def _concentration(angles: FloatArray, lengths: FloatArray, centres: FloatArray,
 
 
 def _modes(angles: FloatArray, weights: FloatArray, bandwidth: float) -> FloatArray:
-    """Where mean shift ends when started from every angle: heaviest first, a bandwidth apart, shape (k,)."""
+    """Where mean shift ends when started from every angle: most wall first, a bandwidth apart, shape (k,)."""
     starts, inverse = np.unique(angles.round(9), return_inverse=True)
     angles = starts
     weights = np.asarray(np.bincount(inverse, weights=weights, minlength=starts.size), dtype=np.float64)
@@ -86,7 +86,8 @@ def _modes(angles: FloatArray, weights: FloatArray, bandwidth: float) -> FloatAr
         points = points + step
         if np.abs(step).max(initial=0.0) < 1e-7:
             break
-    inside = np.abs(angle_between(angles[None, :], points[:, None])) <= bandwidth
+    # By what lies in the direction itself: in the middle between two wings, the kernel holds both and no wall does.
+    inside = np.abs(angle_between(angles[None, :], points[:, None])) <= NARROW
     mass = (weights[None, :] * inside).sum(axis=1)
     modes: list[float] = []
     for i in np.lexsort((starts, -mass.round(9))):

@@ -35,7 +35,7 @@ def _at(arrangement, x, y):
 
 
 @given(LINES)
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)
 def test_faces_tile_the_box_without_overlap(lines):
     arrangement = arrange(lines, BOX)
     box = box_of(BOX)
@@ -48,7 +48,7 @@ def test_faces_tile_the_box_without_overlap(lines):
 
 
 @given(LINES)
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)
 def test_neighbours_are_symmetric_and_share_their_edge(lines):
     arrangement = arrange(lines, BOX)
     for face, beside in enumerate(arrangement.neighbours):
@@ -61,7 +61,7 @@ def test_neighbours_are_symmetric_and_share_their_edge(lines):
 
 
 @given(LINES)
-@settings(max_examples=40)
+@settings(max_examples=40, deadline=None)
 def test_border_faces_are_those_that_touch_the_box(lines):
     arrangement = arrange(lines, BOX)
     ring = box_of(BOX).exterior
