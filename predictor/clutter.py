@@ -9,6 +9,9 @@ from closedrooms.core.grid import FREE, OccupancyGrid
 from closedrooms.predictor.rose import find_rose
 from closedrooms.predictor.window import known_window
 
+# Walls are thinner than this [m]; tables and cupboards are not, and fill this share of the rectangle around them.
+THIN, FILLED = 0.5, 0.5
+
 
 def filter_clutter(grid: OccupancyGrid) -> OccupancyGrid:
     """The same map with what stands free of the walls turned free.
@@ -39,11 +42,12 @@ def filter_clutter(grid: OccupancyGrid) -> OccupancyGrid:
 
 
 def free_islands(grid: OccupancyGrid, area: float, doors: Sequence[Point], reach: float) -> OccupancyGrid:
-    """The same map with small pieces that free space surrounds turned free, hollows and all.
+    """The same map with furniture that free space surrounds turned free, hollows and all.
 
     A table in the middle of a room has straight sides as long as a wall's; its lines part rooms. Where walls are
-    looked for it is better gone. A closed closet in the middle of a hall looks the same from outside: what is near a
-    door stays.
+    looked for it is better gone. Three things that free space surrounds look alike and stay: a piece of wall between
+    open doors, which is thin; a corner or crossing of walls, which leaves most of its rectangle free; and a closed
+    closet in the middle of a hall, which has a door.
 
     Args:
         grid: A map, cropped to what is known with unknown cells around it.
@@ -56,16 +60,15 @@ def free_islands(grid: OccupancyGrid, area: float, doors: Sequence[Point], reach
     if area <= 0.0:
         return grid
     _, pieces, figures, _ = cv2.connectedComponentsWithStats((~grid.free).astype(np.uint8), connectivity=8)
-    small = figures[:, cv2.CC_STAT_AREA] < area / grid.frame.resolution**2
-    small[0] = False  # what is free
+    cells = figures[:, cv2.CC_STAT_AREA] * grid.frame.resolution**2
     edge = np.concatenate((pieces[0], pieces[-1], pieces[:, 0], pieces[:, -1]))
-    small[edge] = False
-    if doors and small.any():
-        places = np.argwhere(small[pieces])
-        points = grid.frame.to_points(places)
-        for door in doors:
-            near = places[np.hypot(*(points - door).T) <= reach]
-            small[pieces[near[:, 0], near[:, 1]]] = False
-    if not small.any():
+    gone = np.zeros(len(figures), dtype=np.bool_)
+    for piece in np.setdiff1d(np.flatnonzero((cells < area) & (cells >= FILLED * THIN**2)), (0, *edge)):
+        left, top, width, height = figures[piece, :4]
+        own = np.argwhere(pieces[top : top + height, left : left + width] == piece) + np.array((top, left))
+        sides = (np.array(cv2.minAreaRect(own.astype(np.float32))[1]) + 1.0) * grid.frame.resolution
+        away = (np.hypot(*(grid.frame.to_points(own) - door).T).min() > reach for door in doors)
+        gone[piece] = sides.min() >= THIN and cells[piece] >= FILLED * sides.prod() and all(away)
+    if not gone.any():
         return grid
-    return OccupancyGrid(grid.frame, np.where(small[pieces], np.int8(FREE), grid.cells))
+    return OccupancyGrid(grid.frame, np.where(gone[pieces], np.int8(FREE), grid.cells))

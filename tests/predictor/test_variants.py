@@ -63,6 +63,12 @@ def test_small_pieces_that_free_space_surrounds_are_freed_with_their_hollows(map
     assert free_islands(grid, 4.0, (), 1.0) is grid
 
 
+def test_a_piece_of_wall_and_a_crossing_of_walls_between_open_doors_are_no_furniture(mapped):
+    wall, bar, post = ((0.5, 3.0), (3.5, 3.2)), ((0.5, 5.0), (3.5, 5.2)), ((1.9, 4.0), (2.1, 6.2))
+    grid = _with_boxes(mapped().grid, wall, bar, post)
+    assert free_islands(grid, 4.0, (), 1.0) is grid
+
+
 def test_a_closet_with_a_door_in_the_middle_of_a_hall_is_no_furniture(mapped):
     grid = _with_boxes(mapped().grid, ((0.5, 3.5), (2.0, 5.0)))
     assert free_islands(grid, 4.0, [(0.5, 4.2)], 1.0) is grid
