@@ -6,13 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, Polygon
+from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.predictor.lines import Line
 
 # Slanted lines that meet nearly in a point leave slivers; smaller faces and shorter edges mean nothing [m2, m].
 MIN_FACE, MIN_EDGE = 1e-6, 1e-4
+# Corners closer than this are one where a union comes out wrong [m].
+SNAP = 1e-7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +63,18 @@ def arrange(lines: Sequence[Line], boundary: Sequence[Line]) -> Arrangement:
     kept = shapely.contains_xy(box, middles[:, 0], middles[:, 1]) & (shapely.area(pieces) > MIN_FACE)
     faces = _ordered([shapely.geometry.polygon.orient(p) for p in pieces[kept]])
     return _connect((*lines, *boundary), faces, box)
+
+
+def joined(faces: Sequence[Polygon]) -> Polygon | MultiPolygon:
+    """The union of faces, valid.
+
+    Where three lines cross in nearly one point, two faces may end at corners a rounding error apart; their union then
+    comes out as the one with the other as a hole outside of it.
+    """
+    whole = shapely.union_all(list(faces))
+    if not isinstance(whole, Polygon) or not whole.is_valid:
+        whole = shapely.union_all(list(faces), grid_size=SNAP)
+    return whole  # type: ignore[return-value]
 
 
 def box_of(boundary: Sequence[Line]) -> Polygon:

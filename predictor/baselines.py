@@ -10,6 +10,7 @@ from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
+from closedrooms.predictor.arrangement import joined
 from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.inpaint import inpaint, passage
 from closedrooms.predictor.prediction import Prediction, Shape
@@ -157,7 +158,7 @@ def _faces_in_sight(start: Start, room: int) -> Shape:
             if other not in seen and inner[other] and _in_sight(start, inner, eye, other):
                 seen.add(other)
                 queue.append(other)
-    return shapely.union_all([arrangement.faces[face] for face in sorted(seen)])  # type: ignore[return-value]
+    return joined([arrangement.faces[face] for face in sorted(seen)])
 
 
 def _in_sight(start: Start, inner: BoolArray, eye: FloatArray, face: int) -> bool:

@@ -5,6 +5,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from closedrooms.core.room import Room, RoomKind
+from closedrooms.predictor.arrangement import joined
 from closedrooms.predictor.border import border_rooms
 from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.expansion import Growth
@@ -53,6 +54,6 @@ def finish_rooms(start: Start, growth: Growth, config: PredictorConfig) -> tuple
 
 def union(growth: Growth, room: int) -> Polygon:
     """The layout of a room as one polygon [m]."""
-    whole = shapely.union_all([growth.arrangement.faces[face] for face in growth.layout(room)])
+    whole = joined([growth.arrangement.faces[face] for face in growth.layout(room)])
     assert isinstance(whole, Polygon), "a layout is connected by edges"
     return whole

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.predictor.arrangement import arrange, box_of
+from closedrooms.predictor.arrangement import arrange, box_of, joined
 from closedrooms.predictor.initial import find_entrance, splits_between
 from closedrooms.predictor.lines import Line
 from closedrooms.predictor.unknown import observed_shares, unknown_faces
@@ -90,6 +90,21 @@ def _half_known():
     cells = np.full(frame.shape, UNKNOWN, dtype=np.int8)
     cells[:100] = FREE  # all below y = 0
     return OccupancyGrid(frame, cells)
+
+
+def test_faces_whose_corners_are_a_rounding_error_apart_are_joined():
+    west = shapely.Polygon([
+        (-15.27470246699104, -5.572209709928908), (-19.67195971653084, -5.571510574244614),
+        (-19.671260580846546, -1.1742533247048115), (-15.274003331306744, -1.1749524603891062),
+    ])  # fmt: skip
+    east = shapely.Polygon([
+        (-15.27470246699104, -5.5722097099289085), (-12.225000000000003, -5.572694593050399),
+        (-12.225000000000003, -1.1754372323525097), (-15.274003331306744, -1.1749524603891062),
+    ])  # fmt: skip
+    both = joined([west, east])
+    assert both.is_valid
+    assert both.geom_type == "Polygon"
+    assert both.area == pytest.approx(west.area + east.area, abs=1e-5)
 
 
 def test_shares_are_exact_where_lines_run_between_and_through_cells():
