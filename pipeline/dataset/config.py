@@ -11,6 +11,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.navigation_config import NavigationConfig
 from closedrooms.pipeline.config import NoiseName
+from closedrooms.pipeline.options import check_least
 from closedrooms.sim.config import SimConfig
 
 MapSource = Literal["erased", "simulated"]
@@ -66,10 +67,6 @@ class DatasetConfig:
     def __post_init__(self) -> None:
         if not self.worlds:
             raise InvalidInputError("no world", expected="names of bundled worlds, files, or all")
-        for name, least in (("repetitions", 1), ("max_closed", 1), ("workers", 1), ("seed", 0)):
-            value = getattr(self, name)
-            if value < least:
-                option = name.replace("_", "-")
-                raise InvalidInputError(f"--{option} {value}", expected=f"a whole number of at least {least}")
+        check_least(self, repetitions=1, max_closed=1, workers=1, seed=0)
         if self.scheduler is not None and not re.fullmatch(r"(tcp|tls|ws|ucx)://\S+:\d+", self.scheduler):
             raise InvalidInputError(f"--scheduler {self.scheduler}", expected="tcp://host:port")

@@ -7,6 +7,7 @@ from typing import Literal
 import tyro
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.pipeline.options import check_least
 
 Method = Literal["paper", "best", "rose", "line-of-sight", "geometric"]
 METHODS: tuple[Method, ...] = ("paper", "best", "rose", "line-of-sight", "geometric")
@@ -52,7 +53,4 @@ class EvaluateConfig:
             raise InvalidInputError("no dataset", expected="at least one folder")
         if not self.methods or len(set(self.methods)) != len(self.methods):
             raise InvalidInputError(f"methods {self.methods}", expected=f"each once, of {', '.join(METHODS)}")
-        for name in ("workers", "resamples", "subset_worlds", "subset_repetitions"):
-            if getattr(self, name) < 1:
-                option = name.replace("_", "-")
-                raise InvalidInputError(f"--{option} {getattr(self, name)}", expected="at least 1")
+        check_least(self, workers=1, resamples=1, subset_worlds=1, subset_repetitions=1)

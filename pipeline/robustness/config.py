@@ -10,6 +10,7 @@ import tyro
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.navigation_config import NavigationConfig
+from closedrooms.pipeline.options import check_least
 from closedrooms.sim.config import SimConfig
 
 Preset = Literal["paper", "best"]
@@ -91,9 +92,7 @@ class RobustnessConfig:
             raise InvalidInputError("no world", expected="names of bundled worlds, files, or all")
         if not self.factors or len(set(self.factors)) != len(self.factors):
             raise InvalidInputError(f"factors {self.factors}", expected=f"each once, of {', '.join(FACTORS)}")
-        for name, least in (("repetitions", 1), ("closed", 1), ("workers", 1), ("resamples", 1), ("seed", 0)):
-            if getattr(self, name) < least:
-                raise InvalidInputError(f"--{name} {getattr(self, name)}", expected=f"at least {least}")
+        check_least(self, repetitions=1, closed=1, workers=1, resamples=1, seed=0)
         for factor in FACTORS[:-1]:
             levels: tuple[float, ...] = getattr(self, factor)
             share = factor in {"dropouts", "missed", "furniture"}

@@ -182,6 +182,9 @@ def test_an_output_folder_with_other_files_is_refused_and_kept(
         (("run", "office-01", "--close", "-1"), "--close"),
         (("run", "office-01", "--close", "2", "--close-doors", "d01"), "one of them"),
         (("worlds", "show", "no-such-world", "--out", "x.png"), "no-such-world"),
+        (("dataset", "office-01", "--max-closed", "0", "--out", "x"), "--max-closed 0; expected a whole number of at"),
+        (("robustness", "office-01", "--workers", "0", "--out", "x"), "--workers 0; expected a whole number of at"),
+        (("evaluate", "x", "--subset-worlds", "0", "--out", "x"), "--subset-worlds 0; expected a whole number of at"),
     ],
 )
 def test_a_wrong_world_or_door_is_one_line_and_status_1(
