@@ -81,6 +81,22 @@ def test_both_figures_stand_in_the_table_and_agree_where_they_should(evaluated: 
     assert pq.read_table(evaluated / "out" / "rooms.parquet").num_rows == len(rows)
 
 
+def test_a_hidden_room_whose_door_was_not_seen_counts_nothing_in_a_column_of_its_own(tmp_path: Path) -> None:
+    write_sample(tmp_path / "data" / "01")
+    rooms = tmp_path / "data" / "01" / "truth_rooms.geojson"
+    write_rooms(rooms, [*read_rooms(rooms), Room(box(0.5, 2.7, 5.0, 7.5), ("unseen",))])
+    evaluate(EvaluateConfig(datasets=(tmp_path / "data",), out=tmp_path / "out", methods=("paper",), workers=1))
+    with (tmp_path / "out" / "summary.csv").open() as file:
+        row = next(row for row in csv.DictReader(file) if row["closed_doors"] == "all")
+    assert (row["rooms_by_door"], row["not_seen"]) == ("1", "1")
+    assert float(row["by_door_mean"]) > 0.85
+    # Both are written with six digits.
+    assert float(row["with_unseen_mean"]) == pytest.approx(float(row["by_door_mean"]) / 2, abs=1e-6)
+    with (tmp_path / "out" / "rooms.csv").open() as file:
+        unseen = [row for row in csv.DictReader(file) if row["room"] == "unseen"]
+    assert [(row["measure"], float(row["iou"])) for row in unseen] == [("not seen", 0.0)]
+
+
 def test_goes_on_where_it_stopped_and_ends_with_the_same_figures(evaluated: Path) -> None:
     out = evaluated / "out"
     before = (out / "rooms.csv").read_bytes()
