@@ -1,5 +1,6 @@
 """Errors that a user can cause, each worth one clear line."""
 
+import traceback
 from pathlib import Path
 
 
@@ -24,3 +25,10 @@ class InvalidInputError(ClosedroomsError):
 
 class OutputError(ClosedroomsError):
     """The output folder cannot be written, or holds something that is not ours."""
+
+
+def internal(error: Exception) -> str:
+    """A defect of the program in one line, with the place where it showed: for work that goes on with the next job."""
+    last = traceback.extract_tb(error.__traceback__)[-1:]
+    place = "".join(f" ({Path(frame.filename).name}:{frame.lineno})" for frame in last)
+    return f"internal error, please report it: {type(error).__name__}: {' '.join(str(error).split())[:300]}{place}"

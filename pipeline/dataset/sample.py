@@ -10,7 +10,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.errors import ClosedroomsError, OutputError
+from closedrooms.core.errors import ClosedroomsError, OutputError, internal
 from closedrooms.core.files import output_folder
 from closedrooms.core.geojson import write_doors, write_rooms
 from closedrooms.core.grid import GridFrame, OccupancyGrid
@@ -91,7 +91,7 @@ class Observed:
 
 
 def make(task: Task) -> Outcome:
-    """Make one survey or sample and write it; nothing that goes wrong is raised but programming errors."""
+    """Make one survey or sample and write it; nothing that goes wrong is raised, it is told."""
     try:
         plan = _plan(task.world.source)
         if task.variant is None:
@@ -105,6 +105,8 @@ def make(task: Task) -> Outcome:
         return Outcome(trouble=str(error))
     except ClosedroomsError as error:
         return Outcome(failure=str(error))
+    except Exception as error:  # a defect that one building brings out must not cost the thousands of others
+        return Outcome(failure=internal(error))
     return Outcome()
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray
-from closedrooms.core.errors import ClosedroomsError, OutputError
+from closedrooms.core.errors import ClosedroomsError, OutputError, internal
 from closedrooms.core.files import write_json
 from closedrooms.core.geojson import write_rooms
 from closedrooms.core.grid import OccupancyGrid
@@ -105,6 +105,9 @@ def evaluate_sample(sample: SamplePath, methods: Sequence[str], out: Path, *, to
                 raise
             except ClosedroomsError as error:
                 outcome.problems[f"{method} {sample.name}"] = str(error)
+                continue
+            except Exception as error:  # a defect that one map brings out must not cost the thousands of others
+                outcome.problems[f"{method} {sample.name}"] = internal(error)
                 continue
             write_json(folder / RESULT, scores)
         outcome.scores.append(scores)

@@ -3,6 +3,7 @@ import json
 import shutil
 import subprocess
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -122,6 +123,25 @@ def test_a_broken_sample_is_said_and_the_others_are_evaluated(
     assert list(failures) == ["bad"]
     assert (tmp_path / "out" / "paper" / "good" / "rooms.geojson").exists()
     assert "closedrooms: bad: a picture that cannot be read" in capsys.readouterr().err
+
+
+def test_a_defect_that_one_map_brings_out_is_said_and_the_other_methods_go_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_sample(tmp_path / "data" / "one")
+
+    def breaks(*_: object, **__: object) -> NoReturn:
+        raise ZeroDivisionError("on this map only")
+
+    monkeypatch.setattr("closedrooms.predictor.baselines.geometric", breaks)
+    config = EvaluateConfig(
+        datasets=(tmp_path / "data",), out=tmp_path / "out", methods=("paper", "geometric"), workers=1
+    )
+    result = evaluate(config)
+    assert list(result.failures) == ["geometric one"]
+    assert "internal error" in result.failures["geometric one"]
+    assert "ZeroDivisionError" in result.failures["geometric one"]
+    assert {row["method"] for row in result.summary} == {"paper"}
 
 
 def test_two_samples_of_one_name_and_a_dataset_without_any_are_refused(tmp_path: Path) -> None:
