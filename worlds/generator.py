@@ -8,6 +8,7 @@ import numpy as np
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.random import stream
+from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.construction import build_plan, turned_sketch
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.programme import BAYS, measures
@@ -77,11 +78,15 @@ def _version_1(
     drawn_size = SIZES[int(rng.choice(3, p=[0.3, 0.45, 0.25]))]
     drawn_angle = float(rng.integers(5, 86)) if rng.random() < 0.3 else 0.0
     shape, size, angle = shape or drawn_shape, size or drawn_size, drawn_angle if angle is None else angle
-    dimensions = measures(rng, kind, size)
-    skeleton = SHAPES[shape](rng, dimensions)
-    sketch = draw_rooms(rng, kind, skeleton)
-    sketch = turned_sketch(sketch, math.radians(angle))
-    plan = build_plan(rng, sketch)
+    # Two rooms that open into each other as well as into the corridor leave nothing to close: draw on.
+    while True:
+        dimensions = measures(rng, kind, size)
+        skeleton = SHAPES[shape](rng, dimensions)
+        sketch = draw_rooms(rng, kind, skeleton)
+        sketch = turned_sketch(sketch, math.radians(angle))
+        plan = build_plan(rng, sketch)
+        if closable_rooms(plan):
+            break
     meta: dict[str, object] = {"generator": 1, "kind": kind, "seed": seed, "shape": shape, "size": size, "angle": angle}
     plan = replace(plan, meta=meta)
     if furniture:
