@@ -27,8 +27,14 @@ class OutputError(ClosedroomsError):
     """The output folder cannot be written, or holds something that is not ours."""
 
 
-def internal(error: Exception) -> str:
-    """A defect of the program in one line, with the place where it showed: for work that goes on with the next job."""
+def reason(error: Exception) -> str:
+    """Why one of many jobs failed, in one line, for work that goes on with the next.
+
+    A defect of the program that one map or building brings out is told with the place where it showed; it must not cost
+    the thousands of others.
+    """
+    if isinstance(error, ClosedroomsError):
+        return str(error)
     last = traceback.extract_tb(error.__traceback__)[-1:]
     place = "".join(f" ({Path(frame.filename).name}:{frame.lineno})" for frame in last)
     return f"internal error, please report it: {type(error).__name__}: {' '.join(str(error).split())[:300]}{place}"

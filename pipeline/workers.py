@@ -116,11 +116,16 @@ class Crew(Generic[Job, Outcome]):
             raise
 
 
-def _begin(parent: int) -> None:
-    """Prepare a local worker: one thread, no part in the parent's Ctrl-C, and no life after the parent's."""
+def one_thread() -> None:
+    """Begin a worker: workers share the processors, and OpenCV's own threads would only get in each other's way."""
     import cv2
 
     cv2.setNumThreads(1)
+
+
+def _begin(parent: int) -> None:
+    """Prepare a local worker: one thread, no part in the parent's Ctrl-C, and no life after the parent's."""
+    one_thread()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def follow() -> None:

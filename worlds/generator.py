@@ -78,7 +78,8 @@ def _version_1(
     drawn_size = SIZES[int(rng.choice(3, p=[0.3, 0.45, 0.25]))]
     drawn_angle = float(rng.integers(5, 86)) if rng.random() < 0.3 else 0.0
     shape, size, angle = shape or drawn_shape, size or drawn_size, drawn_angle if angle is None else angle
-    # Two rooms that open into each other as well as into the corridor leave nothing to close: draw on.
+    # Two rooms that open into each other as well as into the corridor leave nothing to close: draw on. A seed that gave
+    # a building of use keeps it.
     while True:
         dimensions = measures(rng, kind, size)
         skeleton = SHAPES[shape](rng, dimensions)

@@ -37,7 +37,6 @@ from closedrooms.worlds.geometry import areal
 NEAR_LEAF, SIGMAS = 0.02, 4.0
 # Drawn scans that are remembered, most of them with some doors closed: about 30 kB each.
 KEPT_KEYFRAMES = 8000
-NOBODY = np.full(1, -1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,8 +136,10 @@ class Eraser:
         for number, before in enumerate(self._drawn):
             after = None
             if number in wanted:
-                seen = np.unique(owner[number][np.isfinite(ranges[number])]) if cut[number] else NOBODY
-                doors = tuple(closed[int(index)] for index in seen[seen >= 0])
+                doors: tuple[str, ...] = ()
+                if cut[number]:
+                    seen = np.unique(owner[number][np.isfinite(ranges[number])])
+                    doors = tuple(closed[int(index)] for index in seen[seen >= 0])
                 after = self._keyframe(number, ranges[number], doors)
             if after is before:
                 continue

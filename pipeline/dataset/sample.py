@@ -10,7 +10,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.errors import ClosedroomsError, OutputError, internal
+from closedrooms.core.errors import OutputError, reason
 from closedrooms.core.files import output_folder
 from closedrooms.core.geojson import write_doors, write_rooms
 from closedrooms.core.grid import GridFrame, OccupancyGrid
@@ -103,10 +103,8 @@ def make(task: Task) -> Outcome:
             _make_sample(task, task.variant, plan)
     except OutputError as error:
         return Outcome(trouble=str(error))
-    except ClosedroomsError as error:
-        return Outcome(failure=str(error))
-    except Exception as error:  # a defect that one building brings out must not cost the thousands of others
-        return Outcome(failure=internal(error))
+    except Exception as error:
+        return Outcome(failure=reason(error))
     return Outcome()
 
 

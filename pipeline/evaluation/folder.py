@@ -33,10 +33,3 @@ def claim(folder: Path, command: str) -> None:
     except OSError as error:
         raise OutputError(f"cannot write ({error.strerror}): {folder}") from error
     write_json(manifest, {"program": PROGRAM, "command": command, "files": []})
-
-
-def one_thread() -> None:
-    """Begin a worker: workers share the processors, and OpenCV's own threads would only get in each other's way."""
-    import cv2
-
-    cv2.setNumThreads(1)

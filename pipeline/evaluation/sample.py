@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray
-from closedrooms.core.errors import ClosedroomsError, OutputError, internal
+from closedrooms.core.errors import OutputError, reason
 from closedrooms.core.files import write_json
 from closedrooms.core.geojson import write_rooms
 from closedrooms.core.grid import OccupancyGrid
@@ -90,8 +90,8 @@ def evaluate_sample(sample: SamplePath, methods: Sequence[str], out: Path, *, to
             read = read_sample(sample)
             hidden = _hidden(read)
             starts = Starts(read)
-        except ClosedroomsError as error:
-            outcome.problems[sample.name] = str(error)
+        except Exception as error:
+            outcome.problems[sample.name] = reason(error)
             return outcome
     for method in wanted:
         scores = kept[method]
@@ -103,11 +103,8 @@ def evaluate_sample(sample: SamplePath, methods: Sequence[str], out: Path, *, to
                 scores = head | _score(read, method, folder, hidden, out, starts, tours=tours)
             except OutputError:
                 raise
-            except ClosedroomsError as error:
-                outcome.problems[f"{method} {sample.name}"] = str(error)
-                continue
-            except Exception as error:  # a defect that one map brings out must not cost the thousands of others
-                outcome.problems[f"{method} {sample.name}"] = internal(error)
+            except Exception as error:
+                outcome.problems[f"{method} {sample.name}"] = reason(error)
                 continue
             write_json(folder / RESULT, scores)
         outcome.scores.append(scores)
@@ -247,8 +244,8 @@ def _score(
             scores["tour"] = _tours(sample, prediction.grid, sample.rooms_seen, out)
         except OutputError:
             raise
-        except ClosedroomsError as error:
-            scores["no_tour"] = f"no tour: {error}"
+        except Exception as error:
+            scores["no_tour"] = f"no tour: {reason(error)}"
     return scores
 
 

@@ -11,15 +11,16 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError
+from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError, reason
 from closedrooms.core.files import MANIFEST, PROGRAM, write_json
-from closedrooms.pipeline.evaluation.folder import claim, one_thread
+from closedrooms.pipeline.evaluation.folder import claim
 from closedrooms.pipeline.evaluation.tours import code_digest
 from closedrooms.pipeline.manifest import resolved, versions
 from closedrooms.pipeline.robustness.config import RobustnessConfig
 from closedrooms.pipeline.robustness.levels import Case, Setting, cases
 from closedrooms.pipeline.robustness.onset import Onset
 from closedrooms.pipeline.terminal import Progress, Silent
+from closedrooms.pipeline.workers import one_thread
 from closedrooms.worlds.library import bundled_names, load_world
 
 Row = dict[str, Any]
@@ -87,8 +88,8 @@ def robustness(config: RobustnessConfig, *, progress: Progress | None = None) ->
         progress.advance(done, f"{done} of {total}")
     rows = [row for name in worlds.values() if name not in failures for row in _finished(config, name, wanted)]
     if not rows:
-        reason = next(iter(failures.values()), "nothing was asked for")
-        raise InvalidInputError(f"no world could be used ({reason})", expected="at least one")
+        why = next(iter(failures.values()), "nothing was asked for")
+        raise InvalidInputError(f"no world could be used ({why})", expected="at least one")
     from closedrooms.pipeline.robustness.report import write_report
 
     progress.stage("report")
@@ -135,8 +136,8 @@ def _work(worlds: dict[str, str], config: RobustnessConfig) -> Iterator[tuple[in
                     yield done(), {}
             except OutputError:
                 raise
-            except ClosedroomsError as error:
-                yield done(), {world: str(error)}
+            except Exception as error:
+                yield done(), {world: reason(error)}
         return
     with ProcessPoolExecutor(config.workers, mp_context=get_context("spawn"), initializer=one_thread) as pool:
         waiting: dict[Future[str], str] = {
@@ -146,7 +147,7 @@ def _work(worlds: dict[str, str], config: RobustnessConfig) -> Iterator[tuple[in
             while waiting:
                 finished, _ = wait(waiting, timeout=LOOK)
                 problems = {waiting.pop(future): future.result() for future in finished}
-                yield done(), {world: reason for world, reason in problems.items() if reason}
+                yield done(), {world: why for world, why in problems.items() if why}
         except BrokenProcessPool as error:
             raise ClosedroomsError("a worker process was killed; the same command goes on where it stopped") from error
         except BaseException:
@@ -170,8 +171,8 @@ def sweep_world(text: str, world: str, config: RobustnessConfig) -> str:
             pass
     except OutputError:
         raise
-    except ClosedroomsError as error:
-        return str(error)
+    except Exception as error:
+        return reason(error)
     return ""
 
 

@@ -21,6 +21,7 @@ from closedrooms.pipeline.robustness.drives import Drive, furnished, map_drive, 
 from closedrooms.pipeline.robustness.levels import cases, first_setting
 from closedrooms.pipeline.robustness.onset import LevelResult, level_results, onsets
 from closedrooms.pipeline.robustness.repairs import sampled, with_clean_walls
+from closedrooms.pipeline.robustness.sweep import sweep_world
 from closedrooms.sim.config import NOISE_LEVELS, SimConfig
 from closedrooms.worlds.library import load_world
 
@@ -208,6 +209,15 @@ def test_a_loss_within_the_noise_or_too_small_to_matter_is_none() -> None:
     results: list[LevelResult] = level_results(rows, 200)
     wide = results[-1].differences["iou"]
     assert wide.high - wide.low > 0.2
+
+
+def test_a_defect_in_one_world_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("two\nlines")
+
+    monkeypatch.setattr("closedrooms.pipeline.robustness.trial.Building", broken)
+    why = sweep_world("office-01", "office-01", replace(CONFIG, out=tmp_path))
+    assert why.startswith("internal error, please report it: ZeroDivisionError: two lines (test_robustness.py:")
 
 
 @pytest.mark.slow
