@@ -89,10 +89,18 @@ def _around(ranges: FloatArray, *, wrap: bool) -> FloatArray:
 
 
 def _median(around: FloatArray) -> FloatArray:
-    """Median of each column, the lower of two, NaN left out (NaN where there is nothing else)."""
-    measured = around.shape[0] - np.isnan(around).sum(axis=0)
-    middle = np.maximum(measured - 1, 0) // 2
-    return np.asarray(np.sort(around, axis=0)[middle, np.arange(around.shape[1])])
+    """Median of each column of five, the lower of two, NaN left out (NaN where there is nothing else)."""
+    a, b, c, d, e = around
+    # The third of five by comparisons; quicker than sorting. NaN in a column makes its result NaN.
+    low = np.maximum(np.minimum(a, b), np.minimum(c, d))
+    high = np.minimum(np.maximum(a, b), np.maximum(c, d))
+    median: FloatArray = np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), e))
+    doubtful = np.flatnonzero(np.isnan(median))
+    if doubtful.size:
+        columns = around[:, doubtful]
+        measured = len(columns) - np.isnan(columns).sum(axis=0)
+        median[doubtful] = np.sort(columns, axis=0)[np.maximum(measured - 1, 0) // 2, np.arange(doubtful.size)]
+    return median
 
 
 @functools.lru_cache(maxsize=8)

@@ -1,5 +1,6 @@
 """The log-odds grid: evidence of hits and passes per cell, from which scans can be taken back exactly."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -10,7 +11,7 @@ from closedrooms.core.grid import UNKNOWN, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.lattice import Lattice
+from closedrooms.mapping.lattice import Lattice, grown
 
 SUBCELL_BITS = 6
 """Fraction bits of OpenCV's fixed-point polygon corners: 1/64 cell."""
@@ -49,7 +50,8 @@ class EvidenceGrid:
         self._lattice = Lattice(config.resolution)
         shape = self._lattice.frame.shape
         self._hits = np.zeros(shape, dtype=np.int32)
-        self._passes = np.zeros(shape, dtype=np.int32)
+        # Whole numbers, exact up to 2^24: OpenCV adds a mask to floats five times as quickly as to integers.
+        self._passes = np.zeros(shape, dtype=np.float32)
         self._cells: CellArray = np.full(shape, UNKNOWN, dtype=np.int8)
         self._dirty: Window | None = None
         self._grid: OccupancyGrid | None = None
@@ -61,18 +63,19 @@ class EvidenceGrid:
         Free are the cells wholly inside the outline of what the beams crossed; the boundary itself is not, so that
         a wall which is seen at a grazing angle is not worn away by the beams along it.
         """
-        drawn = self._draw(beams, map_T_robot)
-        if drawn is not None:
+        self.add_all([(beams, map_T_robot)], sign=sign)
+
+    def add_all(self, scans: Sequence[tuple[Beams, Pose2]], *, sign: int = 1) -> None:
+        """Count scans in or out again, each as by :meth:`add`; the arrays grow once for all."""
+        for drawn in self._draw(scans):
             self._count(*drawn, sign)
 
     def imprint(self, beams: Beams, map_T_robot: Pose2) -> Imprint | None:
         """What :meth:`add` would count, to be counted by :meth:`stamp`; ``None`` for a scan that crossed nothing."""
-        drawn = self._draw(beams, map_T_robot)
-        if drawn is None:
-            return None
-        (row, col, rows, cols), mask, hits = drawn
-        lattice = self._lattice
-        return Imprint(row + lattice.row0, col + lattice.col0, (rows, cols), np.packbits(mask), hits)
+        for (row, col, rows, cols), mask, hits in self._draw([(beams, map_T_robot)]):
+            lattice = self._lattice
+            return Imprint(row + lattice.row0, col + lattice.col0, (rows, cols), np.packbits(mask), np.unique(hits))
+        return None
 
     def stamp(self, imprint: Imprint, *, sign: int = 1) -> None:
         """Count a scan that :meth:`imprint` of this very grid drew, in (``sign`` 1) or out again (-1)."""
@@ -81,32 +84,40 @@ class EvidenceGrid:
         window = (imprint.row - self._lattice.row0, imprint.col - self._lattice.col0, rows, cols)
         self._count(window, mask, imprint.hits, sign)
 
-    def _draw(self, beams: Beams, map_T_robot: Pose2) -> tuple[Window, Mask, IntArray] | None:
-        """The window of a scan (the arrays grow to hold it), its crossed cells and flat indices of those hit."""
-        outline, points = map_T_robot.transform(beams.outline), map_T_robot.transform(beams.points)
-        if len(outline) == 0:
-            return None
-        low, high = outline.min(axis=0), outline.max(axis=0)
-        if len(points):
-            low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
-        self._grow(low, high)
+    def _draw(self, scans: Sequence[tuple[Beams, Pose2]]) -> Iterator[tuple[Window, Mask, IntArray]]:
+        """The window of each scan that crossed anything, its crossed cells and flat indices of those hit.
+
+        The arrays grow to hold them all.
+        """
+        crossing = [(beams, pose) for beams, pose in scans if len(beams.outline)]
+        if not crossing:
+            return
+        outlines = [pose.transform(beams.outline) for beams, pose in crossing]
+        points = [pose.transform(beams.points) for beams, pose in crossing]
+        boxes = [_box(*seen) for seen in zip(outlines, points, strict=True)]
+        lows, highs = np.array([low for low, _ in boxes]), np.array([high for _, high in boxes])
+        self._grow(lows.min(axis=0), highs.max(axis=0))
         lattice = self._lattice
-        (row_low, row_high), (col_low, col_high) = lattice.cells(np.vstack((low, high)))
-        window = (int(row_low), int(col_low), int(row_high - row_low + 1), int(col_high - col_low + 1))
-        mask = self._crossed(outline, window)
-        flat = np.zeros(0, dtype=np.int64)
-        if len(points):
-            hit_rows, hit_cols = lattice.cells(points)
-            flat = np.unique((hit_rows - window[0]) * window[3] + hit_cols - window[1])
+        row_lows, col_lows = lattice.cells(lows)
+        row_highs, col_highs = lattice.cells(highs)
+        corners = np.stack((row_lows, col_lows, row_highs - row_lows + 1, col_highs - col_lows + 1), axis=1)
+        for (row, col, rows, cols), outline, hits in zip(corners.tolist(), outlines, points, strict=True):
+            window = (row, col, rows, cols)
+            mask = self._crossed(outline, window)
+            hit_rows, hit_cols = lattice.cells(hits)
+            flat = (hit_rows - row) * cols + hit_cols - col
             mask.ravel()[flat] = 0
-        return window, mask, flat
+            yield window, mask, flat
 
     def _count(self, window: Window, mask: Mask, flat: IntArray, sign: int) -> None:
         rows, cols = slice(window[0], window[0] + window[2]), slice(window[1], window[1] + window[3])
         hits, passes = self._hits[rows, cols], self._passes[rows, cols]
+        # A cell that several beams hit counts once: the same sum is written for each.
         hits[flat // window[3], flat % window[3]] += sign
-        # In place; NumPy would convert the mask first.
-        (cv2.add if sign > 0 else cv2.subtract)(passes, mask, passes, dtype=cv2.CV_32S)
+        if sign > 0:
+            cv2.accumulate(mask, passes)
+        else:
+            cv2.subtract(passes, mask, passes, dtype=cv2.CV_32F)
         self._dirty = window if self._dirty is None else _union(self._dirty, window)
 
     def _crossed(self, outline: FloatArray, window: Window) -> Mask:
@@ -123,9 +134,9 @@ class EvidenceGrid:
         padding = self._lattice.cover(low, high, margin=2)
         if padding is None:
             return
-        self._hits = np.pad(self._hits, padding)
-        self._passes = np.pad(self._passes, padding)
-        self._cells = np.pad(self._cells, padding, constant_values=UNKNOWN)
+        self._hits = grown(self._hits, padding)
+        self._passes = grown(self._passes, padding)
+        self._cells = grown(self._cells, padding, UNKNOWN)
         if self._dirty is not None:
             row, col, rows, cols = self._dirty
             self._dirty = (row + padding[0][0], col + padding[1][0], rows, cols)
@@ -141,10 +152,10 @@ class EvidenceGrid:
             most_hits, most_passes = self._percent.shape
             if hits.max() >= most_hits or passes.max() >= most_passes:
                 most_hits = max(most_hits, 16 + int(1.25 * hits.max()))
-                most_passes = max(most_passes, 16 + int(1.25 * passes.max()))
+                most_passes = max(most_passes, 16 + int(1.25 * float(passes.max())))
                 self._percent = self._probabilities(most_hits, most_passes)
             places = hits * self._percent.shape[1]
-            places += passes
+            places += passes.astype(np.int32)
             self._cells[rows, cols] = self._percent.ravel().take(places)
             self._dirty = None
         cells = self._cells.copy()
@@ -164,6 +175,12 @@ class EvidenceGrid:
         percent: CellArray = table.take(np.clip(odds, -limit, limit).astype(np.int64) + limit)
         percent[0, 0] = UNKNOWN
         return percent
+
+
+def _box(outline: FloatArray, points: FloatArray) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Lower left and upper right corner of all, shapes (n, 2) and (m, 2), n > 0."""
+    x, y = np.concatenate((outline, points)).T.copy()
+    return (float(x.min()), float(y.min())), (float(x.max()), float(y.max()))
 
 
 def _union(a: Window, b: Window) -> Window:

@@ -1,11 +1,15 @@
 """An unbounded lattice of cells of which a growing window is kept in arrays."""
 
+from typing import Any, TypeVar
+
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import GridFrame
 
+Padding = tuple[tuple[int, int], tuple[int, int]]
+Scalar = TypeVar("Scalar", bound=np.generic)
 GROWTH = 128
 """Cells by which a window grows at least: few copies, little memory."""
 MAX_CELLS = 200_000_000
@@ -42,7 +46,7 @@ class Lattice:
         (x, y), right, top = middle, self.col0 + self.cols, self.row0 + self.rows
         return self.col0 <= x - reach and x + reach < right and self.row0 <= y - reach and y + reach < top
 
-    def cover(self, low: FloatArray, high: FloatArray, margin: int) -> tuple[tuple[int, int], tuple[int, int]] | None:
+    def cover(self, low: FloatArray, high: FloatArray, margin: int) -> Padding | None:
         """Grow the window until it holds the box from ``low`` to ``high``, ``(x, y)`` [m], and ``margin`` cells.
 
         Returns:
@@ -62,6 +66,18 @@ class Lattice:
             raise InvalidInputError(f"a map of {rows} x {cols} cells", expected=f"at most {MAX_CELLS} cells")
         self.row0, self.col0, self.rows, self.cols = self.row0 - before_rows, self.col0 - before_cols, rows, cols
         return ((before_rows, after_rows), (before_cols, after_cols))
+
+
+def grown(
+    values: np.ndarray[Any, np.dtype[Scalar]], padding: Padding, fill: int = 0
+) -> np.ndarray[Any, np.dtype[Scalar]]:
+    """The array of a window that grew by ``padding``; quicker than NumPy's ``pad``, which serves every case."""
+    (below, above), (left, right) = padding
+    rows, cols = values.shape
+    shape = (below + rows + above, left + cols + right)
+    larger = np.zeros(shape, dtype=values.dtype) if fill == 0 else np.full(shape, fill, dtype=values.dtype)
+    larger[below : below + rows, left : left + cols] = values
+    return larger
 
 
 def _growth(missing: int) -> int:

@@ -217,21 +217,13 @@ class Mapper:
         self._local.clear()
         self._drawn = 0
 
-    def _draw(self, keyframe: Keyframe) -> None:
-        if keyframe.drawn is not None:
-            if (
-                keyframe.drawn.distance(keyframe.pose) <= MOVED[0]
-                and abs(wrap_angle(keyframe.drawn.theta - keyframe.pose.theta)) <= MOVED[1]
-            ):
-                return
-            self._evidence.add(keyframe.beams, keyframe.drawn, sign=-1)
-        self._evidence.add(keyframe.beams, keyframe.pose)
-        keyframe.drawn = keyframe.pose
-
     def grid(self) -> OccupancyGrid:
         """The map so far, from the keyframes' present poses."""
-        for keyframe in self._keyframes[self._drawn :]:
-            self._draw(keyframe)
+        moved = [keyframe for keyframe in self._keyframes[self._drawn :] if _outdated(keyframe)]
+        self._evidence.add_all([(k.beams, k.drawn) for k in moved if k.drawn is not None], sign=-1)
+        self._evidence.add_all([(k.beams, k.pose) for k in moved])
+        for keyframe in moved:
+            keyframe.drawn = keyframe.pose
         self._drawn = len(self._keyframes)
         return self._evidence.grid()
 
@@ -254,3 +246,9 @@ class Mapper:
         """Optimise once more over everything."""
         if len(self._graph.edges) > 0 and self._loops:
             self._apply(optimise(self._poses(), self._graph.edges, kernel=self._config.loops.kernel).poses)
+
+
+def _outdated(keyframe: Keyframe) -> bool:
+    """Whether a keyframe is not drawn where it is now."""
+    drawn, pose = keyframe.drawn, keyframe.pose
+    return drawn is None or drawn.distance(pose) > MOVED[0] or abs(wrap_angle(drawn.theta - pose.theta)) > MOVED[1]

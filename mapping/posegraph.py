@@ -1,16 +1,18 @@
 """The pose graph: keyframes as nodes, measured relative poses as edges, solved sparsely."""
 
 import heapq
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from closedrooms.core.arrays import FloatArray
+from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.pose import Pose2
+from closedrooms.mapping.normal_equations import Pattern
 
 DAMPING = 1e-4
 """First Levenberg-Marquardt damping, relative to the diagonal: nearly Gauss-Newton, since the guess is good."""
+ROUNDING = 1e-9
+"""Differences of ways [m] that come from the order in which lengths were summed."""
 GAIN_DONE = 1e-5
 """Relative decrease of the cost at which the solution counts as converged."""
 
@@ -48,6 +50,10 @@ class PoseGraph:
     edges: list[Edge] = field(default_factory=list)
     ways: FloatArray = field(default_factory=lambda: np.zeros(1))
     _neighbours: dict[int, list[tuple[int, float]]] = field(default_factory=dict)
+    _chain: FloatArray = field(default_factory=lambda: np.zeros(1))
+    """Way along the edges from one keyframe to the next only, from the first to each [m], shape (keyframes,)."""
+    _shortcuts: list[tuple[int, int, float]] = field(default_factory=list)
+    """All other edges: source, target, length."""
 
     def add(self, edge: Edge) -> None:
         """Add an edge: from the latest keyframe to the next one, or from an older one to the latest."""
@@ -57,32 +63,37 @@ class PoseGraph:
         if edge.target == len(self.ways):
             # Every way from the next keyframe leads over this one.
             self.ways = np.append(self.ways + edge.length, 0.0)
+            self._chain = np.append(self._chain, self._chain[-1] + edge.length)
         else:
-            self._shorten(edge.source, edge.length)
+            self._shortcuts.append((edge.source, edge.target, edge.length))
+            if edge.length < self.ways[edge.source]:
+                self.ways[edge.source] = edge.length
+                self._spread()
 
     def drop_last(self) -> None:
-        """Take the latest edge back."""
+        """Take the latest edge back, one that leads to an older keyframe."""
         edge = self.edges.pop()
         self._neighbours[edge.source].pop()
         self._neighbours[edge.target].pop()
+        self._shortcuts.pop()
         self.ways = np.full(len(self.ways), np.inf)
-        self._shorten(len(self.ways) - 1, 0.0)
+        self.ways[-1] = 0.0
+        self._spread()
 
-    def _shorten(self, start: int, way: float) -> None:
-        """Spread a way from the latest keyframe to ``start`` as far as it makes others shorter (Dijkstra)."""
-        if way >= self.ways[start]:
-            return
-        ways = self.ways.tolist()
-        queue = [(way, start)]
-        while queue:
-            way, node = heapq.heappop(queue)
-            if way >= ways[node]:
-                continue
-            ways[node] = way
-            for neighbour, length in self._neighbours.get(node, ()):
-                if way + length < ways[neighbour]:
-                    heapq.heappush(queue, (way + length, neighbour))
-        self.ways = np.array(ways)
+    def _spread(self) -> None:
+        """Make the ways as short as the edges allow: along the chain at once, then over the shortcuts, and again."""
+        chain, ways = self._chain, self.ways
+        shortcuts = np.array(self._shortcuts, dtype=np.float64).reshape(-1, 3)
+        source, target = shortcuts[:, :2].T.astype(np.int64)
+        while True:
+            ways = np.minimum(ways, np.minimum.accumulate(ways - chain) + chain)
+            ways = np.minimum(ways, np.minimum.accumulate((ways + chain)[::-1])[::-1] - chain)
+            to_target, to_source = ways[source] + shortcuts[:, 2], ways[target] + shortcuts[:, 2]
+            if not ((to_target < ways[target] - ROUNDING) | (to_source < ways[source] - ROUNDING)).any():
+                break
+            np.minimum.at(ways, target, to_target)
+            np.minimum.at(ways, source, to_source)
+        self.ways = ways
 
     def within(self, start: int, limit: float) -> dict[int, float]:
         """Way along the graph [m] from ``start`` to each keyframe that is at most ``limit`` away (Dijkstra)."""
@@ -137,10 +148,11 @@ def optimise(poses: FloatArray, edges: list[Edge], *, kernel: float, iterations:
         return float(squared[~robust].sum() + (scale[robust] * np.log1p(squared[robust] / scale[robust])).sum())
 
     errors = _errors(x, source, target, measured)
-    best, damping = cost(errors), DAMPING
+    best, damping, pattern = cost(errors), DAMPING, Pattern(source, target, len(x))
     for _ in range(iterations):
         weights = 1.0 / (1.0 + _squared(errors, information) / scale)
-        step = _step(x, source, target, measured, errors, information * weights[:, None, None], damping)
+        weighted = information * weights[:, None, None]
+        step = pattern.solve(*_jacobians(x, source, target, measured), errors, weighted, damping)
         moved = x + step
         new_errors = _errors(moved, source, target, measured)
         new = cost(new_errors)
@@ -161,7 +173,7 @@ def _squared(errors: FloatArray, information: FloatArray) -> FloatArray:
     return result
 
 
-def _errors(x: FloatArray, source: FloatArray, target: FloatArray, measured: FloatArray) -> FloatArray:
+def _errors(x: FloatArray, source: IntArray, target: IntArray, measured: FloatArray) -> FloatArray:
     a, b = x[source], x[target]
     c, s = np.cos(a[:, 2]), np.sin(a[:, 2])
     d = b[:, :2] - a[:, :2]
@@ -171,50 +183,17 @@ def _errors(x: FloatArray, source: FloatArray, target: FloatArray, measured: Flo
     return np.column_stack((cz * local[:, 0] + sz * local[:, 1], cz * local[:, 1] - sz * local[:, 0], angle))
 
 
-def _step(
-    x: FloatArray,
-    source: FloatArray,
-    target: FloatArray,
-    measured: FloatArray,
-    errors: FloatArray,
-    information: FloatArray,
-    damping: float,
-) -> FloatArray:
-    """Solve the damped normal equations; the first pose does not move."""
-    from scipy.sparse import coo_matrix, diags
-    from scipy.sparse.linalg import splu
-
+def _jacobians(
+    x: FloatArray, source: IntArray, target: IntArray, measured: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Derivatives of the errors by the poses at the source and at the target of each edge, shape (m, 3, 3) each."""
     a, b = x[source], x[target]
     total = a[:, 2] + measured[:, 2]
     c, s = np.cos(total), np.sin(total)
     d = b[:, :2] - a[:, :2]
-    m = len(errors)
-    to_b = np.zeros((m, 3, 3))
+    to_b = np.zeros((len(source), 3, 3))
     to_b[:, 0, 0], to_b[:, 0, 1], to_b[:, 1, 0], to_b[:, 1, 1], to_b[:, 2, 2] = c, s, -s, c, 1.0
     to_a = -to_b
     to_a[:, 0, 2] = -s * d[:, 0] + c * d[:, 1]
     to_a[:, 1, 2] = -c * d[:, 0] - s * d[:, 1]
-    jacobians = {0: to_a, 1: to_b}
-    nodes = {0: source, 1: target}
-    size = 3 * len(x)
-    gradient = np.zeros(size)
-    blocks, rows, cols = [], [], []
-    axis = np.arange(3)
-    for i in (0, 1):
-        weighted = np.einsum("mki,mkl->mil", jacobians[i], information)
-        places = (3 * nodes[i][:, None] + axis).ravel()
-        gradient += np.bincount(places, np.einsum("mil,ml->mi", weighted, errors).ravel(), minlength=size)
-        for j in (0, 1):
-            blocks.append(np.einsum("mil,mlj->mij", weighted, jacobians[j]).ravel())
-            rows.append(np.broadcast_to((3 * nodes[i][:, None] + axis)[:, :, None], (m, 3, 3)).ravel())
-            cols.append(np.broadcast_to((3 * nodes[j][:, None] + axis)[:, None, :], (m, 3, 3)).ravel())
-    hessian = coo_matrix((np.concatenate(blocks), (np.concatenate(rows), np.concatenate(cols))), (size, size)).tocsc()
-    hessian = (hessian + diags(damping * hessian.diagonal() + 1e-9)).tocsc()[3:, 3:]
-    step = np.zeros(size)
-    # Symmetric and positive: ordered as such and without pivoting, which is twice as quick.
-    factors = splu(hessian, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    step[3:] = factors.solve(-gradient[3:])
-    # A keyframe never turns by more than this at once: the linearisation would not hold.
-    result = step.reshape(-1, 3)
-    largest = float(np.abs(result[:, 2]).max())
-    return result if largest <= math.pi / 4 else result * (math.pi / 4 / largest)
+    return to_a, to_b
