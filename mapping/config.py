@@ -31,7 +31,7 @@ class MatcherConfig:
     lost_score: float = 0.15
     """Mean likelihood [0..1] below which a scan fits nowhere and odometry is kept."""
 
-    iterations: int = 8
+    iterations: int = 6
     """Most Gauss-Newton steps of a refinement."""
 
     prior_weight: float = 0.005

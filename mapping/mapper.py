@@ -119,6 +119,8 @@ class Mapper:
         self._trusted = False
         if match is None:
             return
+        distance, angle = self._pose.distance(match.pose), abs(wrap_angle(match.pose.theta - self._pose.theta))
+        self._motion = self._motion.corrected(distance, angle, self._config.matcher)
         self._pose = match.pose
         self._hessian = match.hessian
         self._trusted = match.score >= self._config.matcher.poor * self._usual_score

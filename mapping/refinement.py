@@ -65,13 +65,14 @@ def refine(
     (xx, xy, xt), (_, yy, yt), (_, _, tt) = weight.tolist()
     x, y, theta = guess.x / cell, guess.y / cell, guess.theta
     anchor = guess if prior is None else prior
-    stiffness, score = np.zeros((3, 3)), 0.0
+    stiffness, remembered = np.zeros((3, 3)), 0.0
     for _ in range(iterations):
         sums = slopes.at(x, y, theta)
-        score = 1.0 - float(sums[3, 4] / sums[4, 4])
         # On the crest of a wall the slope vanishes, and with it this curvature: remember what the way up showed, or the
-        # prior alone would pull the pose back down.
+        # prior alone would pull the pose back down. Half-way between sum and mean of what is remembered: the sum makes
+        # short steps, with the mean they swing over the crest.
         stiffness = sums[:3, :3] + MEMORY * stiffness
+        remembered = 1.0 + MEMORY * remembered
         gx, gy, gt = sums[:3, 3].tolist()
         ex, ey, et = anchor.x / cell - x, anchor.y / cell - y, math.remainder(anchor.theta - theta, 2.0 * math.pi)
         gx, gy, gt = (
@@ -79,14 +80,16 @@ def refine(
             gy + xy * ex + yy * ey + yt * et,
             gt + xt * ex + yt * ey + tt * et,
         )
-        dx, dy, turn = _solve((stiffness + weight).tolist(), (gx, gy, gt))
+        dx, dy, turn = _solve((stiffness / math.sqrt(remembered) + weight).tolist(), (gx, gy, gt))
         length = math.hypot(dx, dy) * cell
         if length > LONGEST_STEP:
             dx, dy, turn = (value * LONGEST_STEP / length for value in (dx, dy, turn))
         x, y, theta = x + dx, y + dy, theta + turn
         if length < STEP_DONE and abs(turn) < STEP_DONE / 2:
             break
-    return Refined(Pose2(x * cell, y * cell, theta), score, (1.0 - MEMORY) * stiffness / np.outer(scale, scale))
+    return Refined(
+        Pose2(x * cell, y * cell, theta), slopes.score(), (1.0 - MEMORY) * stiffness / np.outer(scale, scale)
+    )
 
 
 class _Slopes:
@@ -106,13 +109,13 @@ class _Slopes:
         # Beyond this from the middle of the lattice, points may leave it.
         reach = math.sqrt(float(np.einsum("ij,ij->j", self._points, self._points).max()))
         self._inner = (reach, lattice.cols - 1.001 - reach, lattice.rows - 1.001 - reach)
-        # Slope along x, y and theta, residual, and ones: their products with each other yield every sum that is needed.
-        self._terms = np.ones((5, len(points)))
+        # Slope along x, y and theta, and residual: their products with each other yield every sum that is needed.
+        self._terms = np.empty((4, len(points)))
         self._rotation, self._shift = np.empty((2, 2)), np.empty((2, 1))
         self._turned, self._uv, self._floors = np.empty((3, 2, len(points)))
 
     def at(self, x: float, y: float, theta: float) -> FloatArray:
-        """Sums of the products of the five terms at a pose (cells, radians), shape (5, 5)."""
+        """Sums of the products of the four terms at a pose (cells, radians), shape (4, 4)."""
         c, s = math.cos(theta), math.sin(theta)
         u0, v0 = x - self._origin[0], y - self._origin[1]
         rotation, shift, turned, uv, floors = self._rotation, self._shift, self._turned, self._uv, self._floors
@@ -134,7 +137,7 @@ class _Slopes:
         corners = self._values.take(flat.astype(np.int64) + self._corners)  # (4, n)
         right = corners[1::2] - corners[::2]
         low, high = corners[::2] + right * u
-        along_x, along_y, turning, residual, _ = self._terms
+        along_x, along_y, turning, residual = self._terms
         np.subtract(high, low, out=along_y)
         np.multiply(right[1] - right[0], v, out=along_x)
         along_x += right[0]
@@ -144,6 +147,10 @@ class _Slopes:
         residual += low
         np.subtract(1.0, residual, out=residual)
         return np.asarray(self._terms @ self._terms.T)
+
+    def score(self) -> float:
+        """Mean likelihood at the last pose [0..1]."""
+        return 1.0 - float(self._terms[3].mean())
 
 
 def _solve(h: list[list[float]], g: tuple[float, float, float]) -> tuple[float, float, float]:
