@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +39,8 @@ def hit_points(scan: LaserScan, *, max_range: float) -> FloatArray:
     ranges = scan.ranges
     hits = (ranges >= scan.range_min) & (ranges < min(max_range, scan.range_max))
     directions, _ = _directions(scan.angle_min, scan.angle_increment, ranges.size)
-    return Pose2(*scan.robot_T_sensor).transform(directions[hits] * ranges[hits, None])
+    points: FloatArray = directions[hits] * ranges[hits, None]
+    return points if scan.robot_T_sensor == (0.0, 0.0, 0.0) else Pose2(*scan.robot_T_sensor).transform(points)
 
 
 def clean(scan: LaserScan, *, max_range: float) -> Beams:
@@ -55,18 +57,24 @@ def clean(scan: LaserScan, *, max_range: float) -> Beams:
     """
     reach = min(max_range, scan.range_max)
     ranges = np.where(scan.ranges >= scan.range_max, np.inf, scan.ranges)
-    ranges[ranges < scan.range_min] = np.nan
+    if scan.range_min > 0.0:
+        ranges[ranges < scan.range_min] = np.nan
     wrap = abs(abs(scan.angle_increment) * ranges.size - 2.0 * math.pi) < 1.5 * abs(scan.angle_increment)
     around = _around(ranges, wrap=wrap)
     before, after = around[SURROUNDINGS - 1], around[SURROUNDINGS + 1]
     typical = _median(around)
     too_long = ranges > typical + OUTLIER_GAP
-    too_short = ranges < np.fmin(before, after) - OUTLIER_GAP
-    surface: BoolArray = ~too_long & ~too_short & (ranges < reach)
+    doubted = ranges < np.fmin(before, after) - OUTLIER_GAP
+    doubted |= too_long
+    surface: BoolArray = ranges < reach
+    surface &= ~doubted
     crossed = np.where(too_long, typical, ranges)
-    gap = np.isnan(ranges) & ~np.isnan(before) & ~np.isnan(after)
-    crossed = np.minimum(np.where(gap, np.minimum(np.minimum(before, after), typical), crossed), reach)
-    crossed[np.isnan(crossed)] = 0.0
+    missing = np.isnan(ranges)
+    if missing.any():
+        gap = missing & ~np.isnan(before) & ~np.isnan(after)
+        crossed = np.where(gap, np.minimum(np.minimum(before, after), typical), crossed)
+        crossed[np.isnan(crossed)] = 0.0
+    np.minimum(crossed, reach, out=crossed)
 
     sensor = Pose2(*scan.robot_T_sensor)
     directions, halves = _directions(scan.angle_min, scan.angle_increment, ranges.size)
@@ -77,19 +85,21 @@ def clean(scan: LaserScan, *, max_range: float) -> Beams:
     if not wrap:
         outline = np.vstack((np.zeros((1, 2)), outline[:-1]))
     points = directions[surface] * ranges[surface, None]
-    return Beams(sensor.transform(points), sensor.transform(outline), np.array([sensor.x, sensor.y]))
+    if scan.robot_T_sensor != (0.0, 0.0, 0.0):
+        points, outline = sensor.transform(points), sensor.transform(outline)
+    return Beams(points, outline, np.array([sensor.x, sensor.y]))
 
 
-def _around(ranges: FloatArray, *, wrap: bool) -> FloatArray:
-    """Ranges of each beam's neighbours and itself, shape (2 * SURROUNDINGS + 1, n), NaN beyond the ends."""
+def _around(ranges: FloatArray, *, wrap: bool) -> list[FloatArray]:
+    """Ranges of each beam's neighbours and itself, 2 * SURROUNDINGS + 1 of shape (n,), NaN beyond the ends."""
     ends = np.full(SURROUNDINGS, np.nan)
     first, last = (ranges[-SURROUNDINGS:], ranges[:SURROUNDINGS]) if wrap else (ends, ends)
     padded = np.concatenate((first, ranges, last))
-    return np.stack([padded[i : i + ranges.size] for i in range(2 * SURROUNDINGS + 1)])
+    return [padded[i : i + ranges.size] for i in range(2 * SURROUNDINGS + 1)]
 
 
-def _median(around: FloatArray) -> FloatArray:
-    """Median of each column of five, the lower of two, NaN left out (NaN where there is nothing else)."""
+def _median(around: Sequence[FloatArray]) -> FloatArray:
+    """Median of five, shape (n,) each; the lower of two, NaN left out (NaN where there is nothing else)."""
     a, b, c, d, e = around
     # The third of five by comparisons; quicker than sorting. NaN in a column makes its result NaN.
     low = np.maximum(np.minimum(a, b), np.minimum(c, d))
@@ -97,7 +107,7 @@ def _median(around: FloatArray) -> FloatArray:
     median: FloatArray = np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), e))
     doubtful = np.flatnonzero(np.isnan(median))
     if doubtful.size:
-        columns = around[:, doubtful]
+        columns = np.stack([values[doubtful] for values in around])
         measured = len(columns) - np.isnan(columns).sum(axis=0)
         median[doubtful] = np.sort(columns, axis=0)[np.maximum(measured - 1, 0) // 2, np.arange(doubtful.size)]
     return median

@@ -31,6 +31,8 @@ MAX_POINTS = 160
 """Points of a scan that a search looks at; the refinement that follows takes all."""
 BATCH = 16
 """Blocks that are opened at once: fewer calls, at the price of a few blocks opened in vain."""
+FEW_BLOCKS = 5
+"""Blocks along an axis up to which they are looked up one by one; more are read side by side."""
 TIE = 1e-9
 """Mean likelihood by which a later candidate must be better: rounding decides nothing."""
 
@@ -205,11 +207,19 @@ def _bounds(values: Float32Array, rows: IntArray, cols: IntArray, half: int, cel
     # Largest value in the block that starts at each cell: with the anchor at (0, 0) it starts at the cell itself.
     kernel = np.ones((cells, cells), dtype=np.uint8)
     maxima = cv2.dilate(levels, kernel, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0.0)
+    side = 2 * half // cells + 1
+    if side <= FEW_BLOCKS:
+        starts = np.arange(side) * cells - half
+        offsets = (starts[:, None] * maxima.shape[1] + starts).reshape(-1, 1)
+        flat = (rows * maxima.shape[1] + cols)[:, None, :] + offsets  # (angles, blocks, n)
+        blocks = maxima.reshape(-1).take(flat).reshape(-1, rows.shape[1])
+        sums = cv2.reduce(blocks, 1, cv2.REDUCE_SUM, dtype=cv2.CV_32S)
+        return np.asarray(sums.reshape(len(rows), -1) * (1.0 / (255.0 * rows.shape[1])), dtype=np.float64)
     # One picture for each of the cells x cells phases: in it, the blocks of one point lie side by side.
     height, width = (-(-n // cells) for n in values.shape)
-    maxima = np.pad(maxima, ((0, height * cells - values.shape[0]), (0, width * cells - values.shape[1])))
-    phases = np.ascontiguousarray(maxima.reshape(height, cells, width, cells).transpose(1, 3, 0, 2))
-    side = 2 * half // cells + 1
+    whole = np.zeros((height * cells, width * cells), dtype=np.uint8)
+    whole[: values.shape[0], : values.shape[1]] = maxima
+    phases = np.ascontiguousarray(whole.reshape(height, cells, width, cells).transpose(1, 3, 0, 2))
     windows = np.lib.stride_tricks.sliding_window_view(phases, (side, side), axis=(2, 3))
     (block_rows, phase_rows), (block_cols, phase_cols) = np.divmod(rows - half, cells), np.divmod(cols - half, cells)
     bounds: FloatArray = np.empty((len(rows), side * side), dtype=np.float64)

@@ -36,7 +36,7 @@ class LikelihoodField:
 
     def clear(self) -> None:
         """Forget every surface; the window stays, as what comes next lies there too."""
-        self.values = np.zeros_like(self.values)
+        self.values.fill(0.0)
 
     def _cover(self) -> None:
         """What depends on the size of the window."""
@@ -52,24 +52,35 @@ class LikelihoodField:
         if not any(map(len, scans)):
             return
         hits = np.vstack(scans)
-        padding = self.lattice.cover(hits.min(axis=0), hits.max(axis=0), margin=self._reach + BORDER)
+        x, y = hits.T.copy()
+        low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
+        padding = self.lattice.cover(low, high, margin=self._reach + BORDER)
         if padding is not None:
             self.values = grown(self.values, padding)
             self._cover()
         exact = hits * (1.0 / self.lattice.resolution)
-        cells = np.floor(exact).astype(np.int64)
-        flat = (cells[:, 1] - self.lattice.row0) * self.lattice.cols + (cells[:, 0] - self.lattice.col0)
+        floors = np.floor(exact)
+        cells = floors.astype(np.int64)
+        flat = cells[:, 1] * self.lattice.cols
+        flat += cells[:, 0]
+        flat -= self.lattice.row0 * self.lattice.cols + self.lattice.col0
         # Where in its cell each hit fell says which stamp it gets.
-        parts = np.rint((exact - cells) * PARTS).astype(np.int64)
-        stamps = parts[:, 1] * (PARTS + 1) + parts[:, 0]
-        # Neighbouring beams that hit one cell: the first is enough.
+        exact -= floors
+        exact *= PARTS
+        parts = np.rint(exact, out=exact).astype(np.int64)
+        stamps = parts[:, 1] * (PARTS + 1)
+        stamps += parts[:, 0]
         ends = np.cumsum([len(scan) for scan in scans])
+        # Neighbouring beams that hit one cell: the first is enough.
         alone = np.ones(len(flat), dtype=np.bool_)
         np.not_equal(flat[1:], flat[:-1], out=alone[1:])
-        alone[ends[:-1][ends[:-1] < len(flat)]] = True
-        if not alone.all():
-            flat, stamps = flat[alone], stamps[alone]
+        if len(scans) > 1:
+            starts = ends[:-1]
+            alone[starts[starts < len(flat)]] = True
             ends = np.cumsum(alone)[ends - 1]
+        else:
+            ends[0] = np.count_nonzero(alone)
+        flat, stamps = flat[alone], stamps[alone]
         values, start = self.values.reshape(-1), 0
         for end in ends.tolist():
             here = flat[start:end]
