@@ -66,50 +66,71 @@ def search(
     Returns:
         The best pose; its score without the prior, 0 where ``away_from`` leaves none or none reaches ``floor``.
     """
-    lattice = field.lattice
-    points = points[:: -(-len(points) // MAX_POINTS)]
-    angle_step = _angle_step(field, points)
-    n_angles = math.ceil(window.angle / angle_step)
-    turns: FloatArray = np.arange(-n_angles, n_angles + 1, dtype=np.float64) * angle_step
-    half = max(1, math.ceil(window.distance / lattice.resolution))
-    values, rows, cols = _surroundings(field, points, guess, turns, half + coarse_cells)
+    searched = Search(field, points, guess, window, coarse_cells=coarse_cells, prior_sigmas=prior_sigmas)
+    return searched.best(away_from=away_from, floor=floor)
 
-    blocks = np.arange(-half, half + 1, coarse_cells)
-    shifts = np.stack(np.meshgrid(blocks, blocks, indexing="ij"), axis=-1).reshape(-1, 2)
-    bounds = _bounds(values, rows, cols, half, coarse_cells)  # (angles, blocks)
-    bounds -= _penalties(turns, shifts, coarse_cells, lattice.resolution, prior_sigmas)
-    bounds = bounds.ravel()
-    inner = np.stack(np.meshgrid(np.arange(coarse_cells), np.arange(coarse_cells), indexing="ij"), axis=-1)
 
-    # The prior, at most as in the last corner, must not hide a pose above the floor.
-    corner = np.full((1, 2), half + coarse_cells)
-    best = floor - float(_penalty(turns[-1:], corner, 1, lattice.resolution, prior_sigmas)[0])
-    best_pose, best_score = guess, 0.0
-    order = np.flatnonzero(bounds > best)
-    order = order[np.argsort(-bounds[order], kind="stable")]
-    for start in range(0, order.size, BATCH):
-        opened = order[start : start + BATCH]
-        opened = opened[bounds[opened] > best]
-        if opened.size == 0:
-            break
-        angles, chosen = np.divmod(opened, len(shifts))
-        fine = shifts[chosen][:, None, :] + inner.reshape(1, -1, 2)  # (opened, cells of a block, 2)
-        scores = _opened_scores(values, rows[angles], cols[angles], fine)
-        flat_fine = fine.reshape(-1, 2)
-        penalised = scores.ravel() - _penalty(
-            np.repeat(turns[angles], inner.size // 2), flat_fine, 1, lattice.resolution, prior_sigmas
-        )
-        if away_from is not None:
-            pose, radius = away_from
-            at = flat_fine[:, ::-1] * lattice.resolution + (guess.x - pose.x, guess.y - pose.y)
-            penalised[np.hypot(at[:, 0], at[:, 1]) < radius] = -math.inf
-        k = int(np.argmax(penalised))
-        if penalised[k] > best + TIE:
-            best, best_score = float(penalised[k]), float(scores.ravel()[k])
-            dy, dx = flat_fine[k] * lattice.resolution
-            turn = float(turns[angles[k // (inner.size // 2)]])
-            best_pose = Pose2(guess.x + float(dx), guess.y + float(dy), guess.theta + turn)
-    return Found(best_pose, best_score)
+class Search:
+    """A window with the bounds of its blocks, of which several things can be asked; arguments as of :func:`search`."""
+
+    def __init__(
+        self,
+        field: LikelihoodField,
+        points: FloatArray,
+        guess: Pose2,
+        window: Window,
+        *,
+        coarse_cells: int = 4,
+        prior_sigmas: tuple[float, float] | None = None,
+    ) -> None:
+        points = points[:: -(-len(points) // MAX_POINTS)]
+        self._resolution, self._guess, self._sigmas = field.lattice.resolution, guess, prior_sigmas
+        angle_step = _angle_step(field, points)
+        n_angles = math.ceil(window.angle / angle_step)
+        self._turns: FloatArray = np.arange(-n_angles, n_angles + 1, dtype=np.float64) * angle_step
+        half = max(1, math.ceil(window.distance / self._resolution))
+        self._values, rows, cols = _surroundings(field, points, guess, self._turns, half + coarse_cells)
+        self._flat = rows * self._values.shape[1] + cols
+        self._corner = half + coarse_cells
+
+        blocks = np.arange(-half, half + 1, coarse_cells)
+        self._shifts = np.stack(np.meshgrid(blocks, blocks, indexing="ij"), axis=-1).reshape(-1, 2)
+        bounds = _bounds(self._values, rows, cols, half, coarse_cells)  # (angles, blocks)
+        bounds -= _penalties(self._turns, self._shifts, coarse_cells, self._resolution, prior_sigmas)
+        self._bounds = bounds.ravel()
+        inner = np.stack(np.meshgrid(np.arange(coarse_cells), np.arange(coarse_cells), indexing="ij"), axis=-1)
+        self._inner = inner.reshape(1, -1, 2)
+
+    def best(self, *, away_from: tuple[Pose2, float] | None = None, floor: float = -math.inf) -> Found:
+        """The best pose of the window."""
+        guess, bounds, inner = self._guess, self._bounds, self._inner
+        # The prior, at most as in the last corner, must not hide a pose above the floor.
+        corner = np.full((1, 2), self._corner)
+        best = floor - float(_penalty(self._turns[-1:], corner, 1, self._resolution, self._sigmas)[0])
+        best_pose, best_score = guess, 0.0
+        order = np.flatnonzero(bounds > best)
+        order = order[np.argsort(-bounds[order], kind="stable")]
+        for start in range(0, order.size, BATCH):
+            opened = order[start : start + BATCH]
+            opened = opened[bounds[opened] > best]
+            if opened.size == 0:
+                break
+            angles, chosen = np.divmod(opened, len(self._shifts))
+            fine = self._shifts[chosen][:, None, :] + inner  # (opened, cells of a block, 2)
+            scores = _opened_scores(self._values, self._flat[angles], fine)
+            flat_fine = fine.reshape(-1, 2)
+            turns = np.repeat(self._turns[angles], inner.shape[1])
+            penalised = scores.ravel() - _penalty(turns, flat_fine, 1, self._resolution, self._sigmas)
+            if away_from is not None:
+                pose, radius = away_from
+                at = flat_fine[:, ::-1] * self._resolution + (guess.x - pose.x, guess.y - pose.y)
+                penalised[np.hypot(at[:, 0], at[:, 1]) < radius] = -math.inf
+            k = int(np.argmax(penalised))
+            if penalised[k] > best + TIE:
+                best, best_score = float(penalised[k]), float(scores.ravel()[k])
+                dy, dx = flat_fine[k] * self._resolution
+                best_pose = Pose2(guess.x + float(dx), guess.y + float(dy), guess.theta + float(turns[k]))
+        return Found(best_pose, best_score)
 
 
 def search_heading(field: LikelihoodField, points: FloatArray, guess: Pose2, sigma: float, reach: float) -> Pose2:
@@ -230,12 +251,11 @@ def _bounds(values: Float32Array, rows: IntArray, cols: IntArray, half: int, cel
     return bounds
 
 
-def _opened_scores(values: Float32Array, rows: IntArray, cols: IntArray, shifts: IntArray) -> FloatArray:
-    """Mean value at the points, shape (b, n), for the shifts of each block, shape (b, s, 2): shape (b, s)."""
-    width = values.shape[1]
-    offsets = shifts[..., 0] * width + shifts[..., 1]
-    flat = (rows * width + cols)[:, None, :] + offsets[:, :, None]
-    return np.asarray(values.reshape(-1).take(flat).mean(axis=2), dtype=np.float64)
+def _opened_scores(values: Float32Array, flat: IntArray, shifts: IntArray) -> FloatArray:
+    """Mean value at the points, flat indices of shape (b, n), for the shifts of each block, (b, s, 2): (b, s)."""
+    offsets = shifts[..., 0] * values.shape[1] + shifts[..., 1]
+    found = values.reshape(-1).take(flat[:, None, :] + offsets[:, :, None])
+    return np.asarray(found.mean(axis=2), dtype=np.float64)
 
 
 def _penalties(

@@ -8,7 +8,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.correlative import Window, search
+from closedrooms.mapping.correlative import Search, Window
 from closedrooms.mapping.keyframe import Keyframe
 from closedrooms.mapping.likelihood import LikelihoodField
 from closedrooms.mapping.posegraph import PoseGraph
@@ -72,17 +72,15 @@ def find_loop(
         min(loops.window_angle + loops.drift_angle * float(graph.ways[older.index]), 0.5),
     )
     sigmas, least = (window.distance, window.angle), loops.min_score - 0.15
-    found = search(field, points, latest.pose, window, coarse_cells=6, prior_sigmas=sigmas, floor=least)
+    searched = Search(field, points, latest.pose, window, coarse_cells=6, prior_sigmas=sigmas)
+    found = searched.best(floor=least)
     if found.score < least:
         return None
     match = refine(field, points, found.pose, iterations=12)
     if match.score < loops.min_score or match.pose.distance(found.pose) > 0.3:
         return None
     # Rooms of one size in a row fit one room further nearly as well: what has a rival is no evidence.
-    rival = search(
-        field, points, latest.pose, window, coarse_cells=6, prior_sigmas=sigmas,
-        away_from=(found.pose, RIVAL_DISTANCE), floor=loops.max_rival * found.score,
-    )  # fmt: skip
+    rival = searched.best(away_from=(found.pose, RIVAL_DISTANCE), floor=loops.max_rival * found.score)
     if rival.score > loops.max_rival * found.score:
         return None
     return Loop(older.index, latest.index, older.pose.inverse() @ match.pose, match.score, match.hessian)

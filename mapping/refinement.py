@@ -60,36 +60,38 @@ def refine(
     slopes = _Slopes(field, points)
     # Everything below is in cells and radians.
     cell = field.lattice.resolution
-    scale = np.array([cell, cell, 1.0])
-    weight = np.zeros((3, 3)) if prior_information is None else prior_information * np.outer(scale, scale)
+    scale = np.array([[cell * cell, cell * cell, cell], [cell * cell, cell * cell, cell], [cell, cell, 1.0]])
+    weight = np.zeros((3, 3)) if prior_information is None else prior_information * scale
     (xx, xy, xt), (_, yy, yt), (_, _, tt) = weight.tolist()
     x, y, theta = guess.x / cell, guess.y / cell, guess.theta
     anchor = guess if prior is None else prior
-    stiffness, remembered = np.zeros((3, 3)), 0.0
+    # Elements xx, xy, yy, xt, yt, tt: so few are quicker as plain numbers.
+    stiffness, remembered = [0.0] * 6, 0.0
     for _ in range(iterations):
-        sums = slopes.at(x, y, theta)
+        (a, _, _, gx), (b, c, _, gy), (d, e, f, gt), _ = slopes.at(x, y, theta).tolist()
         # On the crest of a wall the slope vanishes, and with it this curvature: remember what the way up showed, or the
         # prior alone would pull the pose back down. Half-way between sum and mean of what is remembered: the sum makes
         # short steps, with the mean they swing over the crest.
-        stiffness = sums[:3, :3] + MEMORY * stiffness
+        stiffness = [now + MEMORY * before for now, before in zip((a, b, c, d, e, f), stiffness, strict=True)]
         remembered = 1.0 + MEMORY * remembered
-        gx, gy, gt = sums[:3, 3].tolist()
         ex, ey, et = anchor.x / cell - x, anchor.y / cell - y, math.remainder(anchor.theta - theta, 2.0 * math.pi)
         gx, gy, gt = (
             gx + xx * ex + xy * ey + xt * et,
             gy + xy * ex + yy * ey + yt * et,
             gt + xt * ex + yt * ey + tt * et,
         )
-        dx, dy, turn = _solve((stiffness / math.sqrt(remembered) + weight).tolist(), (gx, gy, gt))
+        root = math.sqrt(remembered)
+        system = [k / root + p for k, p in zip(stiffness, (xx, xy, yy, xt, yt, tt), strict=True)]
+        dx, dy, turn = _solve(system, (gx, gy, gt))
         length = math.hypot(dx, dy) * cell
         if length > LONGEST_STEP:
             dx, dy, turn = (value * LONGEST_STEP / length for value in (dx, dy, turn))
         x, y, theta = x + dx, y + dy, theta + turn
         if length < STEP_DONE and abs(turn) < STEP_DONE / 2:
             break
-    return Refined(
-        Pose2(x * cell, y * cell, theta), slopes.score(), (1.0 - MEMORY) * stiffness / np.outer(scale, scale)
-    )
+    a, b, c, d, e, f = stiffness
+    hessian = (1.0 - MEMORY) * np.array([[a, b, d], [b, c, e], [d, e, f]]) / scale
+    return Refined(Pose2(x * cell, y * cell, theta), slopes.score(), hessian)
 
 
 class _Slopes:
@@ -153,13 +155,17 @@ class _Slopes:
         return 1.0 - float(self._terms[3].mean())
 
 
-def _solve(h: list[list[float]], g: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Solve a symmetric positive 3 x 3 system by Cholesky; NumPy's solver costs more than the rest of a step."""
-    l00 = math.sqrt(h[0][0] + TINY)
-    l10, l20 = h[1][0] / l00, h[2][0] / l00
-    l11 = math.sqrt(max(h[1][1] - l10 * l10, 0.0) + TINY)
-    l21 = (h[2][1] - l20 * l10) / l11
-    l22 = math.sqrt(max(h[2][2] - l20 * l20 - l21 * l21, 0.0) + TINY)
+def _solve(h: list[float], g: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Solve a symmetric positive 3 x 3 system, its lower triangle by rows, by Cholesky.
+
+    NumPy's solver costs more than the rest of a step.
+    """
+    xx, xy, yy, xt, yt, tt = h
+    l00 = math.sqrt(xx + TINY)
+    l10, l20 = xy / l00, xt / l00
+    l11 = math.sqrt(max(yy - l10 * l10, 0.0) + TINY)
+    l21 = (yt - l20 * l10) / l11
+    l22 = math.sqrt(max(tt - l20 * l20 - l21 * l21, 0.0) + TINY)
     a = g[0] / l00
     b = (g[1] - l10 * a) / l11
     c = (g[2] - l20 * a - l21 * b) / l22
