@@ -44,8 +44,9 @@ class ClosedDoor:
     state: str = "closed"
 
     def __post_init__(self) -> None:
-        if not all(map(math.isfinite, self.midpoint)):
-            raise InvalidInputError(f"door {self.id} at {self.midpoint}", expected="finite coordinates in metres")
+        for point in (self.midpoint, *(self.segment or ())):
+            if not all(map(math.isfinite, point)):
+                raise InvalidInputError(f"door {self.id} at {point}", expected="finite coordinates in metres")
         if self.width is not None and not (math.isfinite(self.width) and self.width > 0.0):
             raise InvalidInputError(f"door {self.id} of width {self.width}", expected="a width above 0 m")
 

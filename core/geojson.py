@@ -39,7 +39,8 @@ def write_features(path: Path, features: Iterable[Feature]) -> None:
 
 
 def _rounded(coordinates: FloatArray) -> FloatArray:
-    return np.round(coordinates, 4) + 0.0
+    # Beyond 1e11 a float holds no tenth of a millimetre, and rounding would overflow in the end.
+    return np.where(np.abs(coordinates) < 1e11, np.round(np.clip(coordinates, -1e11, 1e11), 4), coordinates) + 0.0
 
 
 def read_features(path: Path, *, what: str = "a GeoJSON FeatureCollection") -> list[Feature]:
@@ -69,7 +70,15 @@ def _read_feature(number: int, feature: Any, path: Path) -> Feature:
         geometry = shape(feature["geometry"])
         properties = feature.get("properties") or {}
         finite = all(math.isfinite(v) for v in shapely.get_coordinates(geometry).ravel())
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, shapely.errors.ShapelyError) as error:
+    except (
+        KeyError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        IndexError,
+        OverflowError,
+        shapely.errors.ShapelyError,
+    ) as error:
         raise InvalidInputError(f"feature {number} has no readable geometry", expected="GeoJSON", where=path) from error
     if not isinstance(properties, dict):
         raise InvalidInputError(
@@ -138,7 +147,7 @@ def _door(name: str, geometry: BaseGeometry, properties: dict[str, Any], path: P
     if isinstance(geometry, LineString) and len(geometry.coords) >= 2:
         (x0, y0), (x1, y1) = geometry.coords[0][:2], geometry.coords[-1][:2]
         length = math.hypot(x1 - x0, y1 - y0)
-        midpoint = ((x0 + x1) / 2, (y0 + y1) / 2)
+        midpoint = (x0 / 2 + x1 / 2, y0 / 2 + y1 / 2)
         if length == 0.0:
             return ClosedDoor(name, midpoint, None, width, state)
         return ClosedDoor(name, midpoint, ((x0, y0), (x1, y1)), width or length, state)

@@ -90,7 +90,10 @@ def read_map(path: Path) -> OccupancyGrid:
 
 
 def _interpret(pixels: np.ndarray[Any, np.dtype[np.uint8]], fields: dict[str, Any], mode: str, path: Path) -> Any:
-    negate = fields.get("negate", 0) in {1, "1"}
+    negate = fields.get("negate", 0)
+    if negate not in {0, 1, "0", "1"}:  # True and False are 1 and 0
+        raise InvalidInputError(f"map negate {negate!r}", expected="0 or 1", where=path)
+    negate = negate in {1, "1"}
     occupied_above = _number(fields, "occupied_thresh", path, default=OCCUPIED_THRESH)
     free_below = _number(fields, "free_thresh", path, default=FREE_THRESH)
     if not 0.0 <= free_below < occupied_above <= 1.0:
@@ -140,16 +143,29 @@ def _picture_path(fields: dict[str, Any], path: Path) -> Path:
     named = Path(str(fields["image"]))
     folder = path.parent
     if named.is_absolute():
-        if named.exists():
+        if _exists(named):
             return named
         named = Path(named.name)
     elif ".." in named.parts:
         raise InvalidInputError(f"map image {str(named)!r}", expected="a picture in the folder of the YAML", where=path)
-    if not (folder / named).exists():
+    if not _exists(folder / named):
         raise InvalidInputError(
-            f"map image {str(named)!r} is missing", expected="a PGM or PNG beside the YAML", where=path
+            f"map image {_short(str(named))!r} is missing", expected="a PGM or PNG beside the YAML", where=path
         )
     return folder / named
+
+
+def _exists(path: Path) -> bool:
+    """Whether there is such a file; none has a name that the system refuses."""
+    try:
+        return path.exists()
+    except OSError:
+        return False
+
+
+def _short(text: str, *, longest: int = 80) -> str:
+    """A text for a message of one line."""
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
 def _read_picture(path: Path) -> tuple[np.ndarray[Any, np.dtype[np.uint8]], BoolArray]:

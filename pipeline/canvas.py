@@ -49,7 +49,10 @@ class Canvas:
         """Draw the cells: free white, occupied dark, unknown grey."""
         x0, y0, x1, y1 = self._bounds
         frame = grid.frame
-        (r0, c0), (r1, c1) = frame.to_cells(np.array([[x0, y0], [x1, y1]])).tolist()
+        # No further beyond the grid than it is large: in tiny cells, the margin around it would fill the memory.
+        reach = max(frame.rows, frame.cols, 100)
+        corners = frame.to_cells(np.array([[x0, y0], [x1, y1]]))
+        (r0, c0), (r1, c1) = np.clip(corners, -reach, np.array(frame.shape) + reach).tolist()
         window: GridFrame = frame.cropped(r0, c0, max(r1 - r0, 1), max(c1 - c0, 1))
         cells = grid.on(window)
         grey = np.full(window.shape, colours.UNKNOWN, dtype=np.uint8)
@@ -60,7 +63,7 @@ class Canvas:
         u0 = (x0 - window.origin_x) / window.resolution + step / 2 - 0.5
         v0 = window.rows - (y1 - window.origin_y) / window.resolution + step / 2 - 0.5
         # Area-averaging keeps thin walls visible where a pixel holds several cells.
-        box = max(round(step), 1)
+        box = min(max(round(step), 1), reach)
         smooth = cv2.blur(np.ascontiguousarray(grey[::-1]), (box, box))
         mapping = np.array([[step, 0.0, u0], [0.0, step, v0]])
         mode = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -123,7 +126,7 @@ class Canvas:
 
     def _fixed(self, points: FloatArray) -> npt.NDArray[np.int32]:
         x0, _, _, y1 = self._bounds
-        points = np.asarray(points, dtype=np.float64)
+        points = np.clip(np.asarray(points, dtype=np.float64), -1e300, 1e300)  # the product below stays finite
         u, v = (points[:, 0] - x0) * self.scale - 0.5, (y1 - points[:, 1]) * self.scale - 0.5
         pixels = np.clip(np.column_stack((u, v)), -FAR, FAR)
         fixed: npt.NDArray[np.int32] = np.rint(pixels * 2**SHIFT).astype(np.int32)

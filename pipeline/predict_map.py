@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
 from closedrooms.core.geojson import read_doors, write_doors, write_rooms
 from closedrooms.core.grid import OccupancyGrid
@@ -80,7 +81,10 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> P
     with output_folder(config.out, manifest) as folder:
         with watch.stage("predict"):
             progress.stage("predict")
-            prediction = predict(grid, doors, predictor_config(config), trace=config.record)
+            try:
+                prediction = predict(grid, doors, predictor_config(config), trace=config.record)
+            except InvalidInputError as error:
+                raise InvalidInputError(str(error), where=config.map) from error
         with watch.stage("record"), _recording(config, grid, folder / "run.rrd") as observer:
             observer.configuration(manifest["configuration"])
             observer.prediction(grid, doors, prediction)

@@ -6,9 +6,10 @@ import numpy as np
 import shapely
 
 from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.predictor.prediction import Shape
-from closedrooms.predictor.window import is_free
+from closedrooms.predictor.window import MAX_CELLS, is_free
 
 
 def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Shape]) -> OccupancyGrid:
@@ -21,11 +22,19 @@ def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Sha
 
     Returns:
         A map on the same lattice, grown by whole cells where a room leaves the frame.
+
+    Raises:
+        InvalidInputError: More than :data:`MAX_CELLS` cells, where those of the input are far too small for a room.
     """
     frame = grid.frame
     resolution = frame.resolution
     if shapes:
         x0, y0, x1, y1 = shapely.total_bounds([*shapes, *passages])
+        if (x1 - x0) * (y1 - y0) > MAX_CELLS * resolution**2:
+            raise InvalidInputError(
+                f"rooms over {x1 - x0:.3g} x {y1 - y0:.3g} m in cells of {resolution:g} m",
+                expected=f"at most {MAX_CELLS} cells; is the map's resolution in metres?",
+            )
         frame = frame.covering(x0 - 2 * resolution, y0 - 2 * resolution, x1 + 2 * resolution, y1 + 2 * resolution)
     out = grid.on(frame)
     cells = out.cells.copy()

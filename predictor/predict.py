@@ -39,6 +39,10 @@ def predict(
 
     Returns:
         The completed map on the lattice of the input, the rooms in the order of the doors, failures by door id.
+
+    Raises:
+        InvalidInputError: Two doors of one id; a known area that is too large for the cells that walls are looked for
+            in; a completed map of too many cells, where those of the input are tiny.
     """
     if config.preset == "best":
         from closedrooms.predictor.best.solve import predict_best

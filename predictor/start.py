@@ -1,5 +1,6 @@
 """From a map and doors to faces with one initial face a room (paper, sections 3.1 and 3.2)."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
+from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.arrangement import Arrangement, arrange
 from closedrooms.predictor.clutter import free_islands
@@ -15,6 +17,9 @@ from closedrooms.predictor.initial import Entrance, along_edge, find_entrance, s
 from closedrooms.predictor.structure import WallLines, find_structure
 from closedrooms.predictor.unknown import unknown_faces
 from closedrooms.predictor.window import at_resolution, known_window
+
+# No map of the earth reaches so far [m]; squares of much larger coordinates overflow.
+FARTHEST = 1e9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,19 +59,22 @@ def start_rooms(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: Predic
 
     Returns:
         The start, ``None`` where the map shows no structure at all, and why doors have no room, by door id.
+
+    Raises:
+        InvalidInputError: Two doors of one id, or a known area that is too large (:func:`at_resolution`).
     """
+    failures = unusable(doors, config.same_door)
+    waiting = [door for door in doors if door.id not in failures]
     window = known_window(grid)
     if window is None:
         return None, {door.id: "the map is all unknown" for door in doors}
     if not window.free.any():
         return None, {door.id: "the map holds no free cell" for door in doors}
     working = at_resolution(window, config.lines.resolution)
-    working = free_islands(working, config.clutter_area, [door.midpoint for door in doors], config.door_reach)
+    working = free_islands(working, config.clutter_area, [door.midpoint for door in waiting], config.door_reach)
     structure = find_structure(working, config)
     if structure is None:
         return None, {door.id: "the map holds no wall line" for door in doors}
-    failures = duplicates(doors, config.same_door)
-    waiting = [door for door in doors if door.id not in failures]
     arrangement, unknown, found = _split_until_apart(working, structure, waiting, config)
     failures |= {door: reason for door, reason in found.items() if isinstance(reason, str)}
     entrances = [entrance for entrance in found.values() if isinstance(entrance, Entrance)]
@@ -95,18 +103,28 @@ def _split_until_apart(
         lines += splits
 
 
-def duplicates(doors: Sequence[ClosedDoor], distance: float) -> dict[str, str]:
-    """Doors at the place of another one, of which that with the smallest id stays: the reason by door id.
+def unusable(doors: Sequence[ClosedDoor], distance: float) -> dict[str, str]:
+    """Doors at the place of another one, of which that with the smallest id stays, and those that no map reaches.
 
     Args:
         doors: Closed doors in any order.
         distance: Doors closer than this are the same door [m].
+
+    Returns:
+        The reason by door id.
+
+    Raises:
+        InvalidInputError: Two doors of one id: the result tells doors by it.
     """
     failures: dict[str, str] = {}
     kept: list[ClosedDoor] = []
     for door in sorted(doors, key=lambda d: (d.id, d.midpoint)):
-        same = [k.id for k in kept if np.hypot(*np.subtract(k.midpoint, door.midpoint)) < distance]
-        if same:
+        if door.id in failures or any(other.id == door.id for other in kept):
+            raise InvalidInputError(f"two doors with the id {door.id!r}", expected="one door an id")
+        same = [k.id for k in kept if math.dist(k.midpoint, door.midpoint) < distance]
+        if max(map(abs, door.midpoint)) > FARTHEST:
+            failures[door.id] = f"it lies more than {FARTHEST:g} m from the origin of the map"
+        elif same:
             failures[door.id] = f"at the same place as door {same[0]}"
         else:
             kept.append(door)

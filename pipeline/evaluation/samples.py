@@ -14,6 +14,7 @@ from closedrooms.core.room import Room
 from closedrooms.core.rosmap import read_map
 from closedrooms.pipeline.dataset.checksums import check, digest
 from closedrooms.pipeline.evaluation.listing import SamplePath
+from closedrooms.predictor.window import MAX_CELLS
 
 # Unknown cells kept around what is known when a sample is cropped [m].
 MARGIN = 3.0
@@ -50,7 +51,8 @@ def read_sample(sample: SamplePath) -> Sample:
     """Read a sample, check it against its checksums, and bring its grids to one frame.
 
     Raises:
-        InvalidInputError: A missing, broken or changed file, or grids that do not lie on one lattice.
+        InvalidInputError: A missing, broken or changed file, grids that do not lie on one lattice, or so far apart
+            that a frame that holds them has more than :data:`MAX_CELLS` cells.
     """
     if sample.problem:
         raise InvalidInputError(sample.problem)
@@ -67,7 +69,11 @@ def read_sample(sample: SamplePath) -> Sample:
     low, high = [min(b[i] for b in bounds) for i in (0, 1)], [max(b[i] for b in bounds) for i in (2, 3)]
     start = frame.to_cells(np.array(low) - MARGIN)
     end = frame.to_cells(np.array(high) + MARGIN)
-    window_frame = frame.cropped(int(start[0]), int(start[1]), int(end[0] - start[0]), int(end[1] - start[1]))
+    rows, cols = (int(size) for size in end - start)
+    if rows * cols > MAX_CELLS:
+        extent = f"{cols * frame.resolution:.6g} x {rows * frame.resolution:.6g} m in cells of {frame.resolution:g} m"
+        raise InvalidInputError(f"map and truth together cover {extent}", expected=f"at most {MAX_CELLS}", where=folder)
+    window_frame = frame.cropped(int(start[0]), int(start[1]), rows, cols)
     try:
         cropped = [grid.on(window_frame) for grid in grids]
     except InvalidInputError as error:

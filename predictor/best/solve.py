@@ -27,7 +27,7 @@ from closedrooms.predictor.clutter import free_islands
 from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.inpaint import inpaint, passage
 from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
-from closedrooms.predictor.start import duplicates
+from closedrooms.predictor.start import unusable
 from closedrooms.predictor.window import at_resolution, known_window
 
 # Cells that the evidence is counted in [m], that of the maps tuned on.
@@ -49,17 +49,23 @@ def predict_best(
 
     Returns:
         The completed map on the lattice of the input, rooms in the order of the doors, failures by door id.
+
+    Raises:
+        InvalidInputError: Two doors of one id, or a known area that is too large (:func:`at_resolution`).
     """
+    failures = unusable(doors, config.same_door)
+    waiting = [door for door in doors if door.id not in failures]
     window = known_window(grid)
     if window is None:
         return Prediction(grid, (), {door.id: "the map is all unknown" for door in doors})
     working = at_resolution(window, RESOLUTION)
-    working = free_islands(working, config.clutter_area, [door.midpoint for door in doors], config.door_reach)
+    working = free_islands(working, config.clutter_area, [door.midpoint for door in waiting], config.door_reach)
     directions = find_wall_directions(working)
     if directions is None:
         return Prediction(grid, (), {door.id: "the map holds no wall line" for door in doors})
     # 1. Which way each door looks, in a map turned along its wall.
-    turned, facings, failures = _face_all(working, doors, directions, config)
+    turned, facings, facing_nothing = _face_all(working, waiting, directions, config)
+    failures |= facing_nothing
     # 2. Rectangles and their evidence, door by door.
     thickness = wall_thickness(turned[float(directions.angles[0])])
     suspects = suspect(turned, facings, thickness)
@@ -105,10 +111,8 @@ def _face_all(
     """Maps turned along each direction in use, the doors in them, and the doors that face nothing."""
     turned = {float(directions.angles[0]): turn_map(grid, float(directions.angles[0]), margin=MARGIN)}
     facings: list[Facing] = []
-    failures = duplicates(doors, config.same_door)
+    failures: dict[str, str] = {}
     for door in doors:
-        if door.id in failures:
-            continue
         angle = directions.at(door)
         if angle not in turned:
             turned[angle] = turn_map(grid, angle, margin=MARGIN)

@@ -69,6 +69,7 @@ def test_a_bow_tie_is_repaired(tmp_path: Path) -> None:
     [
         (point(0, float("nan")), "JSON"),
         (point("a", "b"), "geometry"),
+        (point(10**400, 1), "geometry"),
         ({"type": "Feature", "properties": {}, "geometry": None}, "geometry"),
         (
             {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, 1], [0, 0]]]}},
@@ -106,6 +107,19 @@ def test_rejects_two_doors_of_one_id_and_other_json(tmp_path: Path) -> None:
     (tmp_path / "x").write_text("{")
     with pytest.raises(InvalidInputError, match="broken JSON"):
         read_doors(tmp_path / "x")
+
+
+def test_a_door_as_far_off_as_a_number_can_say_is_read(tmp_path: Path) -> None:
+    ends = [[1.7e308, 1.7e308], [1.6e308, 1.7e308]]
+    line = {"type": "Feature", "properties": {}, "geometry": {"type": "LineString", "coordinates": ends}}
+    (door,) = read_doors(collection(tmp_path / "d", line))
+    assert door.midpoint == pytest.approx((1.65e308, 1.7e308))
+
+
+@pytest.mark.parametrize("wrong", [{"midpoint": (float("nan"), 0.0)}, {"segment": ((0.0, 0.0), (float("inf"), 1.0))}])
+def test_a_door_without_finite_coordinates_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InvalidInputError, match="finite coordinates"):
+        ClosedDoor(**({"id": "a", "midpoint": (0.5, 0.5)} | wrong))
 
 
 def test_a_moved_door_keeps_its_width() -> None:

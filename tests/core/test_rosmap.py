@@ -72,6 +72,7 @@ def test_finds_the_picture_of_a_foreign_absolute_path_beside_the_yaml(tmp_path: 
         (HEAD.replace("0.05", "-1"), "resolution"),
         (HEAD.replace("0.05", "fine"), "resolution"),
         (HEAD.replace("0.65", "0.1"), "thresholds"),
+        (HEAD.replace("negate: 0", "negate: maybe"), "negate 'maybe'"),
     ],
 )
 def test_a_wrong_field_is_named_in_one_line_with_the_path_last(tmp_path: Path, head: str, message: str) -> None:
@@ -87,6 +88,9 @@ def test_rejects_missing_and_broken_files(tmp_path: Path) -> None:
         read_map(tmp_path / "none.yaml")
     path = tmp_path / "m.yaml"
     path.write_text("image: gone.png\n" + HEAD)
+    with pytest.raises(InvalidInputError, match="missing"):
+        read_map(path)
+    path.write_text(f"image: {'a' * 5000}\n" + HEAD)  # longer than any name of a file
     with pytest.raises(InvalidInputError, match="missing"):
         read_map(path)
     path.write_text("image: ../../etc/m.png\n" + HEAD)

@@ -93,7 +93,7 @@ def test_the_same_command_writes_the_same_bytes(corridor: Path) -> None:
 def test_doors_far_off_in_free_space_and_twice_the_same_are_named_and_the_others_predicted(
     corridor: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    places = {"free": (1.5, 2.0), "twin": (6.65, 0.0), "far": (60.0, 60.0), "galaxy": (1e12, -1e300)}
+    places = {"free": (1.5, 2.0), "twin": (6.65, 0.0), "far": (60.0, 60.0), "galaxy": (1.7e308, -1.7e308)}
     content = json.loads((corridor / "doors.geojson").read_text())
     for name, place in places.items():
         geometry = {"type": "Point", "coordinates": place}
@@ -103,7 +103,9 @@ def test_doors_far_off_in_free_space_and_twice_the_same_are_named_and_the_others
         out = corridor / preset
         words = ("predict", corridor / "map.yaml", "--doors", corridor / "doors.geojson", "--preset", preset)
         assert call(*words, "--out", out) == 3
-        assert "1 of 5 doors predicted" in capsys.readouterr().out
+        said = capsys.readouterr()
+        assert "1 of 5 doors predicted" in said.out
+        assert "Warning" not in said.err
         assert json.loads((out / "run.json").read_text())["doors"]["failures"].keys() == places.keys()
         rooms = json.loads((out / "rooms.geojson").read_text())["features"]
         assert [room["properties"]["doors"] for room in rooms] == [["d1"]]
@@ -118,7 +120,7 @@ def test_doors_far_off_in_free_space_and_twice_the_same_are_named_and_the_others
         ({"image": "short.pgm"}, "a picture that cannot be read"),
         ({"origin": "[0.0, 0.0, 0.3]"}, "map origin with yaw 0.3; expected yaw 0"),
         ({"resolution": "0.0"}, "grid resolution 0.0"),
-        ({"resolution": "90.0"}, "in cells of 90 m; expected at most 100000000 cells of 0.05 m"),
+        ({"resolution": "90.0"}, "in cells of 90 m; expected at most 100000000 cells of 0.05 m: "),
     ],
 )
 @pytest.mark.parametrize("preset", ["paper", "best"])
@@ -149,6 +151,19 @@ def test_a_map_of_one_kind_is_written_as_it_is_with_the_reason_for_every_door(
     assert call(*words, "--out", out) == 3
     assert set(json.loads((out / "run.json").read_text())["doors"]["failures"]) == {"d1"}
     assert (read_map(out / "predicted.yaml").cells == fill).all()
+
+
+@pytest.mark.parametrize("preset", ["paper", "best"])
+@pytest.mark.parametrize("resolution", [1e-12, 1e-4])
+def test_a_map_in_a_wrong_unit_is_written_as_it_is_with_the_reason_for_every_door(
+    corridor: Path, preset: str, resolution: float
+) -> None:
+    text = (corridor / "map.yaml").read_text().replace("resolution: 0.05", f"resolution: {resolution:.13f}")
+    (corridor / "map.yaml").write_text(text)
+    out = corridor / "out"
+    words = ("predict", corridor / "map.yaml", "--doors", corridor / "doors.geojson", "--preset", preset)
+    assert call(*words, "--out", out) == 3
+    assert set(json.loads((out / "run.json").read_text())["doors"]["failures"]) == {"d1"}
 
 
 @pytest.mark.parametrize("command", ["predict", "cover"])

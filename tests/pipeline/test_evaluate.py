@@ -125,6 +125,33 @@ def test_a_broken_sample_is_said_and_the_others_are_evaluated(
     assert "closedrooms: bad: a picture that cannot be read" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("origin: [1000000.0, 0.0, 0.0]", "map and truth together cover 1.00002e+06 x 13"),
+        ("origin: [0.02, 0.0, 0.0]", "different lattices"),
+        ("resolution: 0.1", "different lattices"),
+        ("origin: [0.0, 0.0, 0.5]", "yaw 0.5"),
+    ],
+)
+def test_a_truth_that_does_not_fit_the_map_is_said_and_the_others_are_evaluated(
+    tmp_path: Path, change: str, message: str
+) -> None:
+    write_sample(tmp_path / "data" / "good")
+    write_sample(tmp_path / "data" / "bad")
+    yaml = tmp_path / "data" / "bad" / "truth.yaml"
+    key = change.split(":", maxsplit=1)[0]
+    kept = [line for line in yaml.read_text().splitlines() if not line.startswith(key)]
+    yaml.write_text("\n".join([*kept, change]))
+    config = EvaluateConfig(
+        datasets=(tmp_path / "data",), out=tmp_path / "out", methods=("geometric",), workers=1, tours=False
+    )
+    result = evaluate(config)
+    assert list(result.failures) == ["bad"]
+    assert message in result.failures["bad"]
+    assert result.summary[0]["samples"] == 1
+
+
 def test_a_defect_that_one_map_brings_out_is_said_and_the_other_methods_go_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

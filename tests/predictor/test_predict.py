@@ -10,9 +10,11 @@ from shapely import affinity
 
 import closedrooms.predictor.structure as structure_module
 from closedrooms.core.door import ClosedDoor
+from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.geojson import read_doors
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.rosmap import read_map
+from closedrooms.predictor.baselines import geometric, line_of_sight
 from closedrooms.predictor.config import preset
 from closedrooms.predictor.predict import predict
 from closedrooms.predictor.segments import find_segments
@@ -184,6 +186,16 @@ def test_trouble_with_one_door_leaves_the_others(mapped, iou):
     assert [room.doors[0] for room in prediction.rooms] == [door.id for door in scene.doors]
     for room in prediction.rooms:
         assert iou(room.polygon, scene.hidden[room.doors[0]]) > 0.9
+
+
+def test_two_doors_of_one_id_are_refused_by_every_method(mapped):
+    scene = mapped()
+    twice = [*scene.doors, ClosedDoor(scene.doors[0].id, (14.0, 7.0))]
+    for method in (predict, line_of_sight, geometric):
+        with pytest.raises(InvalidInputError, match="two doors with the id 't1'"):
+            method(scene.grid, twice, PAPER)
+    with pytest.raises(InvalidInputError, match="two doors with the id 't1'"):
+        predict(scene.grid, twice, preset("best"))
 
 
 @pytest.mark.parametrize("fill", [UNKNOWN, FREE, OCCUPIED])

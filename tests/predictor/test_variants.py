@@ -5,6 +5,7 @@ import pytest
 import shapely
 from shapely.geometry import box
 
+from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.predictor.baselines import geometric, line_of_sight
 from closedrooms.predictor.clutter import filter_clutter, free_islands
@@ -143,6 +144,12 @@ def test_a_room_is_drawn_free_inside_and_occupied_on_its_outline():
     grown = inpaint(grid, [box(-1.03, 0.5, 1.5, 3.0)], [])
     assert grown.frame.origin_x == pytest.approx(-1.3)
     assert grown.frame.bounds[3] >= 3.0
+
+
+def test_a_room_of_too_many_cells_is_refused():
+    grid = OccupancyGrid(GridFrame(1e-4, 0, 0, 10, 10), np.full((10, 10), UNKNOWN, dtype=np.int8))
+    with pytest.raises(InvalidInputError, match=r"rooms over 5 x 5 m in cells of 0.0001 m"):
+        inpaint(grid, [box(0.0, 0.0, 5.0, 5.0)], [])
 
 
 def test_a_passage_leads_from_free_space_into_the_room():
