@@ -29,6 +29,8 @@ class Found:
 
 MAX_POINTS = 160
 """Points of a scan that a search looks at; the refinement that follows takes all."""
+HEADING_POINTS = 80
+"""Points of a scan that a search of headings looks at."""
 BATCH = 16
 """Blocks that are opened at once: fewer calls, at the price of a few blocks opened in vain."""
 FEW_BLOCKS = 5
@@ -146,24 +148,27 @@ def search_heading(field: LikelihoodField, points: FloatArray, guess: Pose2, sig
         sigma: Standard deviation of its heading [rad].
         reach: Half width of the search in standard deviations.
     """
-    points = points[:: -(-len(points) // MAX_POINTS)]
+    points = points[:: -(-len(points) // HEADING_POINTS)]
     step = _angle_step(field, points)
     count = math.ceil(reach * sigma / step)
     turns: FloatArray = np.arange(-count, count + 1, dtype=np.float64) * step
     lattice = field.lattice
-    cells = _exact_cells(field, points, guess, turns)
-    np.floor(cells, out=cells)
-    rows, cols = cells[:, 1::2], cells[:, ::2]
-    middle, far = (guess.x / lattice.resolution, guess.y / lattice.resolution), _farthest(points) / lattice.resolution
-    if not lattice.holds(middle, far + 1.0):
+    # In cells from the corner of the window, as complex numbers: a turn is one product. Single precision is plenty.
+    cell = lattice.resolution
+    middle = complex(guess.x / cell - lattice.col0, guess.y / cell - lattice.row0)
+    arms = (points @ np.array([1.0, 1.0j]) / cell).astype(np.complex64)
+    at = np.exp(1j * (guess.theta + turns)).astype(np.complex64)[:, None] * arms
+    at += np.complex64(middle)
+    cells = at.view(np.float32)
+    if not lattice.holds((guess.x / cell, guess.y / cell), _farthest(points) / cell + 1.0):
         # What lies outside reads the border, which is zero.
-        rows = np.clip(rows, lattice.row0, lattice.row0 + lattice.rows - 1)
-        cols = np.clip(cols, lattice.col0, lattice.col0 + lattice.cols - 1)
-    flat = rows * lattice.cols
-    flat += cols
-    flat -= lattice.row0 * lattice.cols + lattice.col0
-    likelihoods = field.values.reshape(-1).take(flat.astype(np.int64))
-    scores = likelihoods.mean(axis=1, dtype=np.float64) - PRIOR_COST * (turns / sigma) ** 2
+        np.clip(cells[:, ::2], 0.0, lattice.cols - 1.0, out=cells[:, ::2])
+        np.clip(cells[:, 1::2], 0.0, lattice.rows - 1.0, out=cells[:, 1::2])
+    whole = cells.astype(np.int32)
+    flat = whole[:, 1::2] * lattice.cols
+    flat += whole[:, ::2]
+    likelihoods = field.values.reshape(-1).take(flat)
+    scores = likelihoods.mean(axis=1) - PRIOR_COST * (turns / sigma) ** 2
     # From the middle outwards, so that the odometry wins ties.
     order = np.argsort(np.abs(turns), kind="stable")
     best = order[int(np.argmax(scores[order]))]

@@ -14,6 +14,7 @@ from closedrooms.mapping.beams import clean, hit_points, thin
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.doors import fuse_doors
 from closedrooms.mapping.evidence import EvidenceGrid
+from closedrooms.mapping.growing import GrowingArray
 from closedrooms.mapping.keyframe import Keyframe
 from closedrooms.mapping.localmap import LocalMap
 from closedrooms.mapping.loops import Loop, find_loop
@@ -40,8 +41,8 @@ class Mapper:
         self._loops: list[Loop] = []
         self._hessian: FloatArray = np.zeros((3, 3))
         self._tied_at = self._tried_at = 0.0
-        self._places: FloatArray = np.empty((0, 2))
-        self._driven: FloatArray = np.empty(0)
+        self._places = GrowingArray(2)
+        self._driven = GrowingArray()
         self._drawn = 0
         self._trusted = True
         self._evidence = EvidenceGrid(self._config)
@@ -142,8 +143,8 @@ class Mapper:
         self._keyframes.append(keyframe)
         if keyframe.index > 0:
             self._tie_to_previous(keyframe)
-        self._places = np.vstack((self._places, (keyframe.pose.x, keyframe.pose.y)))
-        self._driven = np.append(self._driven, keyframe.way)
+        self._places.append((keyframe.pose.x, keyframe.pose.y))
+        self._driven.append(keyframe.way)
         distances = self._distances(keyframe)
         self._tie_to_older(keyframe, distances)
         if self._config.loops.enabled and self._close_loop(keyframe, distances):
@@ -152,7 +153,7 @@ class Mapper:
 
     def _distances(self, keyframe: Keyframe) -> FloatArray:
         """From a keyframe to each as the crow flies, shape (keyframes,) [m]."""
-        offsets = self._places - (keyframe.pose.x, keyframe.pose.y)
+        offsets = self._places.values - (keyframe.pose.x, keyframe.pose.y)
         return np.asarray(np.hypot(offsets[:, 0], offsets[:, 1]))
 
     def _tie_to_previous(self, keyframe: Keyframe) -> None:
@@ -171,7 +172,7 @@ class Mapper:
         loops = self._config.loops
         if keyframe.way - self._tied_at < loops.link_interval:
             return
-        older = (keyframe.way - self._driven > loops.horizon / 2) & (self._graph.ways <= loops.horizon)
+        older = (keyframe.way - self._driven.values > loops.horizon / 2) & (self._graph.ways <= loops.horizon)
         candidates = np.flatnonzero(older & (distances <= loops.link_distance))
         if candidates.size == 0:
             return
@@ -214,7 +215,7 @@ class Mapper:
         """Move the keyframes; what hangs on them (way, doors, map) follows."""
         for keyframe, (x, y, theta) in zip(self._keyframes, poses, strict=True):
             keyframe.pose = Pose2(x, y, theta)
-        self._places = np.array(poses[:, :2])
+        self._places.values[:] = poses[:, :2]
         self._pose = self._keyframes[-1].pose
         self._local.clear()
         self._drawn = 0

@@ -7,6 +7,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.pose import Pose2
+from closedrooms.mapping.growing import GrowingArray
 from closedrooms.mapping.normal_equations import Pattern
 
 DAMPING = 1e-4
@@ -38,22 +39,32 @@ class Edge:
     loop: bool = False
 
 
+def _first(value: float) -> GrowingArray:
+    array = GrowingArray()
+    array.append(value)
+    return array
+
+
 @dataclass(slots=True)
 class PoseGraph:
     """Edges, and who is near to whom along them.
 
     Attributes:
         edges: In the order they were measured.
-        ways: Way along the graph [m] from the latest keyframe to each, shape (keyframes,).
     """
 
     edges: list[Edge] = field(default_factory=list)
-    ways: FloatArray = field(default_factory=lambda: np.zeros(1))
     _neighbours: dict[int, list[tuple[int, float]]] = field(default_factory=dict)
-    _chain: FloatArray = field(default_factory=lambda: np.zeros(1))
+    _ways: GrowingArray = field(default_factory=lambda: _first(0.0))
+    _chain: GrowingArray = field(default_factory=lambda: _first(0.0))
     """Way along the edges from one keyframe to the next only, from the first to each [m], shape (keyframes,)."""
     _shortcuts: list[tuple[int, int, float]] = field(default_factory=list)
     """All other edges: source, target, length."""
+
+    @property
+    def ways(self) -> FloatArray:
+        """Way along the graph [m] from the latest keyframe to each, shape (keyframes,), until the next edge."""
+        return self._ways.values
 
     def add(self, edge: Edge) -> None:
         """Add an edge: from the latest keyframe to the next one, or from an older one to the latest."""
@@ -62,8 +73,9 @@ class PoseGraph:
         self._neighbours.setdefault(edge.target, []).append((edge.source, edge.length))
         if edge.target == len(self.ways):
             # Every way from the next keyframe leads over this one.
-            self.ways = np.append(self.ways + edge.length, 0.0)
-            self._chain = np.append(self._chain, self._chain[-1] + edge.length)
+            self._ways.values[:] += edge.length
+            self._ways.append(0.0)
+            self._chain.append(float(self._chain.values[-1]) + edge.length)
         else:
             self._shortcuts.append((edge.source, edge.target, edge.length))
             if edge.length < self.ways[edge.source]:
@@ -76,13 +88,13 @@ class PoseGraph:
         self._neighbours[edge.source].pop()
         self._neighbours[edge.target].pop()
         self._shortcuts.pop()
-        self.ways = np.full(len(self.ways), np.inf)
+        self.ways[:-1] = np.inf
         self.ways[-1] = 0.0
         self._spread()
 
     def _spread(self) -> None:
         """Make the ways as short as the edges allow: along the chain at once, then over the shortcuts, and again."""
-        chain, ways = self._chain, self.ways
+        chain, ways = self._chain.values, self.ways
         shortcuts = np.array(self._shortcuts, dtype=np.float64).reshape(-1, 3)
         source, target = shortcuts[:, :2].T.astype(np.int64)
         while True:
@@ -93,7 +105,7 @@ class PoseGraph:
                 break
             np.minimum.at(ways, target, to_target)
             np.minimum.at(ways, source, to_source)
-        self.ways = ways
+        self.ways[:] = ways
 
     def within(self, start: int, limit: float) -> dict[int, float]:
         """Way along the graph [m] from ``start`` to each keyframe that is at most ``limit`` away (Dijkstra)."""
