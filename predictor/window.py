@@ -9,7 +9,7 @@ from closedrooms.core.grid import FREE, FREE_BELOW, OCCUPIED, OCCUPIED_ABOVE, UN
 # What of an interpolated cell must be occupied to stay so: below a half, as slanted walls one cell thick touch at
 # corners only.
 STAYS = 0.4
-# 10,000 x 10,000 cells are 25 ha in cells of 0.05 m, well within 1 GB; a map in metres for millimetres is beyond.
+# 10,000 x 10,000 cells are 25 ha in cells of 0.05 m; a map in metres for millimetres is beyond.
 MAX_CELLS = 100_000_000
 # Width of the Gaussian that evens out staircases [coarse cells].
 SMOOTH = 0.5

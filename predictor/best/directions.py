@@ -13,6 +13,9 @@ from closedrooms.core.grid import OccupancyGrid
 QUARTER = math.pi / 2
 # A second direction needs this share of the strongest one's walls: less is furniture or noise.
 MIN_SHARE = 0.12
+# The strongest direction holds so many times the edges that it would if all were equally strong; less is noise of
+# single cells. Measured: such noise 1.1 to 2.2, maps of furnished buildings from 4.8, of plain ones from 11.
+LEAST_CONTRAST = 3.0
 # Directions closer than this are one [rad].
 APART = math.radians(8.0)
 # Blur before the gradient is taken [cells]: a wall's staircase on the raster vanishes.
@@ -60,7 +63,7 @@ class WallDirections:
 
 
 def find_wall_directions(grid: OccupancyGrid) -> WallDirections | None:
-    """Peaks of the directions of the edges of free space; ``None`` where there is no edge."""
+    """Peaks of the directions of the edges of free space; ``None`` where there is no edge, or only noise."""
     occupied = np.argwhere(grid.occupied)
     image = cv2.GaussianBlur(grid.free.astype(np.float32), (0, 0), BLUR)
     gx, gy = cv2.Sobel(image, cv2.CV_32F, 1, 0), cv2.Sobel(image, cv2.CV_32F, 0, 1)
@@ -71,6 +74,8 @@ def find_wall_directions(grid: OccupancyGrid) -> WallDirections | None:
     angles = _wrapped(np.arctan2(gy[edge], gx[edge]).astype(np.float64))
     votes = np.bincount(np.floor((angles + QUARTER / 2) / math.radians(1.0)).astype(int) % 90, minlength=90)
     smooth = np.sum([np.roll(votes, k) * w for k, w in ((-2, 1), (-1, 2), (0, 3), (1, 2), (2, 1))], axis=0)
+    if smooth.max() < LEAST_CONTRAST * smooth.mean():
+        return None
     peaks: list[float] = []
     for index in sorted(range(90), key=lambda i: (-smooth[i], i)):
         angle = math.radians(index + 0.5) - QUARTER / 2

@@ -1,5 +1,6 @@
 import itertools
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -207,11 +208,28 @@ def test_a_map_of_one_kind_fails_every_door_with_a_reason(fill):
     assert prediction.grid is grid
 
 
-def test_noise_without_a_line_fails_with_a_reason():
-    cells = np.where(np.random.default_rng(0).random((150, 150)) < 0.02, OCCUPIED, FREE).astype(np.int8)
-    prediction = predict(OccupancyGrid(GridFrame(0.05, 0, 0, 150, 150), cells), [ClosedDoor("a", (3.0, 3.0))], PAPER)
-    assert prediction.rooms == ()
-    assert "a" in prediction.failures
+@pytest.mark.parametrize("size", [150, 400])
+@pytest.mark.parametrize(
+    ("config", "occupied"),
+    [
+        (PAPER, 0.01),
+        (PAPER, 0.02),
+        *(
+            (config, share)
+            for config in (replace(PAPER, structure="rose"), preset("best"))
+            for share in (0.01, 0.02, 0.1)
+        ),
+    ],
+    ids=lambda value: str(value) if isinstance(value, float) else f"{value.preset}-{value.structure}",
+)
+def test_noise_without_a_line_fails_with_a_reason(config, size, occupied):
+    for seed, free in itertools.product(range(3), (0.5, 1.0)):
+        dice = np.random.default_rng(seed).random((size, size))
+        cells = np.where(dice < occupied, OCCUPIED, np.where(dice < free, FREE, UNKNOWN)).astype(np.int8)
+        grid = OccupancyGrid(GridFrame(0.05, 0, 0, size, size), cells)
+        prediction = predict(grid, [ClosedDoor("a", (3.0, 3.0))], config)
+        assert prediction.rooms == ()
+        assert "a" in prediction.failures
 
 
 def test_no_doors_give_the_map_back(mapped):
@@ -229,6 +247,13 @@ def test_a_huge_map_costs_no_more_than_what_is_known(mapped):
     large = predict(huge, scene.doors, PAPER)
     assert large.grid.frame.shape == (7000, 7000)
     assert large.rooms[0].polygon.symmetric_difference(small.rooms[0].polygon).area < 1e-6
+
+
+def test_best_refuses_a_known_area_whose_tables_would_fill_the_memory():
+    cells = np.full((5001, 5001), UNKNOWN, dtype=np.int8)
+    cells[0, 0] = cells[-1, -1] = FREE
+    with pytest.raises(InvalidInputError, match="at most 25000000 cells"):
+        predict(OccupancyGrid(GridFrame(0.05, 0, 0, 5001, 5001), cells), [], preset("best"))
 
 
 @pytest.mark.parametrize(("environment", "closed"), [("office1_fs_updated", 6), ("Sabadell1_updated", 4)])
