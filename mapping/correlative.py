@@ -29,8 +29,6 @@ class Found:
 
 MAX_POINTS = 160
 """Points of a scan that a search looks at; the refinement that follows takes all."""
-HEADING_POINTS = 80
-"""Points of a scan that a search of headings looks at."""
 BATCH = 16
 """Blocks that are opened at once: fewer calls, at the price of a few blocks opened in vain."""
 FEW_BLOCKS = 5
@@ -148,7 +146,7 @@ def search_heading(field: LikelihoodField, points: FloatArray, guess: Pose2, sig
         sigma: Standard deviation of its heading [rad].
         reach: Half width of the search in standard deviations.
     """
-    points = points[:: -(-len(points) // HEADING_POINTS)]
+    points = points[:: -(-len(points) // MAX_POINTS)]
     step = _angle_step(field, points)
     count = math.ceil(reach * sigma / step)
     turns: FloatArray = np.arange(-count, count + 1, dtype=np.float64) * step
