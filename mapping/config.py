@@ -40,7 +40,7 @@ class MatcherConfig:
     min_score: float = 0.45
     """Mean likelihood [0..1] below which a refinement is doubted and a search is made."""
 
-    doubt: float = 0.85
+    doubt: float = 0.9
     """Share of the usual score below which a refinement is doubted and a search is made."""
 
     sure_angle: float = 0.02

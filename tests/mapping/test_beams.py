@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.beams import clean, hit_points, thin
+from closedrooms.mapping.beams import clean, hit_points, steadied, thin
 
 FULL = 2 * np.pi / 360
 
@@ -93,3 +93,43 @@ def test_thinning_evens_out_near_and_far() -> None:
     assert 9 <= (kept[:, 0] <= 1.0).sum() <= 12
     assert (kept[:, 0] >= 5).sum() >= 49
     assert len(thin(near, 0.001, 40)) <= 41
+
+
+def room(angles: np.ndarray) -> np.ndarray:
+    """Ranges to the walls of a room of 6 x 4 m from a place in it."""
+    x, y = np.array([2.0, -4.0]), np.array([1.5, -2.5])
+    with np.errstate(divide="ignore"):
+        to_x = np.where(np.cos(angles) > 0, x[0], x[1]) / np.cos(angles)
+        to_y = np.where(np.sin(angles) > 0, y[0], y[1]) / np.sin(angles)
+    return np.minimum(np.abs(to_x), np.abs(to_y))
+
+
+def test_straight_walls_without_noise_stay_where_they_are() -> None:
+    ranges = room(np.linspace(-np.pi, np.pi, 360, endpoint=False))
+    assert steadied(ranges, FULL, wrap=True) == pytest.approx(ranges, abs=1e-9)
+
+
+def test_noise_along_straight_walls_is_halved_at_least_and_few_beams_at_corners_lose() -> None:
+    truth, rng, noise = room(np.linspace(-np.pi, np.pi, 360, endpoint=False)), np.random.default_rng(0), 0.05
+    off = np.array([steadied(truth + rng.normal(scale=noise, size=360), FULL, wrap=True) - truth for _ in range(50)])
+    error = np.sqrt((off**2).mean(axis=0))
+    assert np.sqrt((off**2).mean()) < 0.5 * noise
+    assert (error > noise).sum() <= 0.03 * 360
+
+
+def test_a_step_larger_than_the_noise_stays_sharp() -> None:
+    ranges = np.full(360, 3.0)
+    ranges[180:] = 3.4
+    noisy = ranges + np.random.default_rng(1).normal(scale=0.01, size=360)
+    steady = steadied(noisy, FULL, wrap=False)
+    assert np.abs(steady - ranges)[170:190].max() < 0.03
+
+
+def test_gaps_are_neither_filled_nor_crossed() -> None:
+    ranges = np.full(360, 3.0) + np.random.default_rng(2).normal(scale=0.02, size=360)
+    ranges[100:103] = np.nan
+    steady = steadied(ranges, FULL, wrap=True)
+    assert np.isnan(steady[100:103]).all()
+    assert np.isfinite(np.delete(steady, [100, 101, 102])).all()
+    # A pair needs a beam on either side.
+    assert steady[[99, 103]] == pytest.approx(ranges[[99, 103]])
