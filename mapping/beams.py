@@ -23,9 +23,9 @@ ALONG = 4
 ON_WALL = (4.0, 3.0, 3.0, 3.0)
 """Standard deviations by which the mean of the next pair of neighbours may leave that of the beams within, from the
 innermost pair on: beams far off their wall need the averaging most, corners must end it."""
-STEADY = 0.002
-"""Standard deviation of the range below which a scan is left as it is [m]: a wall that is not quite straight would
-lose more than noise."""
+STEADY = 0.025
+"""Standard deviation of the range below which a scan is left as it is [m]: less than half a cell of the map thickens no
+wall, and corners and walls that are not quite straight would lose more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
