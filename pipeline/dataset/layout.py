@@ -74,12 +74,18 @@ def alone(folder: Path) -> Iterator[None]:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError as error:
                 raise OutputError(f"another closedrooms works on this dataset: {folder}") from error
-            for depth in ("*", "*/*", "*/*/*", "*/*/*/*"):
-                for path in filter(_unfinished, folder.glob(depth)):
-                    shutil.rmtree(path) if path.is_dir() else path.unlink()
+            _clear_unfinished(folder)
             yield
+            # A worker whose parent was killed may have lived on for a moment and have written since.
+            _clear_unfinished(folder)
     except OSError as error:
         raise OutputError(f"cannot write ({error.strerror}): {error.filename or folder}") from error
+
+
+def _clear_unfinished(folder: Path) -> None:
+    for depth in ("*", "*/*", "*/*/*", "*/*/*/*"):
+        for path in filter(_unfinished, folder.glob(depth)):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:

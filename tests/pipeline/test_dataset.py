@@ -19,6 +19,7 @@ from closedrooms.core.geojson import read_doors, read_rooms
 from closedrooms.core.rosmap import read_map
 from closedrooms.pipeline.commands import main
 from closedrooms.pipeline.dataset.config import DatasetConfig
+from closedrooms.pipeline.dataset.layout import alone
 from closedrooms.pipeline.dataset.variants import (
     World,
     find_variants,
@@ -397,3 +398,15 @@ def test_hugging_face_loads_three_splits_offline(made: Path, tmp_path: Path) -> 
     assert counts == str({"train": 4, "validation": 4, "test": 4})
     for column in ("map", "truth", "id", "closed", "area_mapped", "doors_geojson"):
         assert f"'{column}'" in columns
+
+
+def test_what_a_killed_worker_writes_after_its_parent_is_cleared_away_too(tmp_path: Path) -> None:
+    (tmp_path / "train" / "a").mkdir(parents=True)
+    with alone(tmp_path):
+        late = tmp_path / "train" / "a" / ".r01-c02.ezf9mop0.part"
+        late.mkdir()
+        (late / "map.png").write_bytes(b"half")
+        kept = tmp_path / "train" / "a" / "map.yaml"
+        kept.write_text("whole")
+    assert not late.exists()
+    assert kept.exists()
