@@ -78,7 +78,9 @@ def clean(scan: LaserScan, *, max_range: float) -> Beams:
     doubted |= too_long
     surface: BoolArray = ranges < reach
     surface &= ~doubted
-    crossed = np.where(too_long, typical, ranges)
+    # What was hit and what was crossed must agree, or the beams with long errors would clear the wall away.
+    steady = np.where(surface, steadied(np.where(surface, ranges, np.nan), scan.angle_increment, wrap=wrap), ranges)
+    crossed = np.where(too_long, typical, steady)
     missing = np.isnan(ranges)
     if missing.any():
         gap = missing & ~np.isnan(before) & ~np.isnan(after)
@@ -94,7 +96,6 @@ def clean(scan: LaserScan, *, max_range: float) -> Beams:
     outline[1::2] = halves * np.minimum(crossed, np.concatenate((crossed[1:], crossed[:1])))[:, None]
     if not wrap:
         outline = np.vstack((np.zeros((1, 2)), outline[:-1]))
-    steady = steadied(np.where(surface, ranges, np.nan), scan.angle_increment, wrap=wrap)
     points = directions[surface] * steady[surface, None]
     if scan.robot_T_sensor != (0.0, 0.0, 0.0):
         points, outline = sensor.transform(points), sensor.transform(outline)

@@ -140,3 +140,12 @@ def test_gaps_are_neither_filled_nor_crossed() -> None:
     assert not np.allclose(np.delete(steady, [100, 101, 102]), np.delete(ranges, [100, 101, 102]))
     # A pair needs a beam on either side.
     assert steady[[99, 103]] == pytest.approx(ranges[[99, 103]])
+
+
+def test_what_was_crossed_ends_where_the_surface_is() -> None:
+    truth = room(np.linspace(-np.pi, np.pi, 360, endpoint=False))
+    beams = clean(scan(truth + np.random.default_rng(4).normal(scale=0.05, size=360)), max_range=25.0)
+    assert len(beams.points) > 350
+    ends = beams.outline[0::2]
+    gaps = np.hypot(*(beams.points[:, None] - ends[None]).transpose(2, 0, 1)).min(axis=1)
+    assert gaps.max() < 1e-9
