@@ -91,9 +91,9 @@ def read_map(path: Path) -> OccupancyGrid:
 
 def _interpret(pixels: np.ndarray[Any, np.dtype[np.uint8]], fields: dict[str, Any], mode: str, path: Path) -> Any:
     negate = fields.get("negate", 0)
-    if negate not in {0, 1, "0", "1"}:  # True and False are 1 and 0
-        raise InvalidInputError(f"map negate {negate!r}", expected="0 or 1", where=path)
-    negate = negate in {1, "1"}
+    if negate not in (0, 1, "0", "1"):  # True and False are 1 and 0
+        raise InvalidInputError(f"map negate {_short(repr(negate))}", expected="0 or 1", where=path)
+    negate = negate in (1, "1")
     occupied_above = _number(fields, "occupied_thresh", path, default=OCCUPIED_THRESH)
     free_below = _number(fields, "free_thresh", path, default=FREE_THRESH)
     if not 0.0 <= free_below < occupied_above <= 1.0:

@@ -17,12 +17,10 @@ lidar) is not believed."""
 SURROUNDINGS = 2
 """Beams to each side whose median says how far one can see: two outliers in a row, at 1 % of them one scan in ten,
 still open no way through a wall."""
-
-ALONG = 4
-"""Beams to each side that a wall is drawn through."""
 ON_WALL = (4.0, 3.0, 3.0, 3.0)
 """Standard deviations by which the mean of the next pair of neighbours may leave that of the beams within, from the
-innermost pair on: beams far off their wall need the averaging most, corners must end it."""
+innermost pair on: beams far off their wall need the averaging most, corners must end it. A wall is drawn through as
+many beams to each side."""
 STEADY = 0.025
 """Standard deviation of the range below which a scan is left as it is [m]: less than half a cell of the map thickens no
 wall, and corners and walls that are not quite straight would lose more."""
@@ -118,36 +116,44 @@ def steadied(ranges: FloatArray, increment: float, *, wrap: bool) -> FloatArray:
     Returns:
         Shape (n,) [m], NaN where ``ranges`` is.
     """
-    n = ranges.size
-    if n <= 2 * ALONG:
+    reach, n = len(ON_WALL), ranges.size
+    if n <= 2 * reach:
         return ranges
     inverse = 1.0 / ranges
-    ends = np.full(ALONG, np.nan)
-    first, last = (inverse[-ALONG:], inverse[:ALONG]) if wrap else (ends, ends)
-    padded = np.concatenate((first, inverse, last))
-    square, count, total, spread = ranges * ranges, np.ones(n), inverse.copy(), 0.0
-    agree: BoolArray = np.ones(n, dtype=np.bool_)
-    for step in range(1, ALONG + 1):
-        ends_sum = padded[ALONG - step : ALONG - step + n] + padded[ALONG + step : ALONG + step + n]
-        pairs = ends_sum / (2.0 * math.cos(step * increment))
-        off = np.abs(pairs - total / count) * square
-        if step == 1:
-            known = off[~np.isnan(off)]
-            # The median of |x| is 0.6745 sigma, here of one beam less the mean of two others: 1.5 times its variance.
-            spread = float(np.median(known)) / 0.6745 / math.sqrt(1.5) if known.size else 0.0
-            if spread < STEADY:
-                return ranges
-        agree &= off <= ON_WALL[step - 1] * spread * np.sqrt(0.5 + 1.0 / count)
+    padded = _padded(inverse, reach, wrap=wrap)
+
+    def between(step: int) -> FloatArray:
+        """1/r between the two beams ``step`` to either side."""
+        low, high = padded[reach - step :][:n], padded[reach + step :][:n]
+        return np.asarray((low + high) / (2.0 * math.cos(step * increment)))
+
+    square = ranges * ranges
+    off = np.abs(between(1) - inverse) * square
+    known = off[~np.isnan(off)]
+    # The median of |x| is 0.6745 sigma, here of one beam less the mean of two others: 1.5 times the variance of one.
+    noise = float(np.median(known)) / 0.6745 / math.sqrt(1.5) if known.size else 0.0
+    if noise < STEADY:
+        return ranges
+    count, total, agree = np.ones(n), inverse.copy(), np.ones(n, dtype=np.bool_)
+    for step, sigmas in enumerate(ON_WALL, start=1):
+        pair = between(step)
+        off = np.abs(pair - total / count) * square
+        agree &= off <= sigmas * noise * np.sqrt(0.5 + 1.0 / count)
         count += np.where(agree, 2.0, 0.0)
-        total += np.where(agree, 2.0 * pairs, 0.0)
+        total += np.where(agree, 2.0 * pair, 0.0)
     return np.asarray(count / total)
+
+
+def _padded(values: FloatArray, reach: int, *, wrap: bool) -> FloatArray:
+    """The values of a scan with ``reach`` more at either end: those of the other end, or NaN."""
+    ends = np.full(reach, np.nan)
+    first, last = (values[-reach:], values[:reach]) if wrap else (ends, ends)
+    return np.concatenate((first, values, last))
 
 
 def _around(ranges: FloatArray, *, wrap: bool) -> list[FloatArray]:
     """Ranges of each beam's neighbours and itself, 2 * SURROUNDINGS + 1 of shape (n,), NaN beyond the ends."""
-    ends = np.full(SURROUNDINGS, np.nan)
-    first, last = (ranges[-SURROUNDINGS:], ranges[:SURROUNDINGS]) if wrap else (ends, ends)
-    padded = np.concatenate((first, ranges, last))
+    padded = _padded(ranges, SURROUNDINGS, wrap=wrap)
     return [padded[i : i + ranges.size] for i in range(2 * SURROUNDINGS + 1)]
 
 

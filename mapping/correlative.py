@@ -37,41 +37,12 @@ TIE = 1e-9
 """Mean likelihood by which a later candidate must be better: rounding decides nothing."""
 
 
-def search(
-    field: LikelihoodField,
-    points: FloatArray,
-    guess: Pose2,
-    window: Window,
-    *,
-    coarse_cells: int = 4,
-    prior_sigmas: tuple[float, float] | None = None,
-    away_from: tuple[Pose2, float] | None = None,
-    floor: float = -math.inf,
-) -> Found:
-    """Find the pose in the window with the highest mean likelihood, exactly on the lattice of candidate poses.
+class Search:
+    """The poses of a window, on a lattice, and the one of the highest mean likelihood among them, found exactly.
 
     Correlative scan matching after Olson, ICRA 2009, section III: scores on a field of block maxima are upper bounds,
-    so blocks are opened in the order of their bound until no other can win.
-
-    Args:
-        field: The surfaces.
-        points: Robot frame, shape (n, 2) [m].
-        guess: Centre of the window, ``map_T_robot``.
-        window: Half widths.
-        coarse_cells: Width of a block in cells.
-        prior_sigmas: Standard deviations ``(distance [m], angle [rad])`` of the guess; lowers the score far from it.
-        away_from: A pose, and the distance [m] within which of it none is taken: finds its rivals.
-        floor: Score without the prior below which a pose is of no interest.
-
-    Returns:
-        The best pose; its score without the prior, 0 where ``away_from`` leaves none or none reaches ``floor``.
+    so blocks are opened in the order of their bound until no other can win. The bounds serve several questions.
     """
-    searched = Search(field, points, guess, window, coarse_cells=coarse_cells, prior_sigmas=prior_sigmas)
-    return searched.best(away_from=away_from, floor=floor)
-
-
-class Search:
-    """A window with the bounds of its blocks, of which several things can be asked; arguments as of :func:`search`."""
 
     def __init__(
         self,
@@ -83,6 +54,17 @@ class Search:
         coarse_cells: int = 4,
         prior_sigmas: tuple[float, float] | None = None,
     ) -> None:
+        """Bound the score of every block.
+
+        Args:
+            field: The surfaces.
+            points: Robot frame, shape (n, 2) [m].
+            guess: Centre of the window, ``map_T_robot``.
+            window: Half widths.
+            coarse_cells: Width of a block in cells.
+            prior_sigmas: Standard deviations ``(distance [m], angle [rad])`` of the guess; lowers the score far from
+                it.
+        """
         points = points[:: -(-len(points) // MAX_POINTS)]
         self._resolution, self._guess, self._sigmas = field.lattice.resolution, guess, prior_sigmas
         angle_step = _angle_step(field, points)
@@ -102,7 +84,15 @@ class Search:
         self._inner = inner.reshape(1, -1, 2)
 
     def best(self, *, away_from: tuple[Pose2, float] | None = None, floor: float = -math.inf) -> Found:
-        """The best pose of the window."""
+        """The pose of the window with the highest mean likelihood, less what the prior takes.
+
+        Args:
+            away_from: A pose, and the distance [m] within which of it none is taken: finds its rivals.
+            floor: Score without the prior below which a pose is of no interest.
+
+        Returns:
+            The best pose; its score without the prior, 0 where ``away_from`` leaves none or none reaches ``floor``.
+        """
         guess, bounds, inner = self._guess, self._bounds, self._inner
         # The prior, at most as in the last corner, must not hide a pose above the floor.
         corner = np.full((1, 2), self._corner)

@@ -56,19 +56,10 @@ class Lattice:
         Raises:
             InvalidInputError: The window would grow beyond any building.
         """
-        (col_low, row_low), (col_high, row_high) = (
-            [math.floor(value / self.resolution) for value in corner.tolist()] for corner in (low, high)
-        )
-        col_low, row_low, col_high, row_high = (
-            col_low - margin,
-            row_low - margin,
-            col_high + margin + 1,
-            row_high + margin + 1,
-        )
-        before_rows = _growth(self.row0 - row_low)
-        after_rows = _growth(row_high - self.row0 - self.rows)
-        before_cols = _growth(self.col0 - col_low)
-        after_cols = _growth(col_high - self.col0 - self.cols)
+        col_low, row_low = (math.floor(value / self.resolution) - margin for value in low.tolist())
+        col_high, row_high = (math.floor(value / self.resolution) + margin + 1 for value in high.tolist())
+        before_rows, after_rows = _growth(self.row0 - row_low), _growth(row_high - self.row0 - self.rows)
+        before_cols, after_cols = _growth(self.col0 - col_low), _growth(col_high - self.col0 - self.cols)
         if not (before_rows or after_rows or before_cols or after_cols):
             return None
         rows, cols = self.rows + before_rows + after_rows, self.cols + before_cols + after_cols

@@ -74,12 +74,8 @@ class LikelihoodField:
         # Neighbouring beams that hit one cell: the first is enough.
         alone = np.ones(len(flat), dtype=np.bool_)
         np.not_equal(flat[1:], flat[:-1], out=alone[1:])
-        if len(scans) > 1:
-            starts = ends[:-1]
-            alone[starts[starts < len(flat)]] = True
-            ends = np.cumsum(alone)[ends - 1]
-        else:
-            ends[0] = np.count_nonzero(alone)
+        alone[ends[ends < len(flat)]] = True
+        ends = np.concatenate(([0], np.cumsum(alone)))[ends]
         flat, stamps = flat[alone], stamps[alone]
         values, start = self.values.reshape(-1), 0
         for end in ends.tolist():

@@ -8,7 +8,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MatcherConfig
-from closedrooms.mapping.correlative import Window, search, search_heading
+from closedrooms.mapping.correlative import Search, Window, search_heading
 from closedrooms.mapping.likelihood import LikelihoodField
 from closedrooms.mapping.refinement import Refined, refine
 
@@ -121,7 +121,7 @@ def match_scan(
     """Refine the pose that odometry predicts, so that the scan lies on the surfaces of the field.
 
     The prediction is refined at once (:func:`refine`); when the fit is worse than usual, the window that the odometry
-    leaves open is searched (:func:`search`).
+    leaves open is searched (:class:`Search`).
 
     Args:
         field: Surfaces known so far.
@@ -153,7 +153,7 @@ def match_scan(
         min(max(config.window_sigmas * sigma_distance, 3 * field.lattice.resolution), config.max_window),
         min(max(config.window_sigmas * sigma_angle, 0.05), config.max_window_angle),
     )
-    found = search(field, points, guess, window, prior_sigmas=(sigma_distance, sigma_angle))
+    found = Search(field, points, guess, window, prior_sigmas=(sigma_distance, sigma_angle)).best()
     best = direct
     if found.score > 0.0:
         other = refined(found.pose)

@@ -73,6 +73,7 @@ def test_finds_the_picture_of_a_foreign_absolute_path_beside_the_yaml(tmp_path: 
         (HEAD.replace("0.05", "fine"), "resolution"),
         (HEAD.replace("0.65", "0.1"), "thresholds"),
         (HEAD.replace("negate: 0", "negate: maybe"), "negate 'maybe'"),
+        (HEAD.replace("negate: 0", "negate: [1]"), r"negate \[1\]"),
     ],
 )
 def test_a_wrong_field_is_named_in_one_line_with_the_path_last(tmp_path: Path, head: str, message: str) -> None:

@@ -41,3 +41,17 @@ def test_an_empty_scan_changes_nothing() -> None:
     field = LikelihoodField(0.05, MatcherConfig())
     field.add(np.empty((0, 2)))
     assert not field.values.any()
+
+
+def test_each_scan_stamps_what_those_before_it_left_unknown_wherever_an_empty_one_comes() -> None:
+    rng = np.random.default_rng(0)
+    scans = [np.column_stack((np.linspace(0.0, 2.0, 60), rng.normal(scale=0.03, size=60))) for _ in range(3)]
+    nothing = np.empty((0, 2))
+    alone = LikelihoodField(0.05, MatcherConfig())
+    for scan in scans:
+        alone.add(scan)
+    for order in (scans, [nothing, *scans], [scans[0], nothing, *scans[1:]], [*scans, nothing]):
+        together = LikelihoodField(0.05, MatcherConfig())
+        together.add_scans(order)
+        size = np.minimum(alone.values.shape, together.values.shape)
+        assert (together.values[: size[0], : size[1]] == alone.values[: size[0], : size[1]]).all()

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import hit_points, thin
 from closedrooms.mapping.config import MatcherConfig
-from closedrooms.mapping.correlative import Window, search, search_heading
+from closedrooms.mapping.correlative import Search, Window, search_heading
 from closedrooms.mapping.likelihood import LikelihoodField
 from closedrooms.mapping.matcher import Motion, match_scan
 from closedrooms.mapping.refinement import refine
@@ -61,7 +61,7 @@ def test_points_outside_the_field_do_no_harm() -> None:
 def test_the_search_finds_what_trying_every_pose_finds(dx: float, dy: float, turn: float, coarse: int) -> None:
     points = 0.997 * shape(120) + 0.0031  # off the borders of cells, where rounding decides
     guess = Pose2(dx, dy, turn)
-    found = search(FIELD, points, guess, Window(0.25, 0.03), coarse_cells=coarse)
+    found = Search(FIELD, points, guess, Window(0.25, 0.03), coarse_cells=coarse).best()
     step = math.sqrt((points**2).sum() / len(points))
     step = min(max(2 * 0.05 / max(step, 1.0), 0.004), 0.04)
     best = 0.0
@@ -84,7 +84,7 @@ def test_the_search_finds_what_trying_every_pose_finds(dx: float, dy: float, tur
 def test_the_search_recovers_a_metre_and_fifteen_degrees() -> None:
     truth = Pose2(0.9, -0.8, 0.26)
     field = field_of(truth.transform(shape(900)))
-    found = search(field, shape(), Pose2(), Window(1.2, 0.35))
+    found = Search(field, shape(), Pose2(), Window(1.2, 0.35)).best()
     assert found.pose.distance(truth) < 0.08
     assert abs(found.pose.theta - truth.theta) < 0.04
 
@@ -93,7 +93,7 @@ def test_the_prior_settles_ties_in_favour_of_the_odometry() -> None:
     x = np.arange(-10, 10, 0.05)
     walls = np.vstack((np.column_stack((x, np.full(400, 1.0))), np.column_stack((x, np.full(400, -1.0)))))
     points = walls[np.abs(walls[:, 0]) < 5]
-    found = search(field_of(walls), points, Pose2(), Window(0.5, 0.05), prior_sigmas=(0.1, 0.05))
+    found = Search(field_of(walls), points, Pose2(), Window(0.5, 0.05), prior_sigmas=(0.1, 0.05)).best()
     assert abs(found.pose.x) <= 0.1
 
 
@@ -152,8 +152,9 @@ def test_a_place_that_repeats_has_a_rival(repeated: bool, least: float, most: fl
     if repeated:
         field.add(corner + np.array((0.0, 2.5)))
     window = Window(3.0, 0.1)
-    best = search(field, corner, Pose2(0.2, 0.1, 0.0), window, prior_sigmas=(3.0, 0.1))
-    rival = search(field, corner, Pose2(0.2, 0.1, 0.0), window, prior_sigmas=(3.0, 0.1), away_from=(best.pose, 1.0))
+    searched = Search(field, corner, Pose2(0.2, 0.1, 0.0), window, prior_sigmas=(3.0, 0.1))
+    best = searched.best()
+    rival = searched.best(away_from=(best.pose, 1.0))
     assert best.pose.distance(Pose2()) < 0.06
     assert rival.pose.distance(best.pose) >= 1.0
     assert least <= rival.score / best.score <= most
@@ -165,8 +166,9 @@ def test_a_place_that_repeats_has_a_rival(repeated: bool, least: float, most: fl
 @given(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8), st.floats(-0.2, 0.2), st.floats(0.0, 1.0))
 def test_a_floor_hides_only_what_lies_below_it(dx: float, dy: float, turn: float, floor: float) -> None:
     guess, window = Pose2(dx, dy, turn), Window(0.6, 0.1)
-    best = search(FIELD, shape(120), guess, window, prior_sigmas=(0.6, 0.1))
-    found = search(FIELD, shape(120), guess, window, prior_sigmas=(0.6, 0.1), floor=floor)
+    searched = Search(FIELD, shape(120), guess, window, prior_sigmas=(0.6, 0.1))
+    best = searched.best()
+    found = searched.best(floor=floor)
     if best.score >= floor:
         assert found == best
     else:
@@ -174,5 +176,5 @@ def test_a_floor_hides_only_what_lies_below_it(dx: float, dy: float, turn: float
 
 
 def test_nothing_is_found_where_nothing_reaches_the_floor() -> None:
-    found = search(FIELD, shape(120), Pose2(30.0, 0.0, 0.0), Window(0.6, 0.1), floor=0.3)
+    found = Search(FIELD, shape(120), Pose2(30.0, 0.0, 0.0), Window(0.6, 0.1)).best(floor=0.3)
     assert found.score == 0.0
