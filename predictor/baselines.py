@@ -152,18 +152,22 @@ def _faces_in_sight(start: Start, room: int) -> Shape:
     inner: BoolArray = start.unknown & ~arrangement.border
     inner[entrance.face] = True
     eye = np.array(entrance.door.midpoint) + 1e-3 * start.inward(room)
-    seen, queue = {entrance.face}, [entrance.face]
+    crossed = shapely.STRtree([arrangement.faces[face] for face in np.flatnonzero(inner)])
+    asked, seen, queue = {entrance.face}, [entrance.face], [entrance.face]
     while queue:
         for other in arrangement.neighbours[queue.pop()]:
-            if other not in seen and inner[other] and _in_sight(start, inner, eye, other):
-                seen.add(other)
+            if other in asked or not inner[other]:
+                continue
+            asked.add(other)
+            if _in_sight(crossed, eye, arrangement.faces[other]):
+                seen.append(other)
                 queue.append(other)
     return joined([arrangement.faces[face] for face in sorted(seen)])
 
 
-def _in_sight(start: Start, inner: BoolArray, eye: FloatArray, face: int) -> bool:
+def _in_sight(inner: shapely.STRtree, eye: FloatArray, face: Polygon) -> bool:
     """Whether the way from the door to the centre of a face crosses inner faces only."""
-    faces = start.arrangement.faces
-    way = shapely.LineString((eye, faces[face].centroid.coords[0]))
-    inside = sum(float(way.intersection(faces[f]).length) for f in np.flatnonzero(inner) if way.intersects(faces[f]))
+    way = shapely.LineString((eye, face.centroid.coords[0]))
+    crossed = inner.geometries[inner.query(way, predicate="intersects")]
+    inside = float(shapely.length(shapely.intersection(way, crossed)).sum())
     return inside >= way.length - 0.1

@@ -54,18 +54,36 @@ def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Sha
 
 
 def fill_shape(shape: Shape, frame: GridFrame, mask: BoolArray) -> None:
-    """Mark cells whose centre lies in a shape."""
+    """Mark cells whose centre lies in a shape, row by row: from its first side to its second, third to fourth, ..."""
     if shape.is_empty:
         return
-    x0, y0, x1, y1 = shape.bounds
-    (r0, c0), (r1, c1) = frame.to_cells(np.array([[x0, y0], [x1, y1]]))
-    rows = np.arange(max(r0, 0), min(r1, frame.rows - 1) + 1)
-    cols = np.arange(max(c0, 0), min(c1, frame.cols - 1) + 1)
-    if rows.size == 0 or cols.size == 0:
-        return
-    points = frame.to_points(np.stack(np.meshgrid(rows, cols, indexing="ij"), axis=-1))
-    shapely.prepare(shape)
-    mask[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1] |= shapely.contains_xy(shape, points[..., 0], points[..., 1])
+    x = frame.to_points(np.stack((np.zeros(frame.cols, dtype=np.int64), np.arange(frame.cols)), axis=-1))[:, 0]
+    y = frame.to_points(np.stack((np.arange(frame.rows), np.zeros(frame.rows, dtype=np.int64)), axis=-1))[:, 1]
+    low, high = _sides(shape)
+    # Rows that each side crosses: its lower end belongs to it, its upper one does not.
+    first, after = np.searchsorted(y, low[:, 1]), np.searchsorted(y, high[:, 1])
+    side = np.repeat(np.arange(len(low)), after - first)
+    row = np.arange(side.size) - np.repeat(np.cumsum(after - first) - after, after - first)
+    rise = (y[row] - low[side, 1]) / (high[side, 1] - low[side, 1])
+    crossing = low[side, 0] + rise * (high[side, 0] - low[side, 0])
+    order = np.lexsort((crossing, row))
+    row, crossing = row[order], crossing[order]
+    left, right = np.searchsorted(x, crossing[::2], side="right"), np.searchsorted(x, crossing[1::2])
+    # A centre on the outline does not lie in the shape: rows through corners may run along a side.
+    corner = np.isin(y[row[::2]], shapely.get_coordinates(shape)[:, 1])
+    for r, c0, c1, asked in zip(row[::2].tolist(), left.tolist(), right.tolist(), corner.tolist(), strict=True):
+        mask[r, c0:c1] |= shapely.contains_xy(shape, x[c0:c1], y[r]) if asked else True
+
+
+def _sides(shape: Shape) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper end of every side of a shape that is not level [m], shape (n, 2) each."""
+    points, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(shape)), return_index=True)
+    same = ring[1:] == ring[:-1]
+    start, end = points[:-1][same], points[1:][same]
+    upward = (start[:, 1] < end[:, 1])[:, None]
+    low, high = np.where(upward, start, end), np.where(upward, end, start)
+    slanted = low[:, 1] < high[:, 1]
+    return low[slanted], high[slanted]
 
 
 def _trace(shape: Shape, frame: GridFrame, mask: BoolArray) -> None:
