@@ -54,7 +54,10 @@ def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Sha
 
 
 def fill_shape(shape: Shape, frame: GridFrame, mask: BoolArray) -> None:
-    """Mark cells whose centre lies in a shape, row by row: from its first side to its second, third to fourth, ..."""
+    """Mark cells whose centre lies in a shape, row by row: from its first side to its second, third to fourth, ...
+
+    A centre on an upright side does not lie in it; on a slanted one rounding decides.
+    """
     if shape.is_empty:
         return
     x = frame.to_points(np.stack((np.zeros(frame.cols, dtype=np.int64), np.arange(frame.cols)), axis=-1))[:, 0]
