@@ -29,6 +29,7 @@ from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.posegraph import Edge, Solution, optimise
 from closedrooms.mapping.recorded import RecordedRun, read_run
 from closedrooms.mapping.refinement import refine
+from closedrooms.mapping.sweeps import sweeps
 from closedrooms.mapping.trajectory import ate
 
 WITHOUT_LOOPS = MapperConfig(loops=LoopConfig(enabled=False))
@@ -59,7 +60,8 @@ def mapped(run: RecordedRun, config: MapperConfig) -> tuple[Mapper, FloatArray, 
     """The mapper after a run, the poses as estimated at the time, and the processor and wall-clock time it took [s]."""
     mapper = Mapper(config)
     start = clocks()
-    online = [mapper.process(s, Pose2(*o)).as_tuple() for s, o in zip(run.scans, run.odometry, strict=True)]
+    taken = zip(run.scans, run.odometry, sweeps(run.scans, config), strict=True)
+    online = [mapper.process(scan, Pose2(*pose), sweep=sweep).as_tuple() for scan, pose, sweep in taken]
     mapper.finish()
     mapper.grid()
     return mapper, np.array(online), since(start)

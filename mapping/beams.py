@@ -45,8 +45,8 @@ def hit_points(scan: LaserScan, *, max_range: float) -> FloatArray:
     """End points of all beams that ended on something up to ``max_range`` [m], robot frame, shape (n, 2)."""
     ranges = scan.ranges
     hits = (ranges >= scan.range_min) & (ranges < min(max_range, scan.range_max))
-    directions, _ = _directions(scan.angle_min, scan.angle_increment, ranges.size)
-    points: FloatArray = directions[hits] * ranges[hits, None]
+    units, _ = directions(scan.angle_min, scan.angle_increment, ranges.size)
+    points: FloatArray = units[hits] * ranges[hits, None]
     return points if scan.robot_T_sensor == (0.0, 0.0, 0.0) else Pose2(*scan.robot_T_sensor).transform(points)
 
 
@@ -63,11 +63,20 @@ def clean(scan: LaserScan, *, max_range: float) -> Beams:
         scan: NaN is a drop-out, infinity (or anything from ``range_max``) is no return up to ``range_max``.
         max_range: Longer ranges are cut to this [m].
     """
-    reach = min(max_range, scan.range_max)
-    ranges = np.where(scan.ranges >= scan.range_max, np.inf, scan.ranges)
-    if scan.range_min > 0.0:
-        ranges[ranges < scan.range_min] = np.nan
-    wrap = abs(abs(scan.angle_increment) * ranges.size - 2.0 * math.pi) < 1.5 * abs(scan.angle_increment)
+    return clean_alike([scan], max_range=max_range)[0]
+
+
+def clean_alike(scans: Sequence[LaserScan], *, max_range: float) -> list[Beams]:
+    """As :func:`clean`, for several scans that differ in ranges and stamps only."""
+    # Arrays below are of shape (scans, beams).
+    first = scans[0]
+    reach, increment = min(max_range, first.range_max), first.angle_increment
+    ranges = np.stack([scan.ranges for scan in scans])
+    ranges[ranges >= first.range_max] = np.inf
+    if first.range_min > 0.0:
+        ranges[ranges < first.range_min] = np.nan
+    beams = ranges.shape[1]
+    wrap = beams > 2 * SURROUNDINGS and abs(abs(increment) * beams - 2.0 * math.pi) < 1.5 * abs(increment)
     around = _around(ranges, wrap=wrap)
     before, after = around[SURROUNDINGS - 1], around[SURROUNDINGS + 1]
     typical = _median(around)
@@ -77,7 +86,7 @@ def clean(scan: LaserScan, *, max_range: float) -> Beams:
     surface: BoolArray = ranges < reach
     surface &= ~doubted
     # What was hit and what was crossed must agree, or the beams with long errors would clear the wall away.
-    steady = np.where(surface, steadied(np.where(surface, ranges, np.nan), scan.angle_increment, wrap=wrap), ranges)
+    steady = np.where(surface, steadied(np.where(surface, ranges, np.nan), increment, wrap=wrap), ranges)
     crossed = np.where(too_long, typical, steady)
     missing = np.isnan(ranges)
     if missing.any():
@@ -86,18 +95,22 @@ def clean(scan: LaserScan, *, max_range: float) -> Beams:
         crossed[np.isnan(crossed)] = 0.0
     np.minimum(crossed, reach, out=crossed)
 
-    sensor = Pose2(*scan.robot_T_sensor)
-    directions, halves = _directions(scan.angle_min, scan.angle_increment, ranges.size)
+    sensor = Pose2(*first.robot_T_sensor)
+    units, halves = directions(first.angle_min, increment, beams)
+    following = np.concatenate((crossed[:, 1:], crossed[:, :1]), axis=1)
     # Each beam's end, and half-way to the next beam the shorter of the two.
-    outline = np.empty((2 * crossed.size, 2))
-    outline[0::2] = directions * crossed[:, None]
-    outline[1::2] = halves * np.minimum(crossed, np.concatenate((crossed[1:], crossed[:1])))[:, None]
+    outlines = np.empty((len(scans), 2 * beams, 2))
+    outlines[:, 0::2] = units * crossed[:, :, None]
+    outlines[:, 1::2] = halves * np.minimum(crossed, following)[:, :, None]
     if not wrap:
-        outline = np.vstack((np.zeros((1, 2)), outline[:-1]))
-    points = directions[surface] * steady[surface, None]
-    if scan.robot_T_sensor != (0.0, 0.0, 0.0):
-        points, outline = sensor.transform(points), sensor.transform(outline)
-    return Beams(points, outline, np.array([sensor.x, sensor.y]))
+        outlines[:, 1:] = outlines[:, :-1].copy()
+        outlines[:, 0] = 0.0
+    ends = units * np.where(surface, steady, 0.0)[:, :, None]
+    if first.robot_T_sensor != (0.0, 0.0, 0.0):
+        ends, outlines = sensor.transform(ends), sensor.transform(outlines)
+    origin = np.array([sensor.x, sensor.y])
+    # Copies: a scan that is kept must not keep the others.
+    return [Beams(end[on], outline.copy(), origin) for end, on, outline in zip(ends, surface, outlines, strict=True)]
 
 
 def steadied(ranges: FloatArray, increment: float, *, wrap: bool) -> FloatArray:
@@ -109,14 +122,14 @@ def steadied(ranges: FloatArray, increment: float, *, wrap: bool) -> FloatArray:
     pairs of the whole scan tell: steps and corners stay as sharp as that noise lets them be seen.
 
     Args:
-        ranges: Of the beams on surfaces, NaN elsewhere, shape (n,) [m].
+        ranges: Of the beams on surfaces, NaN elsewhere, shape (..., n), a row a scan [m].
         increment: Angle from beam to beam [rad].
         wrap: The first beam follows upon the last.
 
     Returns:
-        Shape (n,) [m], NaN where ``ranges`` is.
+        Shape (..., n) [m], NaN where ``ranges`` is.
     """
-    reach, n = len(ON_WALL), ranges.size
+    reach, n = len(ON_WALL), ranges.shape[-1]
     if n <= 2 * reach:
         return ranges
     inverse = 1.0 / ranges
@@ -124,56 +137,65 @@ def steadied(ranges: FloatArray, increment: float, *, wrap: bool) -> FloatArray:
 
     def between(step: int) -> FloatArray:
         """1/r between the two beams ``step`` to either side."""
-        low, high = padded[reach - step :][:n], padded[reach + step :][:n]
+        low, high = padded[..., reach - step :][..., :n], padded[..., reach + step :][..., :n]
         return np.asarray((low + high) / (2.0 * math.cos(step * increment)))
 
     square = ranges * ranges
     off = np.abs(between(1) - inverse) * square
-    known = off[~np.isnan(off)]
     # The median of |x| is 0.6745 sigma, here of one beam less the mean of two others: 1.5 times the variance of one.
-    noise = float(np.median(known)) / 0.6745 / math.sqrt(1.5) if known.size else 0.0
-    if noise < STEADY:
+    noise = _known_median(off)[..., None] / 0.6745 / math.sqrt(1.5)
+    noisy = noise >= STEADY
+    if not noisy.any():
         return ranges
-    count, total, agree = np.ones(n), inverse.copy(), np.ones(n, dtype=np.bool_)
+    count, total, agree = np.ones(ranges.shape), inverse.copy(), np.ones(ranges.shape, dtype=np.bool_)
     for step, sigmas in enumerate(ON_WALL, start=1):
         pair = between(step)
         off = np.abs(pair - total / count) * square
         agree &= off <= sigmas * noise * np.sqrt(0.5 + 1.0 / count)
         count += np.where(agree, 2.0, 0.0)
         total += np.where(agree, 2.0 * pair, 0.0)
-    return np.asarray(count / total)
+    return np.where(noisy, count / total, ranges)
+
+
+def _known_median(values: FloatArray) -> FloatArray:
+    """Median of what is not NaN in each row, shape (..., n) to (...); 0 where a row has nothing else."""
+    rows = np.sort(values, axis=-1).reshape(-1, values.shape[-1])  # NaN comes last
+    known = np.count_nonzero(~np.isnan(rows), axis=-1)
+    each = np.arange(len(rows))
+    middle = 0.5 * (rows[each, np.maximum(known - 1, 0) // 2] + rows[each, known // 2])
+    return np.where(known > 0, middle, 0.0).reshape(values.shape[:-1])
 
 
 def _padded(values: FloatArray, reach: int, *, wrap: bool) -> FloatArray:
-    """The values of a scan with ``reach`` more at either end: those of the other end, or NaN."""
-    ends = np.full(reach, np.nan)
-    first, last = (values[-reach:], values[:reach]) if wrap else (ends, ends)
-    return np.concatenate((first, values, last))
+    """The values of each scan with ``reach`` more at either end: those of the other end, or NaN; (..., n)."""
+    ends = np.full((*values.shape[:-1], reach), np.nan)
+    first, last = (values[..., -reach:], values[..., :reach]) if wrap else (ends, ends)
+    return np.concatenate((first, values, last), axis=-1)
 
 
 def _around(ranges: FloatArray, *, wrap: bool) -> list[FloatArray]:
-    """Ranges of each beam's neighbours and itself, 2 * SURROUNDINGS + 1 of shape (n,), NaN beyond the ends."""
+    """Ranges of each beam's neighbours and itself, 2 * SURROUNDINGS + 1 of shape (..., n), NaN beyond the ends."""
     padded = _padded(ranges, SURROUNDINGS, wrap=wrap)
-    return [padded[i : i + ranges.size] for i in range(2 * SURROUNDINGS + 1)]
+    return [padded[..., i : i + ranges.shape[-1]] for i in range(2 * SURROUNDINGS + 1)]
 
 
 def _median(around: Sequence[FloatArray]) -> FloatArray:
-    """Median of five, shape (n,) each; the lower of two, NaN left out (NaN where there is nothing else)."""
+    """Median of five, shape (..., n) each; the lower of two, NaN left out (NaN where there is nothing else)."""
     a, b, c, d, e = around
     # The third of five by comparisons; quicker than sorting. NaN in a column makes its result NaN.
     low = np.maximum(np.minimum(a, b), np.minimum(c, d))
     high = np.minimum(np.maximum(a, b), np.maximum(c, d))
     median: FloatArray = np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), e))
-    doubtful = np.flatnonzero(np.isnan(median))
-    if doubtful.size:
+    doubtful = np.isnan(median)
+    if doubtful.any():
         columns = np.stack([values[doubtful] for values in around])
         measured = len(columns) - np.isnan(columns).sum(axis=0)
-        median[doubtful] = np.sort(columns, axis=0)[np.maximum(measured - 1, 0) // 2, np.arange(doubtful.size)]
+        median[doubtful] = np.sort(columns, axis=0)[np.maximum(measured - 1, 0) // 2, np.arange(columns.shape[1])]
     return median
 
 
 @functools.lru_cache(maxsize=8)
-def _directions(angle_min: float, increment: float, beams: int) -> tuple[FloatArray, FloatArray]:
+def directions(angle_min: float, increment: float, beams: int) -> tuple[FloatArray, FloatArray]:
     """Unit vectors of the beams and of the directions half-way to the next ones, shape (beams, 2) each."""
     angles = angle_min + increment * np.arange(beams)
     half = angles + increment / 2.0

@@ -13,6 +13,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.recorded import RecordedRun
+from closedrooms.mapping.sweeps import sweeps
 from closedrooms.mapping.trajectory import ate
 
 
@@ -58,12 +59,14 @@ def build_map(
     """
     import scipy.sparse.linalg  # noqa: F401  (loading it takes longer than closing a loop; not part of the timing)
 
+    config = config or MapperConfig()
     mapper = Mapper(config)
     online = np.empty((len(run.scans), 3))
     seconds = 0.0
+    made_ready = sweeps(run.scans, config)
     for i, (scan, pose) in enumerate(zip(run.scans, run.odometry, strict=True)):
         start = time.perf_counter()
-        estimate = mapper.process(scan, Pose2(*pose))
+        estimate = mapper.process(scan, Pose2(*pose), sweep=next(made_ready))
         seconds += time.perf_counter() - start
         online[i] = estimate.as_tuple()
         if watch is not None:

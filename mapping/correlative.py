@@ -10,6 +10,8 @@ from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.likelihood import Float32Array, LikelihoodField
 
+Mask = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
+
 
 @dataclass(frozen=True, slots=True)
 class Window:
@@ -30,7 +32,10 @@ class Found:
 MAX_POINTS = 160
 """Points of a scan that a search looks at; the refinement that follows takes all."""
 BATCH = 16
-"""Blocks that are opened at once: fewer calls, at the price of a few blocks opened in vain."""
+"""Blocks that are opened at once at first, then twice as many and so on: fewer calls, at the price of a few blocks
+opened in vain."""
+LARGE_BLOCK = 4
+"""Cells above which a block is cut to smaller ones before its poses are scored one by one."""
 FEW_BLOCKS = 5
 """Blocks along an axis up to which they are looked up one by one; more are read side by side."""
 TIE = 1e-9
@@ -75,13 +80,13 @@ class Search:
         self._flat = rows * self._values.shape[1] + cols
         self._corner = half + coarse_cells
 
-        blocks = np.arange(-half, half + 1, coarse_cells)
-        self._shifts = np.stack(np.meshgrid(blocks, blocks, indexing="ij"), axis=-1).reshape(-1, 2)
-        bounds = _bounds(self._values, rows, cols, half, coarse_cells)  # (angles, blocks)
+        self._levels = _Levels(self._values, rows, cols, half + coarse_cells)
+        self._shifts = _pairs(np.arange(-half, half + 1, coarse_cells))
+        bounds = self._levels.bounds(half, coarse_cells)  # (angles, blocks)
         bounds -= _penalties(self._turns, self._shifts, coarse_cells, self._resolution, prior_sigmas)
         self._bounds = bounds.ravel()
-        inner = np.stack(np.meshgrid(np.arange(coarse_cells), np.arange(coarse_cells), indexing="ij"), axis=-1)
-        self._inner = inner.reshape(1, -1, 2)
+        self._cells = coarse_cells
+        self._small = next(cells for cells in (2, 3, coarse_cells) if coarse_cells % cells == 0)
 
     def best(self, *, away_from: tuple[Pose2, float] | None = None, floor: float = -math.inf) -> Found:
         """The pose of the window with the highest mean likelihood, less what the prior takes.
@@ -93,23 +98,28 @@ class Search:
         Returns:
             The best pose; its score without the prior, 0 where ``away_from`` leaves none or none reaches ``floor``.
         """
-        guess, bounds, inner = self._guess, self._bounds, self._inner
+        guess, bounds = self._guess, self._bounds
         # The prior, at most as in the last corner, must not hide a pose above the floor.
         corner = np.full((1, 2), self._corner)
         best = floor - float(_penalty(self._turns[-1:], corner, 1, self._resolution, self._sigmas)[0])
         best_pose, best_score = guess, 0.0
         order = np.flatnonzero(bounds > best)
         order = order[np.argsort(-bounds[order], kind="stable")]
-        for start in range(0, order.size, BATCH):
-            opened = order[start : start + BATCH]
+        start, size = 0, BATCH
+        while start < order.size:
+            opened = order[start : start + size]
+            start, size = start + size, 2 * size
             opened = opened[bounds[opened] > best]
             if opened.size == 0:
                 break
             angles, chosen = np.divmod(opened, len(self._shifts))
-            fine = self._shifts[chosen][:, None, :] + inner  # (opened, cells of a block, 2)
+            angles, corners, cells = self._split(angles, self._shifts[chosen], best)
+            if corners.size == 0:
+                continue
+            fine = corners[:, None, :] + _pairs(np.arange(cells))  # (opened, cells of a block, 2)
             scores = _opened_scores(self._values, self._flat[angles], fine)
             flat_fine = fine.reshape(-1, 2)
-            turns = np.repeat(self._turns[angles], inner.shape[1])
+            turns = np.repeat(self._turns[angles], fine.shape[1])
             penalised = scores.ravel() - _penalty(turns, flat_fine, 1, self._resolution, self._sigmas)
             if away_from is not None:
                 pose, radius = away_from
@@ -121,6 +131,26 @@ class Search:
                 dy, dx = flat_fine[k] * self._resolution
                 best_pose = Pose2(guess.x + float(dx), guess.y + float(dy), guess.theta + float(turns[k]))
         return Found(best_pose, best_score)
+
+    def _split(self, angles: IntArray, corners: IntArray, best: float) -> tuple[IntArray, IntArray, int]:
+        """Large blocks cut into small ones, less those whose bound is not above ``best``.
+
+        Args:
+            angles: Turn of each block, shape (b,).
+            corners: Its first shift, shape (b, 2).
+            best: What a pose has to beat.
+
+        Returns:
+            The same for the blocks that are left, and how many cells wide they are.
+        """
+        if self._cells <= LARGE_BLOCK:
+            return angles, corners, self._cells
+        parts = corners[:, None, :] + _pairs(np.arange(0, self._cells, self._small))
+        bounds = self._levels.bounds_of(angles, parts, self._small).ravel()
+        angles, corners = np.repeat(angles, parts.shape[1]), parts.reshape(-1, 2)
+        bounds -= _penalty(self._turns[angles], corners, self._small, self._resolution, self._sigmas)
+        left = bounds > best
+        return angles[left], corners[left], self._small
 
 
 def search_heading(field: LikelihoodField, points: FloatArray, guess: Pose2, sigma: float, reach: float) -> Pose2:
@@ -172,7 +202,7 @@ def _angle_step(field: LikelihoodField, points: FloatArray) -> float:
 def _surroundings(
     field: LikelihoodField, points: FloatArray, guess: Pose2, turns: FloatArray, margin: int
 ) -> tuple[Float32Array, IntArray, IntArray]:
-    """The part of the field that the window can reach, padded with zeros, and the points' cells in it for each turn.
+    """The field, or where the window leaves it the window padded with zeros, and the points' cells for each turn.
 
     Returns:
         The values, and rows and columns, shape (turns, n) each.
@@ -180,10 +210,12 @@ def _surroundings(
     lattice = field.lattice
     rows, cols = _cells(field, points, guess, turns)
     row0, col0 = int(rows.min()) - margin, int(cols.min()) - margin
-    values = np.zeros((int(rows.max()) + margin + 1 - row0, int(cols.max()) + margin + 1 - col0), dtype=np.float32)
+    row1, col1 = int(rows.max()) + margin + 1, int(cols.max()) + margin + 1
     r0, c0 = max(row0, lattice.row0), max(col0, lattice.col0)
-    r1 = min(row0 + values.shape[0], lattice.row0 + lattice.rows)
-    c1 = min(col0 + values.shape[1], lattice.col0 + lattice.cols)
+    r1, c1 = min(row1, lattice.row0 + lattice.rows), min(col1, lattice.col0 + lattice.cols)
+    if (r0, c0, r1, c1) == (row0, col0, row1, col1):
+        return field.values, rows - lattice.row0, cols - lattice.col0
+    values = np.zeros((row1 - row0, col1 - col0), dtype=np.float32)
     if r1 > r0 and c1 > c0:
         known = field.values[r0 - lattice.row0 : r1 - lattice.row0, c0 - lattice.col0 : c1 - lattice.col0]
         values[r0 - row0 : r1 - row0, c0 - col0 : c1 - col0] = known
@@ -211,37 +243,68 @@ def _farthest(points: FloatArray) -> float:
     return math.sqrt(float(np.einsum("ij,ij->i", points, points).max(initial=0.0)))
 
 
-def _bounds(values: Float32Array, rows: IntArray, cols: IntArray, half: int, cells: int) -> FloatArray:
-    """Upper bound of the mean value at the points in each block of shifts, shape (angles, blocks).
+class _Levels:
+    """Block maxima of the field around a scan: upper bounds of its mean value over blocks of shifts.
 
-    Blocks are ``cells`` wide and start at ``-half``, ``-half + cells`` and so on, rows first.
+    Values are rounded up to 1/255, as bytes are read quicker.
     """
-    # Rounded up to 1/255: bytes are read quicker.
-    levels = cv2.convertScaleAbs(values, alpha=255.0, beta=0.5)
-    # Largest value in the block that starts at each cell: with the anchor at (0, 0) it starts at the cell itself.
-    kernel = np.ones((cells, cells), dtype=np.uint8)
-    maxima = cv2.dilate(levels, kernel, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0.0)
-    side = 2 * half // cells + 1
-    if side <= FEW_BLOCKS:
-        starts = np.arange(side) * cells - half
-        offsets = (starts[:, None] * maxima.shape[1] + starts).reshape(-1, 1)
-        flat = (rows * maxima.shape[1] + cols)[:, None, :] + offsets  # (angles, blocks, n)
-        blocks = maxima.reshape(-1).take(flat).reshape(-1, rows.shape[1])
+
+    def __init__(self, values: Float32Array, rows: IntArray, cols: IntArray, margin: int) -> None:
+        """Take what the points of each turn reach, cells of shape (turns, n) each, and ``margin`` around it."""
+        row0, col0 = int(rows.min()) - margin, int(cols.min()) - margin
+        reach = values[row0 : int(rows.max()) + margin + 1, col0 : int(cols.max()) + margin + 1]
+        self._levels = cv2.convertScaleAbs(reach, alpha=255.0, beta=0.5)
+        self._rows, self._cols = rows - row0, cols - col0
+        self._maxima: dict[int, Mask] = {}
+
+    def _highest(self, cells: int) -> Mask:
+        """Largest value in the block of ``cells`` x ``cells`` that starts at each cell."""
+        if cells not in self._maxima:
+            kernel = np.ones((cells, cells), dtype=np.uint8)
+            # With the anchor at (0, 0) a block starts at the cell itself.
+            self._maxima[cells] = np.asarray(
+                cv2.dilate(self._levels, kernel, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0.0),
+                dtype=np.uint8,
+            )
+        return self._maxima[cells]
+
+    def bounds_of(self, angles: IntArray, shifts: IntArray, cells: int) -> FloatArray:
+        """Bounds in some blocks: their turns, shape (b,), and first shifts, shape (b, s, 2); to (b, s)."""
+        maxima = self._highest(cells)
+        flat = self._rows[angles] * maxima.shape[1] + self._cols[angles]
+        offsets = shifts[..., 0] * maxima.shape[1] + shifts[..., 1]
+        blocks = maxima.reshape(-1).take(flat[:, None, :] + offsets[:, :, None]).reshape(-1, flat.shape[1])
         sums = cv2.reduce(blocks, 1, cv2.REDUCE_SUM, dtype=cv2.CV_32S)
-        return np.asarray(sums.reshape(len(rows), -1) * (1.0 / (255.0 * rows.shape[1])), dtype=np.float64)
-    # One picture for each of the cells x cells phases: in it, the blocks of one point lie side by side.
-    height, width = (-(-n // cells) for n in values.shape)
-    whole = np.zeros((height * cells, width * cells), dtype=np.uint8)
-    whole[: values.shape[0], : values.shape[1]] = maxima
-    phases = np.ascontiguousarray(whole.reshape(height, cells, width, cells).transpose(1, 3, 0, 2))
-    windows = np.lib.stride_tricks.sliding_window_view(phases, (side, side), axis=(2, 3))
-    (block_rows, phase_rows), (block_cols, phase_cols) = np.divmod(rows - half, cells), np.divmod(cols - half, cells)
-    bounds: FloatArray = np.empty((len(rows), side * side), dtype=np.float64)
-    for i in range(len(rows)):
-        blocks = windows[phase_rows[i], phase_cols[i], block_rows[i], block_cols[i]].reshape(-1, side * side)
-        bounds[i] = cv2.reduce(blocks, 0, cv2.REDUCE_SUM, dtype=cv2.CV_32S)
-    bounds *= 1.0 / (255.0 * rows.shape[1])
-    return bounds
+        return np.asarray(sums.reshape(offsets.shape) * (1.0 / (255.0 * flat.shape[1])), dtype=np.float64)
+
+    def bounds(self, half: int, cells: int) -> FloatArray:
+        """Bounds in all blocks, shape (turns, blocks): they start at ``-half``, ``-half + cells``, ..., rows first."""
+        side = 2 * half // cells + 1
+        if side <= FEW_BLOCKS:
+            starts = _pairs(np.arange(side) * cells - half)
+            return self.bounds_of(
+                np.arange(len(self._rows)), np.broadcast_to(starts, (len(self._rows), *starts.shape)), cells
+            )
+        maxima, (turns, n) = self._highest(cells), self._rows.shape
+        # One picture for each of the cells x cells phases: in it, the blocks of one point lie side by side.
+        height, width = (-(-size // cells) for size in maxima.shape)
+        whole = np.zeros((height * cells, width * cells), dtype=np.uint8)
+        whole[: maxima.shape[0], : maxima.shape[1]] = maxima
+        phases = np.ascontiguousarray(whole.reshape(height, cells, width, cells).transpose(1, 3, 0, 2))
+        windows = np.lib.stride_tricks.sliding_window_view(phases, (side, side), axis=(2, 3))
+        block_rows, phase_rows = np.divmod(self._rows - half, cells)
+        block_cols, phase_cols = np.divmod(self._cols - half, cells)
+        bounds: FloatArray = np.empty((turns, side * side), dtype=np.float64)
+        for i in range(turns):
+            blocks = windows[phase_rows[i], phase_cols[i], block_rows[i], block_cols[i]].reshape(-1, side * side)
+            bounds[i] = cv2.reduce(blocks, 0, cv2.REDUCE_SUM, dtype=cv2.CV_32S)
+        bounds *= 1.0 / (255.0 * n)
+        return bounds
+
+
+def _pairs(steps: IntArray) -> IntArray:
+    """All pairs of two steps, rows first, shape (steps^2, 2)."""
+    return np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def _opened_scores(values: Float32Array, flat: IntArray, shifts: IntArray) -> FloatArray:

@@ -21,6 +21,7 @@ from closedrooms.mapping.loops import Loop, find_loop
 from closedrooms.mapping.matcher import Motion, match_scan
 from closedrooms.mapping.posegraph import Edge, PoseGraph, optimise
 from closedrooms.mapping.refinement import refine
+from closedrooms.mapping.sweeps import Sweep
 
 MOVED = (0.015, 0.003)
 """Correction of a keyframe ([m], [rad]) beyond which it is drawn anew."""
@@ -70,24 +71,35 @@ class Mapper:
         """The measurements that tie the keyframes together."""
         return self._graph.edges
 
-    def process(self, scan: LaserScan, odometry: Pose2, sightings: Sequence[DoorSighting] = ()) -> Pose2:
+    def process(
+        self,
+        scan: LaserScan,
+        odometry: Pose2,
+        sightings: Sequence[DoorSighting] = (),
+        *,
+        sweep: Sweep | None = None,
+    ) -> Pose2:
         """Take in one scan.
 
         Args:
             scan: The sweep.
             odometry: ``odom_T_robot`` at its time, accumulated since any start.
             sightings: Closed doors seen in it, robot frame.
+            sweep: What is taken from the scan, where that was found for many at once (:func:`sweeps`).
 
         Returns:
             ``map_T_robot`` as estimated.
         """
         self._predict(odometry)
         matcher, max_range = self._config.matcher, self._config.max_range
-        points = thin(hit_points(scan, max_range=max_range), matcher.point_spacing, matcher.max_points)
+        if sweep is not None:
+            points = sweep.points
+        else:
+            points = thin(hit_points(scan, max_range=max_range), matcher.point_spacing, matcher.max_points)
         if self._keyframes:
             self._match(points)
         if self._wants_keyframe():
-            beams = clean(scan, max_range=max_range)
+            beams = clean(scan, max_range=max_range) if sweep is None else sweep.beams
             self._insert(Keyframe(len(self._keyframes), scan.stamp, self._pose, beams, points, self._way))
         latest = self._keyframes[-1]
         keyframe_T_robot = latest.pose.inverse() @ self._pose
