@@ -13,6 +13,7 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.arrangement import Arrangement, arrange
 from closedrooms.predictor.clutter import free_islands
 from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.edges import shows_walls
 from closedrooms.predictor.initial import Entrance, along_edge, find_entrance, splits_between
 from closedrooms.predictor.structure import WallLines, find_structure
 from closedrooms.predictor.unknown import unknown_faces
@@ -72,7 +73,7 @@ def start_rooms(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: Predic
         return None, {door.id: "the map holds no free cell" for door in doors}
     working = at_resolution(window, config.lines.resolution)
     working = free_islands(working, config.clutter_area, [door.midpoint for door in waiting], config.door_reach)
-    structure = find_structure(working, config)
+    structure = find_structure(working, config) if shows_walls(working) else None
     if structure is None:
         return None, {door.id: "the map holds no wall line" for door in doors}
     arrangement, unknown, found = _split_until_apart(working, structure, waiting, config)

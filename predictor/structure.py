@@ -10,12 +10,7 @@ from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.directions import find_directions
 from closedrooms.predictor.lines import Line, boundary_lines, find_lines
 from closedrooms.predictor.rose import find_rose, rose_directions
-from closedrooms.predictor.segments import find_segments, lengths_of
-
-# Share of the length of all segments that lies in those long enough to tell a direction; less is noise of single
-# cells. Measured: noise of 1 to 30 % occupied cells 0.05 to 0.56 (above 0.3, its directions are no concentrated ones),
-# maps of furnished buildings from 0.48 and, in the structural cells of ROSE, from 0.79.
-LONG_SHARE, ROSE_LONG_SHARE = 0.30, 0.67
+from closedrooms.predictor.segments import find_segments
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +36,7 @@ def find_structure(grid: OccupancyGrid, config: PredictorConfig) -> WallLines | 
     """Segments, directions and lines of a map (section 3.1, or 4.2 with ``structure="rose"``).
 
     Returns:
-        ``None`` without any line, or where segments are too short to be more than noise.
+        ``None`` without any line.
     """
     if config.structure == "rose":
         rose = find_rose(grid)
@@ -53,17 +48,8 @@ def find_structure(grid: OccupancyGrid, config: PredictorConfig) -> WallLines | 
     else:
         segments = find_segments(grid, config.lines)
         directions = find_directions(segments, config.lines)
-    least = ROSE_LONG_SHARE if config.structure == "rose" else LONG_SHARE
-    if _long_share(segments, config.lines.direction_segment) < least:
-        return None
     lines, clusters = find_lines(segments, directions, config.lines)
     if not lines:
         return None
     carried = segments[clusters >= 0]
     return WallLines(segments, clusters, lines, boundary_lines(carried, directions, config.lines), directions.angles)
-
-
-def _long_share(segments: FloatArray, long: float) -> float:
-    """Share of the length of segments, shape (n, 4), in those of at least ``long`` [m]; 0 without any."""
-    lengths = lengths_of(segments)
-    return float(lengths[lengths >= long].sum() / lengths.sum()) if len(lengths) else 0.0

@@ -9,17 +9,12 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
+from closedrooms.predictor.edges import BLUR, QUARTER, STEEP, votes_by_degree, wrapped
 
-QUARTER = math.pi / 2
 # A second direction needs this share of the strongest one's walls: less is furniture or noise.
 MIN_SHARE = 0.12
-# The strongest direction holds so many times the edges that it would if all were equally strong; less is noise of
-# single cells. Measured: such noise 1.1 to 2.2, maps of furnished buildings from 4.8, of plain ones from 11.
-LEAST_CONTRAST = 3.0
 # Directions closer than this are one [rad].
 APART = math.radians(8.0)
-# Blur before the gradient is taken [cells]: a wall's staircase on the raster vanishes.
-BLUR = 2.5
 # Below this the map is not turned at all [rad]: 0.35 degrees are 0.12 m over a room row of 20 m.
 UPRIGHT = math.radians(0.35)
 
@@ -47,43 +42,40 @@ class WallDirections:
         """
         if door.segment is not None:
             (x0, y0), (x1, y1) = door.segment
-            return self._snapped(float(_wrapped(math.atan2(y1 - y0, x1 - x0))))
+            return self._snapped(float(wrapped(math.atan2(y1 - y0, x1 - x0))))
         near = np.hypot(*(self.points - np.array(door.midpoint)).T) <= reach
         if not near.any():
             return float(self.angles[0])
-        votes = [(np.abs(_wrapped(self.edge_angles[near] - a)) < APART).sum() for a in self.angles]
+        votes = [(np.abs(wrapped(self.edge_angles[near] - a)) < APART).sum() for a in self.angles]
         # The strongest direction wins unless another one is clearly seen around the door.
         scores = np.array(votes, dtype=float)
         scores[0] *= 1.5
         return float(self.angles[int(scores.argmax())])
 
     def _snapped(self, angle: float) -> float:
-        apart = np.abs(_wrapped(self.angles - angle))
+        apart = np.abs(wrapped(self.angles - angle))
         return float(self.angles[int(apart.argmin())]) if apart.min() < APART else float(angle)
 
 
 def find_wall_directions(grid: OccupancyGrid) -> WallDirections | None:
-    """Peaks of the directions of the edges of free space; ``None`` where there is no edge, or only noise."""
+    """Peaks of the directions of the edges of free space; ``None`` where there is none."""
     occupied = np.argwhere(grid.occupied)
     image = cv2.GaussianBlur(grid.free.astype(np.float32), (0, 0), BLUR)
     gx, gy = cv2.Sobel(image, cv2.CV_32F, 1, 0), cv2.Sobel(image, cv2.CV_32F, 0, 1)
-    edge = (np.hypot(gx, gy) > 0.3 * float(np.hypot(gx, gy).max(initial=0.0))) & (grid.free)
+    edge = (np.hypot(gx, gy) > STEEP * float(np.hypot(gx, gy).max(initial=0.0))) & grid.free
     cells = np.argwhere(edge)
     if len(occupied) < 20 or len(cells) == 0:
         return None
-    angles = _wrapped(np.arctan2(gy[edge], gx[edge]).astype(np.float64))
-    votes = np.bincount(np.floor((angles + QUARTER / 2) / math.radians(1.0)).astype(int) % 90, minlength=90)
-    smooth = np.sum([np.roll(votes, k) * w for k, w in ((-2, 1), (-1, 2), (0, 3), (1, 2), (2, 1))], axis=0)
-    if smooth.max() < LEAST_CONTRAST * smooth.mean():
-        return None
+    angles = wrapped(np.arctan2(gy[edge], gx[edge]).astype(np.float64))
+    smooth = votes_by_degree(angles)
     peaks: list[float] = []
     for index in sorted(range(90), key=lambda i: (-smooth[i], i)):
         angle = math.radians(index + 0.5) - QUARTER / 2
         if smooth[index] < MIN_SHARE * smooth.max():
             break
-        if all(abs(float(_wrapped(angle - p))) >= APART for p in peaks):
-            near = np.abs(_wrapped(angles - angle)) < math.radians(4.0)
-            peaks.append(float(_wrapped(angle + float(_wrapped(angles[near] - angle).mean()))))
+        if all(abs(float(wrapped(angle - p))) >= APART for p in peaks):
+            near = np.abs(wrapped(angles - angle)) < math.radians(4.0)
+            peaks.append(float(wrapped(angle + float(wrapped(angles[near] - angle).mean()))))
     points = grid.frame.to_points(occupied)
     refined = [_sharpest(points, peak) for peak in peaks]
     return WallDirections(np.array(refined), grid.frame.to_points(cells), angles)
@@ -106,8 +98,3 @@ def _sharpest(points: FloatArray, angle: float, *, window: float = math.radians(
     candidates += [float(a) for a in angle + np.linspace(-window, window, steps)]
     best = max(candidates, key=pile)
     return 0.0 if abs(best) < UPRIGHT else best
-
-
-def _wrapped(angle: FloatArray | float) -> FloatArray:
-    """Modulo a right angle, in [-pi/4, pi/4)."""
-    return np.asarray((np.asarray(angle) + QUARTER / 2) % QUARTER - QUARTER / 2, dtype=np.float64)

@@ -26,6 +26,7 @@ from closedrooms.predictor.best.suspects import Suspects, suspect
 from closedrooms.predictor.best.thickness import wall_thickness
 from closedrooms.predictor.clutter import free_islands
 from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.edges import shows_walls
 from closedrooms.predictor.inpaint import inpaint, passage
 from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
 from closedrooms.predictor.start import unusable
@@ -70,7 +71,7 @@ def predict_best(
         )
     working = at_resolution(window, RESOLUTION)
     working = free_islands(working, config.clutter_area, [door.midpoint for door in waiting], config.door_reach)
-    directions = find_wall_directions(working)
+    directions = find_wall_directions(working) if shows_walls(working) else None
     if directions is None:
         return Prediction(grid, (), {door.id: "the map holds no wall line" for door in doors})
     # 1. Which way each door looks, in a map turned along its wall.
