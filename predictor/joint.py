@@ -22,7 +22,9 @@ def swap_faces(growth: Growth, config: PredictorConfig) -> None:
         for b in growth.touches(a)
         if a < b and not growth.is_border(a) and not growth.is_border(b)
     ]
-    for a, b in sorted(pairs, key=lambda pair: _position(growth, pair)):
+    for pair in sorted(pairs, key=lambda pair: _position(growth, pair)):
+        # Of two exchanges that are as good the first is taken: which room comes first must not depend on the order.
+        a, b = sorted(pair, key=growth.position)
         if b in growth.touches(a):
             _swap(growth, a, b, config)
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
-from closedrooms.predictor.best.frame import DoorFrame, count, integral
+from closedrooms.predictor.best.frame import DoorFrame, Table, Window, integral
 
 # Slack of a wall's thickness when known space is looked for behind it [cells].
 SLACK = 4
@@ -87,59 +87,98 @@ class Candidates:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """What a frame says about every possible position of a side, as tables over the raster.
+    """What a frame says about every possible position of a side, as tables over a window of it.
 
-    Each is a summed area table of edges, indexed [along, position], so that any stretch of a side costs four look-ups:
-    v and u for left and right, shape (rows + 1, cols + 2); u and v for the back, shape (cols + 1, rows + 2).
-    ``enclosed_sum`` counts cells between known cells of their row or their column.
+    Each is a table of edges, indexed [along, position], so that any stretch of a side costs four look-ups: v and u for
+    left and right, u and v for the back. ``enclosed`` counts cells between known cells of their row or their column,
+    ``taken`` those that a wall of the usual thickness around known space fills. ``seen`` is how usual each width and
+    depth is in the whole frame.
     """
 
-    closed: dict[str, IntArray]
-    sliver: dict[str, IntArray]
-    gap: dict[str, IntArray]
-    tight: dict[str, IntArray]
-    same: dict[str, IntArray]
-    outer: dict[str, IntArray]
+    closed: dict[str, Table]
+    sliver: dict[str, Table]
+    gap: dict[str, Table]
+    tight: dict[str, Table]
+    same: dict[str, Table]
+    outer: dict[str, Table]
+    enclosed: Table
+    taken: Table
     seen: dict[str, FloatArray]
-    enclosed_sum: IntArray
 
 
-def gather(frame: DoorFrame, thickness: int) -> Evidence:
-    """Tables for one frame.
+def sizes_seen(frame: DoorFrame) -> dict[str, FloatArray]:
+    """How usual each ``width`` and ``depth`` of free space is, by cells, 0 to 1."""
+    return {"width": _spans(frame, "left", "right"), "depth": _spans(frame, "bottom", "top")}
+
+
+def window_around(frame: DoorFrame, entry: "Entry", limits: Sequence[float]) -> Window:
+    """What of a frame has a say about the rectangles of a door: as far as sides and walls in line with them reach.
+
+    Args:
+        frame: Seen from the door.
+        entry: The door.
+        limits: Smallest width, largest width, smallest depth, largest depth of a room [cells].
+    """
+    rows, cols = frame.known.shape
+    wide, deep = int(limits[1]) + 1, int(limits[3]) + 1
+    u, across = int(entry.u), wide + 2 * REACH
+    return Window(
+        min(max(entry.v0 - REACH, 0), rows),
+        min(max(u - across, 0), cols),
+        max(min(entry.v0 + deep + REACH, rows), 0),
+        max(min(u + across + 1, cols), 0),
+    )
+
+
+def gather(frame: DoorFrame, thickness: int, window: Window, seen: dict[str, FloatArray]) -> Evidence:
+    """Tables for a window of a frame.
 
     Args:
         frame: Seen from the doors.
         thickness: Usual thickness of walls [cells].
+        window: Where.
+        seen: Of the whole frame, from :func:`sizes_seen`.
     """
     closed, sliver, gap, tight, same, outer = {}, {}, {}, {}, {}, {}
+    inside = frame.known[window.of]
     for side, opposite in (("right", "left"), ("left", "right"), ("top", "bottom")):
-        known = _canonical(frame.known, side)
-        own, other = _canonical(frame.sharp[side], side), _canonical(frame.sharp[opposite], side)
+        known = _canonical(inside, side)
+        own, other = (_canonical(_edges(frame, name, window), side) for name in (side, opposite))
         near = _within(known, thickness + SLACK)
         wide = _within(known, thickness + SLIVER)
-        gap[side] = _running(_within(known, thickness + GAP) & ~wide, side)
+        gap[side] = _running(_within(known, thickness + GAP) & ~wide, side, window)
         wide &= ~near
-        outer[side] = _running(_blurred(own & ~_beyond(known), 2), side)
+        outer[side] = _running(_blurred(own & ~_beyond(known), 2), side, window)
         shifted = np.zeros_like(other)
         shifted[:, : other.shape[1] - thickness] = other[:, thickness:]
-        closed[side], sliver[side] = _running(near, side), _running(wide, side)
-        tight[side] = _running(_blurred(shifted, 3), side)
-        same[side] = _running(_blurred(own, 2), side)
-    seen = {"width": _spans(frame, "left", "right"), "depth": _spans(frame, "bottom", "top")}
-    return Evidence(closed, sliver, gap, tight, same, outer, seen, integral(_enclosed(frame.known)))
+        closed[side], sliver[side] = _running(near, side, window), _running(wide, side, window)
+        tight[side] = _running(_blurred(shifted, 3), side, window)
+        same[side] = _running(_blurred(own, 2), side, window)
+    enclosed = integral(_enclosed(frame.known, window), window.v0, window.u0)
+    taken = integral(frame.taken[window.of], window.v0, window.u0)
+    return Evidence(closed, sliver, gap, tight, same, outer, enclosed, taken, seen)
 
 
-def _enclosed(known: BoolArray) -> BoolArray:
-    """Cells between the first and the last known cell of their row or of their column."""
-    return _spanned(known) | _spanned(known.T).T
+def _edges(frame: DoorFrame, side: str, window: Window) -> BoolArray:
+    """Wall faces of a side in a window: one more column of edges than of cells, one more row for top and bottom."""
+    rows, cols = window.of
+    if side in {"left", "right"}:
+        return frame.sharp[side][rows, cols.start : cols.stop + 1]
+    return frame.sharp[side][rows.start : rows.stop + 1, cols]
 
 
-def _spanned(known: BoolArray) -> BoolArray:
-    """Cells between the first and the last known cell of their row."""
+def _enclosed(known: BoolArray, window: Window) -> BoolArray:
+    """Cells of a window between the first and the last known cell of their row or of their column."""
+    rows, cols = window.of
+    return _spanned(known[rows], cols) | _spanned(known[:, cols].T, rows).T
+
+
+def _spanned(known: BoolArray, cols: slice) -> BoolArray:
+    """Cells between the first and the last known cell of their row, in some columns."""
     length = known.shape[1]
     first, last = known.argmax(axis=1), length - known[:, ::-1].argmax(axis=1)
     last[~known.any(axis=1)] = 0
-    at = np.arange(length)
+    at = np.arange(cols.start, cols.stop)
     return np.asarray((at >= first[:, None]) & (at < last[:, None]))
 
 
@@ -206,22 +245,11 @@ def _blurred(edges: BoolArray, reach: int) -> BoolArray:
     return np.asarray(cv2.dilate(_bytes(edges), np.ones((1, 2 * reach + 1), np.uint8)) > 0)
 
 
-def _running(edges: BoolArray, side: str) -> IntArray:
-    """Summed area table of edges, indexed [along, position] in the frame's own orientation."""
-    return integral(edges[:, ::-1] if side == "left" else edges)
-
-
-def stretch(table: IntArray, position: IntArray, low: IntArray, high: IntArray) -> FloatArray:
-    """Edges set along a side at ``position`` from ``low`` to ``high``.
-
-    Args:
-        table: Summed area table of edges, indexed [along, position].
-        position: Of the side, shape (n,); clipped to the table.
-        low: First end, shape (n,).
-        high: Last end, shape (n,).
-    """
-    at = np.clip(position, 0, table.shape[1] - 2)
-    return count(table, low, at, high, at + 1).astype(np.float64)
+def _running(edges: BoolArray, side: str, window: Window) -> Table:
+    """Table of the edges of a window, in the frame's own orientation."""
+    if side == "top":
+        return integral(edges, window.u0, window.v0)
+    return integral(edges[:, ::-1] if side == "left" else edges, window.v0, window.u0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,7 +295,7 @@ def propose(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int, 
     u0, u1, v1 = (grid.ravel() for grid in np.meshgrid(left, right, back, indexing="ij"))
     fits = (u1 - u0 >= narrow) & (u1 - u0 <= wide) & (v1 - v0 >= shallow) & (v1 - v0 <= deep)
     boxes = np.stack((u0, np.full_like(u0, v0), u1, v1), axis=-1)[fits]
-    taken = count(frame.taken_sum, boxes[:, 1], boxes[:, 0], boxes[:, 3], boxes[:, 2])
+    taken = evidence.taken.count(boxes[:, 1], boxes[:, 0], boxes[:, 3], boxes[:, 2])
     size = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1])
     clear = taken <= MAX_OVERLAP * size
     for pu, pv in entry.others:
@@ -303,8 +331,8 @@ def _positions(
         near = (v0 + 4, v0 + 60)
     positions = np.arange(low, high + 1)
 
-    def total(table: IntArray, window: tuple[int, int]) -> FloatArray:
-        return stretch(table, positions, np.full_like(positions, window[0]), np.full_like(positions, window[1]))
+    def total(table: Table, window: tuple[int, int]) -> FloatArray:
+        return table.stretch(positions, np.full_like(positions, window[0]), np.full_like(positions, window[1]))
 
     strength = total(evidence.same[side], along) + total(evidence.tight[side], along)
     strength += 2.0 * (total(evidence.same[side], near) + total(evidence.tight[side], near))
@@ -350,7 +378,7 @@ def describe(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int,
     u0, v0, u1, v1 = boxes.T
     width, depth = (u1 - u0).astype(float), (v1 - v0).astype(float)
     cell = frame.resolution
-    taken = count(frame.taken_sum, v0, u0, v1, u1)
+    taken = evidence.taken.count(v0, u0, v1, u1)
     area = np.maximum(width * depth - taken, 1.0) * cell * cell
     columns: dict[str, FloatArray] = {}
     columns["log area"] = np.log(area / 25.0)
@@ -374,7 +402,7 @@ def describe(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int,
     for name in ("closed", "tight", "sliver", "gap", "aligned", "free", "outer"):
         columns[f"back {name}"] = back[name]
     # A back wall that a near room of the same row shows, at most 8 m to either side.
-    near = stretch(evidence.same["top"], v1, u0 - 160, u0) + stretch(evidence.same["top"], v1, u1, u1 + 160)
+    near = evidence.same["top"].stretch(v1, u0 - 160, u0) + evidence.same["top"].stretch(v1, u1, u1 + 160)
     columns["near aligned"] = 1.0 - np.exp(-near / SURE)
     columns["passage end"] = stubs["right"] * stubs["left"]
     last = len(evidence.seen["width"]) - 1
@@ -389,11 +417,11 @@ def describe(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int,
     columns["outside area"] = columns["outside"] * np.maximum(np.log(area / 4.0), 0.0) / entry.row
     # Space with nothing known beyond it along either axis: the building may end anywhere in it. A row of doors
     # announces a row of rooms there.
-    columns["open"] = 1.0 - count(evidence.enclosed_sum, v0, u0, v1, u1) / (width * depth)
+    columns["open"] = 1.0 - evidence.enclosed.count(v0, u0, v1, u1) / (width * depth)
     columns["open area"] = columns["open"] * np.maximum(np.log(area / 4.0), 0.0) / entry.row
     # The wall of the door: known space that cuts into it from behind, known space before it, and how far the room
     # reaches past the ends of the corridor that the door opens to.
-    strip = count(frame.taken_sum, v0 + FRONT[0], u0, v0 + FRONT[1], u1)
+    strip = evidence.taken.count(v0 + FRONT[0], u0, v0 + FRONT[1], u1)
     columns["front taken"] = strip / (width * (FRONT[1] - FRONT[0]))
     before = frame.known[max(entry.v0 - thickness - SLACK, 0) : max(entry.v0, 0)].any(axis=0)
     running = np.concatenate(([0], np.cumsum(before)))
@@ -410,7 +438,7 @@ def _sticks_out(evidence: Evidence, boxes: IntArray) -> FloatArray:
     first, last = v0 + PASSED[0] + 1, v1 - PASSED[1] + 1
     total = np.zeros(len(boxes))
     for low, high in ((u0 - BESIDE, u0), (u1, u1 + BESIDE)):
-        total += count(evidence.outer["top"], low, first, high, last)
+        total += evidence.outer["top"].count(low, first, high, last)
     # An outer wall counts at five positions (blurred by 2 cells to either side).
     return np.asarray(1.0 - np.exp(-total / 5.0 / (SURE / 2)))
 
@@ -430,20 +458,20 @@ def _side(evidence: Evidence, side: str, position: IntArray, low: IntArray, high
     """Evidence of one side of each rectangle, all between 0 and 1."""
     length = np.maximum(high - low, 1).astype(float)
     reach = 2 * REACH if side == "top" else REACH
-    own = stretch(evidence.same[side], position, low, high)
-    outside = stretch(evidence.same[side], position, low - reach, high + reach) - own
-    beyond_own = stretch(evidence.tight[side], position, low, high)
-    closed = stretch(evidence.closed[side], position, low, high) / length
-    sliver = stretch(evidence.sliver[side], position, low, high) / length
-    stub = stretch(evidence.same[side], position, low - 60, low)
-    stub += stretch(evidence.tight[side], position, low - 60, low)
+    own = evidence.same[side].stretch(position, low, high)
+    outside = evidence.same[side].stretch(position, low - reach, high + reach) - own
+    beyond_own = evidence.tight[side].stretch(position, low, high)
+    closed = evidence.closed[side].stretch(position, low, high) / length
+    sliver = evidence.sliver[side].stretch(position, low, high) / length
+    stub = evidence.same[side].stretch(position, low - 60, low)
+    stub += evidence.tight[side].stretch(position, low - 60, low)
     return {
         "closed": closed,
         "tight": beyond_own / length,
         "sliver": sliver,
-        "gap": stretch(evidence.gap[side], position, low, high) / length,
+        "gap": evidence.gap[side].stretch(position, low, high) / length,
         "aligned": 1.0 - np.exp(-outside / SURE),
-        "outer": 1.0 - np.exp(-(stretch(evidence.outer[side], position, low - reach, high + reach)) / SURE),
+        "outer": 1.0 - np.exp(-(evidence.outer[side].stretch(position, low - reach, high + reach)) / SURE),
         "stub": 1.0 - np.exp(-stub / 10.0),
         "free": np.maximum(1.0 - closed - sliver, 0.0),
     }

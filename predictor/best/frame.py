@@ -13,18 +13,70 @@ from closedrooms.core.grid import OccupancyGrid
 FACE_DEPTH = 3
 
 
-def integral(mask: BoolArray) -> IntArray:
-    """Summed area table: ``table[v, u]`` counts the cells below ``v`` and left of ``u``; shape (rows + 1, cols + 1)."""
-    return np.asarray(cv2.integral(mask.astype(np.uint8)))
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Cells ``[v0, v1) x [u0, u1)`` of a frame."""
+
+    v0: int
+    u0: int
+    v1: int
+    u1: int
+
+    @property
+    def cells(self) -> int:
+        """How many."""
+        return (self.v1 - self.v0) * (self.u1 - self.u0)
+
+    @property
+    def of(self) -> tuple[slice, slice]:
+        """To index a raster of the frame with."""
+        return slice(self.v0, self.v1), slice(self.u0, self.u1)
+
+    def joined(self, other: "Window") -> "Window":
+        """The smallest window that holds both."""
+        return Window(min(self.v0, other.v0), min(self.u0, other.u0), max(self.v1, other.v1), max(self.u1, other.u1))
 
 
-def count(table: IntArray, v0: IntArray, u0: IntArray, v1: IntArray, u1: IntArray) -> IntArray:
-    """Cells set in windows ``[v0, v1) x [u0, u1)``, clipped to the table; empty where a window is reversed."""
-    rows, cols = table.shape
-    # Twice as quick as np.clip on short arrays.
-    a, c = np.minimum(np.maximum(v0, 0), rows - 1), np.minimum(np.maximum(u0, 0), cols - 1)
-    b, d = np.minimum(np.maximum(v1, a), rows - 1), np.minimum(np.maximum(u1, c), cols - 1)
-    return np.asarray(table[b, d] - table[a, d] - table[b, c] + table[a, c], dtype=np.int64)
+@dataclass(frozen=True, slots=True, eq=False)
+class Table:
+    """Summed area table of a window of a raster, looked up by the raster's own rows and columns.
+
+    Attributes:
+        sums: ``sums[i, j]`` counts the cells of the window below its row ``i`` and left of its column ``j``; shape
+            (rows + 1, cols + 1).
+        row: First row of the window.
+        col: First column of the window.
+    """
+
+    sums: IntArray
+    row: int = 0
+    col: int = 0
+
+    def count(self, v0: IntArray, u0: IntArray, v1: IntArray, u1: IntArray) -> IntArray:
+        """Cells set in ``[v0, v1) x [u0, u1)``, clipped to the table; none where that is reversed."""
+        rows, cols = self.sums.shape
+        v0, u0, v1, u1 = v0 - self.row, u0 - self.col, v1 - self.row, u1 - self.col
+        # Twice as quick as np.clip on short arrays.
+        a, c = np.minimum(np.maximum(v0, 0), rows - 1), np.minimum(np.maximum(u0, 0), cols - 1)
+        b, d = np.minimum(np.maximum(v1, a), rows - 1), np.minimum(np.maximum(u1, c), cols - 1)
+        sums = self.sums
+        return np.asarray(sums[b, d] - sums[a, d] - sums[b, c] + sums[a, c], dtype=np.int64)
+
+    def stretch(self, position: IntArray, low: IntArray, high: IntArray) -> FloatArray:
+        """Edges set along a side at ``position`` from ``low`` to ``high``, in a table of edges [along, position].
+
+        Args:
+            position: Of the side, shape (n,); clipped to the table.
+            low: First end, shape (n,).
+            high: Last end, shape (n,).
+        """
+        at = np.clip(position, self.col, self.col + self.sums.shape[1] - 2)
+        return self.count(low, at, high, at + 1).astype(np.float64)
+
+
+def integral(mask: BoolArray, row: int = 0, col: int = 0) -> Table:
+    """The table of a mask whose first cell is ``(row, col)`` of the raster."""
+    return Table(np.asarray(cv2.integral(mask.astype(np.uint8))), row, col)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +92,6 @@ class DoorFrame:
         free: Known free cells, indexed [v, u].
         known: Known cells, free or occupied.
         taken: Cells that a wall of the usual thickness around known space fills.
-        taken_sum: Summed area table of ``taken``.
         sharp: Edges where a wall face was seen, by side: ``right`` has free space left of the edge and wall right of
             it, ``left`` the reverse, ``top`` free space below, ``bottom`` above.
     """
@@ -51,7 +102,6 @@ class DoorFrame:
     free: BoolArray
     known: BoolArray
     taken: BoolArray
-    taken_sum: IntArray
     sharp: dict[str, BoolArray]
 
     def to_frame(self, points: FloatArray) -> FloatArray:
@@ -135,7 +185,6 @@ def door_frame(turned: TurnedMap, quarter: int, thickness: int) -> DoorFrame:
         free=free,
         known=known,
         taken=taken,
-        taken_sum=integral(taken),
         sharp=faces,
     )
 

@@ -13,7 +13,6 @@ import shapely
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room, RoomKind
 from closedrooms.predictor.best.directions import WallDirections, find_wall_directions
@@ -30,13 +29,10 @@ from closedrooms.predictor.edges import shows_walls
 from closedrooms.predictor.inpaint import inpaint, passage
 from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
 from closedrooms.predictor.start import unusable
-from closedrooms.predictor.window import MAX_CELLS as LARGEST
 from closedrooms.predictor.window import at_resolution, known_window
 
 # Cells that the evidence is counted in [m], that of the maps tuned on.
 RESOLUTION = 0.05
-# The tables of the evidence take 170 bytes a cell (measured): 5000 x 5000 cells, 6 ha, are 4 GB.
-MAX_CELLS = 25_000_000
 # Unknown cells around a turned map [m]: what lies further out reads as its edge.
 MARGIN = 1.0
 
@@ -56,19 +52,13 @@ def predict_best(
         The completed map on the lattice of the input, rooms in the order of the doors, failures by door id.
 
     Raises:
-        InvalidInputError: Two doors of one id, or a known area of more than :data:`MAX_CELLS` cells.
+        InvalidInputError: Two doors of one id, or a known area that is too large (:func:`at_resolution`).
     """
     failures = unusable(doors, config.same_door)
     waiting = [door for door in doors if door.id not in failures]
     window = known_window(grid)
     if window is None:
         return Prediction(grid, (), {door.id: "the map is all unknown" for door in doors})
-    width, height = window.frame.cols * window.frame.resolution, window.frame.rows * window.frame.resolution
-    if width * height > MAX_CELLS * RESOLUTION**2:
-        raise InvalidInputError(
-            f"a known area of {width:g} x {height:g} m in cells of {window.frame.resolution:g} m",
-            expected=f"at most {MAX_CELLS} cells of {RESOLUTION:g} m (the preset paper takes {LARGEST})",
-        )
     working = at_resolution(window, RESOLUTION)
     working = free_islands(working, config.clutter_area, [door.midpoint for door in waiting], config.door_reach)
     directions = find_wall_directions(working) if shows_walls(working) else None

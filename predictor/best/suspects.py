@@ -1,19 +1,31 @@
 """From doors to the rectangles that their rooms may fill, scored by themselves (preset ``best``)."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
-from closedrooms.predictor.best.candidates import FEATURES, Candidates, Entry, gather, propose
+from closedrooms.predictor.best.candidates import (
+    FEATURES,
+    Candidates,
+    Entry,
+    gather,
+    propose,
+    sizes_seen,
+    window_around,
+)
 from closedrooms.predictor.best.entry import Facing, enter
-from closedrooms.predictor.best.frame import DoorFrame, TurnedMap, door_frame
+from closedrooms.predictor.best.frame import DoorFrame, TurnedMap, Window, door_frame
 from closedrooms.predictor.best.joint import SHORTLIST, Suspect
 from closedrooms.predictor.best.shared import between, spans
 from closedrooms.predictor.best.weights import SIDE_WEIGHTS, weights_of
 
 # Narrowest and widest, shallowest and deepest room [cells]: 0.8 m to 24 m.
 LIMITS = (16, 480, 16, 480)
+# Rooms share tables up to so many cells, whose tables take 170 bytes each (measured): 0.85 GB. What has a say about one
+# door alone is at most 2563 x 1282 cells.
+MAX_WINDOW = 5_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +42,7 @@ class Suspects:
 
 
 def suspect(turned: dict[float, TurnedMap], facings: list[Facing], thickness: int) -> Suspects:
-    """Rectangles of every door, frame by frame: one frame's tables are in memory at a time.
+    """Rectangles of every door, frame by frame.
 
     Args:
         turned: Maps by the angle that they are turned along.
@@ -41,25 +53,50 @@ def suspect(turned: dict[float, TurnedMap], facings: list[Facing], thickness: in
     shared: dict[tuple[int, int], Suspect] = {}
     for angle, quarter in sorted({(facing.angle, facing.quarter) for facing in facings}):
         frame = door_frame(turned[angle], quarter, thickness)
-        evidence = gather(frame, thickness)
         here = [i for i, facing in enumerate(facings) if (facing.angle, facing.quarter) == (angle, quarter)]
-        entries = {}
-        for i in here:
-            entry, across = entries[i] = enter(frame, facings[i], facings, thickness)
-            found = propose(frame, evidence, entry, thickness, LIMITS)
-            alone[i] = _suspect(found, entry, across, frame, turned[angle], quarter)
-        for i in here:
-            for j in here:
-                (left, across), (right, _) = entries[i], entries[j]
-                if left.right != right.u or right.left != left.u:
-                    continue
-                entry = between(left, right)
-                found = propose(frame, evidence, entry, thickness, LIMITS)
-                both = spans(found.boxes, left, right)
-                found = Candidates(found.boxes[both], found.features[both])
-                if len(found.boxes):
-                    shared[i, j] = _suspect(found, entry, across, frame, turned[angle], quarter)
+        entries = {i: enter(frame, facings[i], facings, thickness) for i in here}
+        rooms: dict[tuple[int, ...], Entry] = {(i,): entries[i][0] for i in here}
+        for i, j in itertools.permutations(here, 2):
+            left, right = entries[i][0], entries[j][0]
+            if left.right == right.u and right.left == left.u:
+                rooms[i, j] = between(left, right)
+        for doors, found in _propose_all(frame, rooms, thickness).items():
+            across = entries[doors[0]][1]
+            if len(doors) == 1:
+                alone[doors[0]] = _suspect(found, rooms[doors], across, frame, turned[angle], quarter)
+                continue
+            i, j = doors
+            both = spans(found.boxes, entries[i][0], entries[j][0])
+            if both.any():
+                kept = Candidates(found.boxes[both], found.features[both])
+                shared[i, j] = _suspect(kept, rooms[doors], across, frame, turned[angle], quarter)
     return Suspects([alone[i] for i in range(len(facings))], shared)
+
+
+def _propose_all(
+    frame: DoorFrame, rooms: dict[tuple[int, ...], Entry], thickness: int
+) -> dict[tuple[int, ...], Candidates]:
+    """Rectangles of every room in a frame, window by window: one window's tables are in memory at a time."""
+    seen = sizes_seen(frame)
+    found: dict[tuple[int, ...], Candidates] = {}
+    for window, doors in _windows(frame, rooms):
+        evidence = gather(frame, thickness, window, seen)
+        found |= {key: propose(frame, evidence, rooms[key], thickness, LIMITS) for key in doors}
+    return {key: found[key] for key in rooms}
+
+
+def _windows(frame: DoorFrame, rooms: dict[tuple[int, ...], Entry]) -> list[tuple[Window, list[tuple[int, ...]]]]:
+    """Windows that hold what has a say about each room; near rooms share one."""
+    groups: list[tuple[Window, list[tuple[int, ...]]]] = []
+    for key in sorted(rooms, key=lambda key: (rooms[key].v0, rooms[key].u)):
+        own = window_around(frame, rooms[key], LIMITS)
+        for number, (window, doors) in enumerate(groups):
+            if own.joined(window).cells <= MAX_WINDOW:
+                groups[number] = own.joined(window), [*doors, key]
+                break
+        else:
+            groups.append((own, [key]))
+    return groups
 
 
 def _suspect(

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,13 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.predictor.best.candidates import stretch
+from closedrooms.predictor.best import suspects
 from closedrooms.predictor.best.directions import find_wall_directions
-from closedrooms.predictor.best.frame import count, door_frame, integral, turn_map, wall_faces
+from closedrooms.predictor.best.frame import door_frame, integral, turn_map, wall_faces
 from closedrooms.predictor.best.joint import Suspect, choose
 from closedrooms.predictor.best.pairs import PAIR_FEATURES, pair_features
+from closedrooms.predictor.best.solve import predict_best
 from closedrooms.predictor.best.thickness import DEFAULT, wall_thickness
+from closedrooms.predictor.config import preset
 
 MASKS = hnp.arrays(np.bool_, st.tuples(st.integers(3, 12), st.integers(3, 12)))
 EDGES = st.integers(-3, 15)
@@ -26,7 +30,7 @@ def test_count_agrees_with_slicing(mask: np.ndarray, v0: int, u0: int, v1: int, 
     rows, cols = mask.shape
     a, b = (min(max(v, 0), rows) for v in (v0, v1))
     c, d = (min(max(u, 0), cols) for u in (u0, u1))
-    got = count(integral(mask), *(np.array([x]) for x in (v0, u0, v1, u1)))
+    got = integral(mask).count(*(np.array([x]) for x in (v0, u0, v1, u1)))
     assert got[0] == mask[a : max(a, b), c : max(c, d)].sum()
 
 
@@ -35,7 +39,7 @@ def test_stretch_agrees_with_slicing(mask: np.ndarray, position: int, low: int, 
     rows, cols = mask.shape
     position = min(position, cols - 1)
     a, b = (min(max(v, 0), rows) for v in (low, high))
-    got = stretch(integral(mask), np.array([position]), np.array([low]), np.array([high]))
+    got = integral(mask).stretch(np.array([position]), np.array([low]), np.array([high]))
     assert got[0] == mask[a : max(a, b), position].sum()
 
 
@@ -130,3 +134,22 @@ def test_two_doors_are_chosen_as_well_as_by_trying_every_pair(seed: int) -> None
     best = max(total(i, j) for i, j in itertools.product(range(4), repeat=2))
     assert total(*chosen) == pytest.approx(best)
     assert scores[0] + float(suspects[1].scores[chosen[1]]) == pytest.approx(best)
+
+
+def test_doors_far_apart_say_the_same_from_tables_of_their_own(mapped, monkeypatch) -> None:
+    """Eight buildings in a row are longer than what has a say about one door."""
+    scene = mapped(closed=("t1", "t2", "b3"))
+    cells = np.tile(scene.grid.cells, (1, 8))
+    frame = replace(scene.grid.frame, cols=cells.shape[1])
+    step = scene.grid.frame.cols * frame.resolution
+    doors = [
+        ClosedDoor(f"{door.id}-{at}", (door.midpoint[0] + at * step, door.midpoint[1]))
+        for at in (0, 7)
+        for door in scene.doors
+    ]
+    found = []
+    for cells_at_once in (1, 10 * cells.size):
+        monkeypatch.setattr(suspects, "MAX_WINDOW", cells_at_once)
+        found.append(predict_best(OccupancyGrid(frame, cells), doors, preset("best")).rooms)
+    assert [room.doors for room in found[0]] == [(door.id,) for door in doors]
+    assert [room.polygon.wkb for room in found[0]] == [room.polygon.wkb for room in found[1]]

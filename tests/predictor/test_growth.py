@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from closedrooms.core.door import ClosedDoor
@@ -74,6 +74,7 @@ def test_rooms_are_disjoint_connected_unknown_and_hold_their_initial_face(seed, 
 
 
 @given(st.integers(0, 10_000))
+@example(2910)  # two exchanges of faces that are equally good
 @settings(max_examples=15, deadline=None)
 def test_the_order_of_doors_changes_nothing(seed):
     one = _random_growth(seed, 5)

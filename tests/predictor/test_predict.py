@@ -253,13 +253,6 @@ def test_a_huge_map_costs_no_more_than_what_is_known(mapped):
     assert large.rooms[0].polygon.symmetric_difference(small.rooms[0].polygon).area < 1e-6
 
 
-def test_best_refuses_a_known_area_whose_tables_would_fill_the_memory():
-    cells = np.full((5001, 5001), UNKNOWN, dtype=np.int8)
-    cells[0, 0] = cells[-1, -1] = FREE
-    with pytest.raises(InvalidInputError, match="at most 25000000 cells"):
-        predict(OccupancyGrid(GridFrame(0.05, 0, 0, 5001, 5001), cells), [], preset("best"))
-
-
 @pytest.mark.parametrize(("environment", "closed"), [("office1_fs_updated", 6), ("Sabadell1_updated", 4)])
 def test_it_agrees_with_the_authors_program_on_their_maps(environment, closed):
     folder = AUTHORS / environment / f"{closed:02d}"
