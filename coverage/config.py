@@ -32,6 +32,13 @@ class GraphConfig:
     gap_width: float = 0.10
     """Streaks of unknown up to this width [m] without an occupied cell are gaps between far beams, not walls."""
 
+    nook_width: float = 1.00
+    """Dead ends that a disc of this width [m] cannot enter lead nowhere when they are small: what the leaf of an open
+    door shuts off in a corner of a room. Leaves measure 0.8 to 1.0 m. 0 keeps them."""
+
+    nook_area: float = 1.20
+    """Largest area of such a dead end [m2]; a cabinet of 0.9 m x 1.5 m is larger."""
+
     corner_ratio: float = 0.50
     """A spur must reach farther beyond the largest disc at its junction than this share of that disc's radius. The
     corner of a rectangular room lies at a share of sqrt(2) - 1 = 0.41: whether thinning leaves a branch there is
@@ -42,7 +49,16 @@ class GraphConfig:
     walls measure 0.3 m, and the leaf may hang on either face."""
 
     def __post_init__(self) -> None:
-        for name in ("doorway", "opening_radius", "speck_area", "gap_width", "corner_ratio", "wall_thickness"):
+        lengths = (
+            "doorway",
+            "opening_radius",
+            "speck_area",
+            "gap_width",
+            "nook_width",
+            "corner_ratio",
+            "wall_thickness",
+        )
+        for name in (*lengths, "nook_area"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise InvalidInputError(f"{name} {value}", expected="a finite number of at least 0")

@@ -23,7 +23,7 @@ class GraphDraft:
     def __init__(self, space: FreeSpace, voronoi: VoronoiGraph, *, doorway: float) -> None:
         """Begin with a Voronoi graph; ``doorway`` [cells]: what is smaller each way may be passed on either side."""
         self.space = space
-        self._around = doorway**2
+        self._around = doorway
         self.points: list[FloatArray] = []
         self.kinds: list[VertexKind] = []
         self.edges: dict[tuple[int, int], FloatArray] = {}

@@ -21,7 +21,7 @@ class FreeSpace:
         passable: Cells that an edge may cross: ``mask`` and every cell that the map calls free.
         clearance: Distance from each cell of ``mask`` to the next cell outside it [m].
         parts: Connected part of each cell of ``mask``, numbered from 1 by falling area; 0 elsewhere.
-        areas: Area of each part [m2], ``areas[0]`` is 0.
+        areas: Area of each part with its nooks [m2], ``areas[0]`` is 0.
     """
 
     frame: GridFrame
@@ -52,7 +52,9 @@ def clean_free_space(grid: OccupancyGrid, config: GraphConfig) -> FreeSpace:
     passable = _without_specks(free, config.speck_area / resolution**2)
     mask = _without_corner_contacts(_opened(passable, config.opening_radius / resolution))
     parts, areas = _parts(mask, resolution, least=config.doorway**2)
-    mask = parts > 0
+    mask = _without_nooks(parts > 0, config.nook_width / 2.0 / resolution, config.nook_area / resolution**2)
+    mask = _without_corner_contacts(mask)
+    parts[~mask] = 0
     if not mask.any():
         raise InvalidInputError(
             "a map without free space to cover", expected=f"free space wider than {2 * config.opening_radius:.2f} m"
@@ -130,6 +132,27 @@ def _opened(free: BoolArray, radius: float) -> BoolArray:
     disc = (rows**2 + cols**2 <= radius**2).astype(np.uint8)
     opened: BoolArray = cv2.morphologyEx(free.astype(np.uint8), cv2.MORPH_OPEN, disc, borderValue=0) > 0
     return opened
+
+
+def _without_nooks(free: BoolArray, radius: float, cells: float) -> BoolArray:
+    """Leave out dead ends of at most ``cells`` cells that a disc of ``radius`` cells cannot enter.
+
+    A dead end touches what the disc can reach in one place only; passages, which touch it in two, stay, and so does a
+    part of the map that the disc cannot enter at all.
+    """
+    import cv2
+
+    wide = _opened(free, radius)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats((free & ~wide).astype(np.uint8), connectivity=8)
+    nook = np.zeros(count, dtype=np.bool_)
+    for piece in (1 + np.flatnonzero(stats[1:, cv2.CC_STAT_AREA] <= cells)).tolist():
+        x, y, width, height = stats[piece, :4].tolist()
+        window = (slice(y - 1, y + height + 1), slice(x - 1, x + width + 1))
+        around = cv2.dilate((labels[window] == piece).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        # Side by side only: through a slanted doorway both its ends may touch at a corner.
+        contacts, _ = cv2.connectedComponents((around & wide[window]).astype(np.uint8), connectivity=4)
+        nook[piece] = contacts == 2  # one, and what is none
+    return np.asarray(free & ~nook[labels])
 
 
 def _without_corner_contacts(free: BoolArray) -> BoolArray:

@@ -49,7 +49,8 @@ def split_where_blocked(chain: IntArray, passable: BoolArray, *, around: float =
     Args:
         chain: Cells (row, col), each a neighbour of the one before, shape (n, 2).
         passable: Cells that a segment may cross.
-        around: Obstacles between segment and chain up to this number of cells are passed on either side alike.
+        around: A width in cells: obstacles between segment and chain up to its square are passed on either side alike,
+            where the chain keeps within twice of it from the segment. One that leads farther away leads somewhere.
     """
     points = chain.astype(np.float64) + 0.5
     keep = [0]
@@ -58,11 +59,16 @@ def split_where_blocked(chain: IntArray, passable: BoolArray, *, around: float =
         first, last = pending.pop()
         a, b = points[first], points[last]
         closed = bool((chain[first] == chain[last]).all()) and last - first > 1
-        straight = not closed and is_clear(passable, a, b) and _between(chain[first : last + 1], passable) <= around
-        if last - first <= 1 or straight:
+        if last - first <= 1:
             keep.append(last)
             continue
-        middle = first + 1 + int(np.argmax(_distances(points[first + 1 : last], a, b)))
+        squared = _distances(points[first + 1 : last], a, b)
+        middle = first + 1 + int(np.argmax(squared))
+        if not closed and is_clear(passable, a, b):
+            between = _between(chain[first : last + 1], passable)
+            if between == 0 or (between <= around**2 and float(squared.max()) <= (2.0 * around) ** 2):
+                keep.append(last)
+                continue
         pending += [(middle, last), (first, middle)]
     return keep
 

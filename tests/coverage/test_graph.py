@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -6,7 +8,7 @@ from shapely.geometry import LineString
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.coverage.build import build_graph
 from closedrooms.coverage.config import CoverageConfig, GraphConfig
 from closedrooms.coverage.freespace import clean_free_space
@@ -51,6 +53,55 @@ def test_a_square_room_is_one_vertex_in_its_middle(draw, plain):
     assert len(graph.vertices) == 1
     assert graph.vertices[0] == pytest.approx([3.0, 3.0], abs=0.1)
     assert len(graph.edges) == 0
+
+
+def _corner_room(leaf):
+    """A room of 8 x 6 m, its doorway at the left end of the lower wall, the leaf open into the room beside the wall."""
+    return {"free": [(1.0, 1.0, 9.0, 7.0), (2.0, 0.0, 2.9, 1.0)], "occupied": [(1.9, 1.0, 1.95, 1.0 + leaf)]}
+
+
+@pytest.mark.parametrize("leaf", [0.85, 0.95])
+def test_the_nook_behind_an_open_leaf_in_a_corner_is_no_place_to_go(draw, plain, leaf):
+    grid = draw(10.0, 8.0, **_corner_room(leaf))
+    nook = grid.frame.to_cells(np.array([1.5, 1.3]))
+    space = clean_free_space(grid, plain.graph)
+    row, col = space.frame.to_cells(np.array([1.5, 1.3]))
+    assert grid.free[tuple(nook)]
+    assert space.passable[row, col]
+    graph = build_graph(grid, config=plain).graph
+    assert np.hypot(*(graph.vertices - np.array([1.6, 1.5])).T).min() > 1.0
+    kept = clean_free_space(grid, replace(plain.graph, nook_width=0.0))
+    assert kept.mask[tuple(kept.frame.to_cells(np.array([1.5, 1.3])))]
+
+
+def test_a_closet_of_a_room_keeps_its_vertex(draw, plain):
+    grid = draw(10.0, 8.0, [(1.0, 1.0, 7.0, 7.0), (7.2, 1.0, 8.1, 3.0), (6.9, 1.8, 7.3, 2.6)])
+    graph = build_graph(grid, config=plain).graph
+    assert (graph.vertices[:, 0] > 7.2).any()
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000), st.floats(0.0, np.pi), st.floats(0.3, 1.4))
+def test_leaving_out_nooks_parts_nothing_that_was_connected(seed, angle, width):
+    """Two rooms and a slanted passage between them, with blocks set at random."""
+    rng = np.random.default_rng(seed)
+    cells = np.full((160, 240), 100, dtype=np.int8)
+    cells[20:140, 20:100] = cells[20:140, 140:220] = 0
+    rows, cols = np.mgrid[:160, :240]
+    across = (rows - 80) * np.cos(angle / 3.0) - (cols - 120) * np.sin(angle / 3.0)
+    cells[(np.abs(across) <= width / 0.1) & (cols > 90) & (cols < 150) & (rows > 15) & (rows < 145)] = 0
+    for _ in range(12):
+        row, col, height, length = rng.integers((20, 20, 2, 2), (130, 210, 30, 30))
+        cells[row : row + height, col : col + length] = 100
+    grid = OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 160, 240), cells)
+    config = GraphConfig(clutter_filter=False)
+    before = clean_free_space(grid, replace(config, nook_width=0.0))
+    after = clean_free_space(grid, config)
+    labels = before.parts[after.mask]
+    assert (after.mask <= before.mask).all()
+    # Each part of before is one part of after, or gone as a whole.
+    for part in np.unique(labels):
+        assert len(np.unique(after.parts[after.mask & (before.parts == part)])) == 1
 
 
 def test_a_corridor_around_a_block_stays_a_ring(ring, plain):

@@ -73,4 +73,12 @@ def test_a_chain_through_a_room_with_two_doors_is_not_the_corridor_between_them(
     stops = split_where_blocked(chain, passable)
     assert any(8 <= chain[stop][0] < 28 for stop in stops)
     # What is small enough may be passed on either side.
-    assert split_where_blocked(chain, passable, around=1000) == [0, len(chain) - 1]
+    assert split_where_blocked(chain, passable, around=10.0) == [0, len(chain) - 1]
+
+
+def test_a_chain_that_leads_far_around_a_small_obstacle_leads_somewhere():
+    passable, chain = _corridor_beside_a_room()
+    passable[5:8, 9:31] = True
+    passable[6, 15:20] = False  # five cells are left of the wall
+    assert split_where_blocked(chain, passable, around=6.0) == [0, len(chain) - 1]
+    assert any(8 <= chain[stop][0] < 28 for stop in split_where_blocked(chain, passable, around=5.0))
