@@ -61,8 +61,8 @@ class StructureConfig:
     merge_distance: float = 0.60
     """Walls of one direction whose lines are closer than this share a line [m]."""
 
-    min_line_wall: float = 2.0
-    """A line needs this much wall in its segments [m], where each thin wall shows twice; less is a jamb or clutter."""
+    min_line_wall: float = 1.5
+    """A line needs wall along this much of it [m], seen from one side or both; less is a jamb or clutter."""
 
     border_margin: float = 1.0
     """Distance of the boundary lines from the outermost segments [m]."""

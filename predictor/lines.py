@@ -9,7 +9,6 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.config import StructureConfig
 from closedrooms.predictor.directions import Directions, angle_between
-from closedrooms.predictor.segments import lengths_of
 
 LineKind = Literal["wall", "border", "split"]
 
@@ -56,14 +55,13 @@ def find_lines(
     """
     lines: list[Line] = []
     labels = np.full(len(segments), -1, dtype=np.int64)
-    lengths = lengths_of(segments)
     for cluster, angle in enumerate(directions.angles):
         members = np.flatnonzero(directions.labels == cluster)
         axes = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
         ends = segments[members].reshape(-1, 2, 2) @ axes.T  # (k, 2 ends, along and across)
         walls = _chain(ends, config.collinear_distance)
         for offset, inside in _merge(ends, walls, config.merge_distance):
-            if lengths[members[inside]].sum() < config.min_line_wall:
+            if _covered(ends[inside]) < config.min_line_wall:
                 continue
             labels[members[inside]] = len(lines)
             lines.append(Line(float(angle), offset))
@@ -80,6 +78,15 @@ def _chain(ends: FloatArray, reach: float) -> IntArray:
     gap = np.maximum(np.maximum(low[:, None] - high[None, :], low[None, :] - high[:, None]), 0.0)
     near = np.hypot(gap, across[:, None] - across[None, :]) <= reach
     return np.asarray(connected_components(csr_array(near), directed=False)[1], dtype=np.int64)
+
+
+def _covered(ends: FloatArray) -> float:
+    """Length of a line that segments cover, once where they overlap [m]; ends are (along, across), shape (k, 2, 2)."""
+    low, high = ends[..., 0].min(axis=1), ends[..., 0].max(axis=1)
+    order = np.argsort(low)
+    low, reached = low[order], np.maximum.accumulate(high[order])
+    gaps = np.maximum(low[1:] - reached[:-1], 0.0)
+    return float(reached[-1] - low[0] - gaps.sum())
 
 
 def _merge(ends: FloatArray, walls: IntArray, reach: float) -> list[tuple[float, IntArray]]:

@@ -7,12 +7,20 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
 
-from closedrooms.core.arrays import FloatArray
+from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.grid import UNKNOWN, OccupancyGrid
 from closedrooms.predictor.window import is_free, is_occupied
 
 # Thicker than this is no interior wall but something built in [m].
 MAX_WALL = 0.60
+# Both sides of a wall show this much free space across [m]: less is a speck beside a wall, or a hole in one.
+CLEAR = 0.40
+# Walls take at most this much of a room [m]. The authors drew rooms up to the lines; without this limit agreement with
+# their program is 0.75 instead of 0.83, with none taken 0.86, and rooms on the bundled worlds (walls of 0.2 m) lose
+# 0.02 of IoU.
+MOST_TAKEN = 0.20
+# Cells looked at at once: 50 MB.
+AT_ONCE = 100_000
 # With less wall than this seen from both sides [m], nothing is measured and walls are taken to be thin [m].
 MIN_EVIDENCE, THIN_WALL = 2.0, 0.10
 # The share of a side beyond which free space must have been seen, for the wall to be placed by it.
@@ -22,10 +30,10 @@ BESIDE = 0.21
 
 
 def measure_thickness(grid: OccupancyGrid, directions: FloatArray) -> float:
-    """Typical thickness of the walls that are seen from both sides, face to face [m].
+    """Typical thickness of the walls that are seen from both sides, face to face, at most ``MOST_TAKEN`` [m].
 
-    Along the normal of each main direction, runs between two free cells that begin and end with an occupied cell are
-    walls; each cell of a wall's length counts once.
+    Along the normal of each main direction, runs that begin and end with an occupied cell, with ``CLEAR`` free on
+    either side, are walls; each cell of a wall's length counts once.
 
     Args:
         grid: The map, cropped to what is known.
@@ -35,26 +43,34 @@ def measure_thickness(grid: OccupancyGrid, directions: FloatArray) -> float:
         The median; ``THIN_WALL`` where hardly any wall is seen from both sides.
     """
     resolution = grid.frame.resolution
-    longest = int(MAX_WALL / resolution)
-    runs = [_runs(grid, float(angle), longest) for angle in directions[:2]]
+    longest, clear = int(MAX_WALL / resolution), round(CLEAR / resolution)
+    starts = np.argwhere(grid.occupied)
+    runs = [
+        _runs(grid, starts[first : first + AT_ONCE], float(angle), longest, clear)
+        for angle in directions[:2]
+        for first in range(0, len(starts), AT_ONCE)
+    ]
     lengths = np.concatenate(runs) if runs else np.zeros(0)
     if lengths.size * resolution < MIN_EVIDENCE:
         return THIN_WALL
-    return float(np.median(lengths)) * resolution
+    return min(float(np.median(lengths)) * resolution, MOST_TAKEN)
 
 
-def _runs(grid: OccupancyGrid, angle: float, longest: int) -> FloatArray:
-    """Lengths [cells] of walls across a direction, from every occupied cell with a free one before it, shape (k,)."""
+def _runs(grid: OccupancyGrid, starts: IntArray, angle: float, longest: int, clear: int) -> FloatArray:
+    """Lengths [cells] of the walls across a direction whose first occupied cell is one of ``starts``, shape (k,)."""
     normal = np.array([np.cos(angle), -np.sin(angle)])  # (row, col) of one cell across the wall
-    starts = np.argwhere(grid.occupied)
-    steps = np.arange(-1, longest + 1)
+    steps = np.arange(-clear, longest + clear + 1)
     cells = np.rint(starts[:, None, :] + steps[None, :, None] * normal).astype(np.int64)  # (k, steps, 2)
     cells = np.clip(cells, 0, np.array(grid.frame.shape) - 1)
     values = grid.cells[cells[..., 0], cells[..., 1]]
     free, occupied = is_free(values), is_occupied(values)
-    first = free[:, 1:].argmax(axis=1) + 1  # index of the first free cell behind; its step is one less
-    wall = free[:, 0] & free[:, 1:].any(axis=1) & occupied[np.arange(len(starts)), first - 1]
-    lengths: FloatArray = first[wall].astype(np.float64) - 1.0
+    before, behind = free[:, :clear].all(axis=1), free[:, clear:]
+    first = behind.argmax(axis=1)  # steps from the start to the first free cell behind the wall
+    number = np.arange(len(starts))
+    seen = np.cumsum(behind, axis=1)  # 1 at that cell
+    after = (first >= 1) & (first <= longest) & (seen[number, np.minimum(first, longest) + clear - 1] == clear)
+    wall = before & after & occupied[number, clear + first - 1]
+    lengths: FloatArray = first[wall].astype(np.float64)
     return lengths
 
 

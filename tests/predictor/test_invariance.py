@@ -135,7 +135,7 @@ def test_a_slanted_wing_is_predicted_like_the_rest_at_any_angle(winged, iou, met
 
 
 @pytest.mark.parametrize("method", ["rose", "best"])
-@pytest.mark.parametrize("resolution", [0.025, 0.04, 0.1])
+@pytest.mark.parametrize("resolution", [0.025, 0.03, 0.04, 0.08, 0.1])
 def test_a_map_of_other_cells_gives_the_same_rooms(mapped, iou, method, resolution):
     usual, other = mapped(), mapped(resolution=resolution)
     before = _rooms(usual.grid, usual.doors, METHODS[method])

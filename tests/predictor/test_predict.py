@@ -46,7 +46,7 @@ def test_rotating_the_map_rotates_the_answer(mapped, iou, degrees):
         assert iou(room.polygon, turned) > 0.85
 
 
-@pytest.mark.parametrize("resolution", [0.025, 0.04, 0.1])
+@pytest.mark.parametrize("resolution", [0.025, 0.03, 0.04, 0.08, 0.1])
 def test_another_resolution_gives_the_same_rooms(mapped, iou, resolution):
     scene = mapped(resolution=resolution)
     prediction = predict(scene.grid, scene.doors, PAPER)

@@ -36,6 +36,17 @@ def test_a_wall_becomes_segments_on_the_wall():
     assert segments[:, 0::2].max() < -3.0 + 180 * 0.05 + 0.1
 
 
+@pytest.mark.parametrize(("length", "kept"), [(1.6, True), (1.4, False)])
+@pytest.mark.parametrize("sides", [(0.0,), (0.0, 0.15)], ids=["one", "both"])
+def test_a_wall_carries_a_line_by_its_length_whether_one_side_of_it_was_found_or_both(length, kept, sides):
+    short = [_segment(0.3, offset, 0.0, length) for offset in sides]
+    long = [_segment(0.3, 5.0, 0.0, 6.0), _segment(0.3 + math.pi / 2, 0.0, 0.0, 6.0)]
+    segments = np.array([*short, *long])
+    lines, labels = find_lines(segments, find_directions(segments, CONFIG), CONFIG)
+    assert len(lines) == (3 if kept else 2)
+    assert (labels[: len(short)] >= 0).all() == kept
+
+
 def test_a_map_without_walls_has_no_segments():
     grid = OccupancyGrid(GridFrame(0.05, 0, 0, 50, 50), np.full((50, 50), FREE, dtype=np.int8))
     assert find_segments(grid, CONFIG).shape == (0, 4)

@@ -113,6 +113,26 @@ def test_the_thickness_of_walls_is_measured(mapped, degrees):
     assert measured == pytest.approx(0.2, abs=0.05)
 
 
+def _two_rooms(gap, specks=()):
+    """Two rooms of 4 x 6 m, ``gap`` [m] of unknown and a cell of wall on either side of it between them."""
+    cells = np.full((120, 200), FREE, dtype=np.int8)
+    cells[:, 80 : 80 + round(gap / 0.05)] = UNKNOWN
+    cells[:, [80, 79 + round(gap / 0.05)]] = OCCUPIED
+    for row in specks:
+        cells[row, 76:79:2] = OCCUPIED
+    return OccupancyGrid(GridFrame(0.05, 0, 0, 120, 200), cells)
+
+
+def test_specks_beside_a_wall_have_no_thickness():
+    upright = np.array([math.pi / 2])
+    assert measure_thickness(_two_rooms(0.15), upright) == pytest.approx(0.15)
+    assert measure_thickness(_two_rooms(0.15, specks=range(0, 110)), upright) != pytest.approx(0.05)
+
+
+def test_thick_walls_take_no_more_of_a_room_than_usual_ones():
+    assert measure_thickness(_two_rooms(0.45), np.array([math.pi / 2])) == pytest.approx(0.20)
+
+
 def test_thin_walls_are_assumed_where_none_is_seen_from_both_sides():
     grid = OccupancyGrid(GridFrame(0.05, 0, 0, 40, 40), np.full((40, 40), FREE, dtype=np.int8))
     assert measure_thickness(grid, np.array([0.0, math.pi / 2])) == pytest.approx(0.10)
