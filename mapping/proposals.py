@@ -31,7 +31,7 @@ SMOOTH = 0.01
 LEAST_CONTRAST = 1.3
 # Score: logistic regression of log(contrast) and share of the leaf's face that was seen, fitted on every other bundled
 # world (office-01, -03, ... school-08) at medium noise by benchmarks/door_proposals.py.
-INTERCEPT, PER_CONTRAST, PER_SEEN = -10.3, 3.85, 6.85
+INTERCEPT, PER_CONTRAST, PER_SEEN = -10.87, 3.04, 8.37
 # Candidates that overlap by more than this share of the narrower one are the same door.
 OVERLAP = 0.3
 
