@@ -52,6 +52,9 @@ def arrange(lines: Sequence[Line], boundary: Sequence[Line]) -> Arrangement:
     Args:
         lines: Representative lines and splits.
         boundary: Four lines, two and two parallel.
+
+    Returns:
+        The faces inside the box, slivers left out, ordered by where they are.
     """
     box = box_of(boundary)
     reach = 2.0 * float(np.hypot(*np.ptp(shapely.get_coordinates(box), axis=0))) + 1.0

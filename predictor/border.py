@@ -41,6 +41,10 @@ def border_rooms(growth: Growth, config: PredictorConfig) -> dict[int, BorderRoo
 
     Where the boundary cuts the door's edge, its length says nothing: the square takes the size of the other side of
     the initial face. Adjacent ones of the same outward direction share their mean depth.
+
+    Args:
+        growth: The layouts; those that start in a border face never grew.
+        config: Whether depth is shared.
     """
     rooms = {r: _square(growth, r) for r in range(len(growth.entrances)) if growth.is_border(r)}
     if config.average_border_depth:

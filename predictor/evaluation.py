@@ -47,6 +47,12 @@ def evaluate(terms: Terms, weights: Weights, phi: Phi, *, dependent: bool) -> Fl
 
     ``as-run`` counts free edges a face where the text takes the ratio of lengths, subtracts the penalty for free
     faces from independent rooms too where the text adds it, takes the hull ratio from 1 and the proportion beyond 2.
+
+    Args:
+        terms: Of k layouts.
+        weights: ``w1`` to ``w6``, the area's a metre.
+        phi: Which of the two readings.
+        dependent: Whether the room touches another one's layout.
     """
     size = weights.area * np.sqrt(terms.area)
     hull = terms.hull / terms.area

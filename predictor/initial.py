@@ -109,6 +109,13 @@ def splits_between(arrangement: Arrangement, entrances: Sequence[Entrance]) -> l
     Doors on one edge: the perpendicular through the middle of two neighbouring doors. Doors on two edges of one
     face, of which the text says nothing: the perpendicular of the line from door to door, through its middle, turned
     to the nearest of the two directions of the first door's edge.
+
+    Args:
+        arrangement: The faces.
+        entrances: All doors, each with its edge and face.
+
+    Returns:
+        The lines by place, none where no two doors share a face.
     """
     by_face: dict[int, list[Entrance]] = {}
     for entrance in entrances:

@@ -50,6 +50,11 @@ def find_lines(
     Segments closer than ``collinear_distance`` chain into one wall, whose line lies at the median offset; walls
     whose lines are closer than ``merge_distance`` share one line. Lines with hardly any wall are dropped.
 
+    Args:
+        segments: Ends ``x0, y0, x1, y1`` in the map frame [m], shape (n, 4).
+        directions: Of the same segments.
+        config: Distances and the least length of wall.
+
     Returns:
         The lines, ordered by direction and offset, and the line of each segment (-1 for none), shape (n,).
     """

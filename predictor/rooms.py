@@ -18,6 +18,11 @@ from closedrooms.predictor.thickness import free_interior, measure_thickness
 def finish_rooms(start: Start, growth: Growth, config: PredictorConfig) -> tuple[tuple[Room, ...], list[Shape]]:
     """Polygons of the grown layouts and of the border rooms, and the passages at their doors.
 
+    Args:
+        start: The map and its faces.
+        growth: The grown layouts.
+        config: Wall thickness, depth of border rooms, width of passages.
+
     Returns:
         Rooms in the order of the doors, and what to clear at each door [m].
     """

@@ -58,6 +58,11 @@ Started = tuple[Start | None, dict[str, str]]
 def start_rooms(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PredictorConfig) -> Started:
     """Structure, faces and initial faces of a map: the same for every method with the same structure.
 
+    Args:
+        grid: The map, of any resolution and size.
+        doors: Closed doors in the frame of the map.
+        config: Settings; what comes after the initial faces has no say.
+
     Returns:
         The start, ``None`` where the map shows no structure at all, and why doors have no room, by door id.
 

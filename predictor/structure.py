@@ -35,6 +35,10 @@ class WallLines:
 def find_structure(grid: OccupancyGrid, config: PredictorConfig) -> WallLines | None:
     """Segments, directions and lines of a map (section 3.1, or 4.2 with ``structure="rose"``).
 
+    Args:
+        grid: The map at the working resolution, cropped to what is known with unknown cells around it.
+        config: ``structure`` and ``lines``.
+
     Returns:
         ``None`` without any line.
     """

@@ -17,7 +17,15 @@ def level_of(k: int, growth: Growth) -> Level:
 
 
 def trace_of(start: Start, levels: list[Level]) -> PredictionTrace:
-    """Every stage of a prediction, for recordings and pictures."""
+    """Every stage of a prediction, for recordings and pictures.
+
+    Args:
+        start: Structure, faces and entrances.
+        levels: Layouts after each step, as they were reported.
+
+    Returns:
+        The stages in the map frame; the lines clipped to the box of the faces.
+    """
     arrangement = start.arrangement
     box = shapely.union_all(list(arrangement.faces)).envelope
     reach = float(np.hypot(box.bounds[2] - box.bounds[0], box.bounds[3] - box.bounds[1]))

@@ -98,7 +98,16 @@ def update(
 
 
 def overlay(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedDoor] = ()) -> OccupancyGrid:
-    """The map as known now, completed by the prediction where it is unknown; doorways of ``doors`` stay passable."""
+    """The map as known now, completed by the prediction where it is unknown; doorways of ``doors`` stay passable.
+
+    Args:
+        prediction: On the same lattice.
+        grid: The map as it is known now.
+        doors: Doors of the predicted rooms, map frame [m].
+
+    Returns:
+        A map that covers both frames.
+    """
     frame = prediction.grid.frame.covering(*grid.frame.bounds)
     now, before = grid.on(frame), prediction.grid.on(frame)
     cells = np.where(now.unknown, before.cells, now.cells)
@@ -107,7 +116,12 @@ def overlay(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedD
 
 
 def seen_share(prediction: Prediction, grid: OccupancyGrid) -> dict[str, float]:
-    """How much of each predicted room is known by now, 0..1, by the id of its first door."""
+    """How much of each predicted room is known by now, 0..1, by the id of its first door.
+
+    Args:
+        prediction: On the same lattice.
+        grid: The map as it is known now.
+    """
     frame = prediction.grid.frame.covering(*grid.frame.bounds)
     known = grid.on(frame).known
     shares = {}

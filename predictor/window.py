@@ -26,7 +26,12 @@ def is_occupied(values: CellArray) -> BoolArray:
 
 
 def known_window(grid: OccupancyGrid, *, margin: int = 8) -> OccupancyGrid | None:
-    """The known cells with ``margin`` unknown cells around them, ``None`` when all is unknown."""
+    """The known cells with ``margin`` unknown cells around them, ``None`` when all is unknown.
+
+    Args:
+        grid: A map.
+        margin: Cells on every side; outside of the map they are unknown too.
+    """
     bounds = grid.known_bounds()
     if bounds is None:
         return None
@@ -39,6 +44,10 @@ def at_resolution(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:
 
     A coarser cell is occupied when any of the cells whose centre it holds is, else free when any is free. Finer cells
     interpolate, so that a slanted wall does not become a staircase, which has no direction.
+
+    Args:
+        grid: A map.
+        resolution: Of the result [m]; where it is the map's own, the map comes back.
 
     Raises:
         InvalidInputError: More than :data:`MAX_CELLS` cells of ``resolution``.

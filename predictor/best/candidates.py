@@ -374,7 +374,15 @@ def _peaks(positions: IntArray, strength: FloatArray, keep: int, *, apart: int =
 
 
 def describe(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int, boxes: IntArray) -> FloatArray:
-    """Evidence of each rectangle, shape (n, len(FEATURES))."""
+    """Evidence of each rectangle, shape (n, len(FEATURES)).
+
+    Args:
+        frame: The door's frame.
+        evidence: Its tables, over :func:`window_around` the door at least.
+        entry: The door.
+        thickness: Usual thickness of walls [cells].
+        boxes: ``u0, v0, u1, v1`` [cells], shape (n, 4).
+    """
     u0, v0, u1, v1 = boxes.T
     width, depth = (u1 - u0).astype(float), (v1 - v0).astype(float)
     cell = frame.resolution

@@ -58,7 +58,14 @@ class WallDirections:
 
 
 def find_wall_directions(grid: OccupancyGrid) -> WallDirections | None:
-    """Peaks of the directions of the edges of free space; ``None`` where there is none."""
+    """Peaks of the directions of the edges of free space.
+
+    Args:
+        grid: The map in cells of 0.05 m, cropped to what is known.
+
+    Returns:
+        Directions, strongest first; ``None`` with fewer than 20 occupied cells or no edge.
+    """
     occupied = np.argwhere(grid.occupied)
     image = cv2.GaussianBlur(grid.free.astype(np.float32), (0, 0), BLUR)
     gx, gy = cv2.Sobel(image, cv2.CV_32F, 1, 0), cv2.Sobel(image, cv2.CV_32F, 0, 1)
