@@ -9,7 +9,7 @@ from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.predictor.prediction import Shape
-from closedrooms.predictor.window import MAX_CELLS, is_free
+from closedrooms.predictor.window import MAX_CELLS, is_free, is_occupied
 
 
 def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Shape]) -> OccupancyGrid:
@@ -26,30 +26,33 @@ def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Sha
     Raises:
         InvalidInputError: More than :data:`MAX_CELLS` cells, where those of the input are far too small for a room.
     """
-    frame = grid.frame
-    resolution = frame.resolution
-    if shapes:
-        x0, y0, x1, y1 = shapely.total_bounds([*shapes, *passages])
-        if (x1 - x0) * (y1 - y0) > MAX_CELLS * resolution**2:
-            raise InvalidInputError(
-                f"rooms over {x1 - x0:.3g} x {y1 - y0:.3g} m in cells of {resolution:g} m",
-                expected=f"at most {MAX_CELLS} cells; is the map's resolution in metres?",
-            )
-        frame = frame.covering(x0 - 2 * resolution, y0 - 2 * resolution, x1 + 2 * resolution, y1 + 2 * resolution)
-    out = grid.on(frame)
-    cells = out.cells.copy()
-    unknown = out.unknown
+    if not shapes and not passages:
+        return grid
+    resolution = grid.frame.resolution
+    x0, y0, x1, y1 = shapely.total_bounds([*shapes, *passages])
+    if (x1 - x0) * (y1 - y0) > MAX_CELLS * resolution**2:
+        raise InvalidInputError(
+            f"rooms over {x1 - x0:.3g} x {y1 - y0:.3g} m in cells of {resolution:g} m",
+            expected=f"at most {MAX_CELLS} cells; is the map's resolution in metres?",
+        )
+    frame = grid.frame.covering(x0 - 2 * resolution, y0 - 2 * resolution, x1 + 2 * resolution, y1 + 2 * resolution)
+    cells = grid.on(frame).cells.copy()
     inside = np.zeros(frame.shape, dtype=np.bool_)
     ring = np.zeros(frame.shape, dtype=np.bool_)
     for shape in shapes:
         fill_shape(shape, frame, inside)
         _trace(shape, frame, ring)
-    cells[unknown & inside & ~ring] = FREE
-    cells[unknown & ring] = OCCUPIED
     cleared = np.zeros(frame.shape, dtype=np.bool_)
     for passage in passages:
         fill_shape(passage, frame, cleared)
-    cells[cleared] = FREE
+    # Where nothing is drawn nothing is asked: maps are large and rooms small.
+    (r0, c0), (r1, c1) = np.maximum(frame.to_cells(np.array([[x0, y0], [x1, y1]])), 0)
+    drawn = slice(r0, r1 + 1), slice(c0, c1 + 1)
+    part = cells[drawn]
+    unknown = ~(is_free(part) | is_occupied(part))
+    part[unknown & inside[drawn] & ~ring[drawn]] = FREE
+    part[unknown & ring[drawn]] = OCCUPIED
+    part[cleared[drawn]] = FREE
     return OccupancyGrid(frame, cells)
 
 

@@ -1,5 +1,7 @@
 """The part of a map that is known, at the resolution that the predictor works at."""
 
+import math
+
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, CellArray, FloatArray
@@ -17,7 +19,7 @@ SMOOTH = 0.5
 
 def is_free(values: CellArray) -> BoolArray:
     """Which of some cells are free: the grid's rule where only few of its cells are asked for."""
-    return np.asarray((values >= 0) & (values < FREE_BELOW))
+    return np.less(values.view(np.uint8), math.ceil(FREE_BELOW))
 
 
 def is_occupied(values: CellArray) -> BoolArray:
