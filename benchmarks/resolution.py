@@ -6,6 +6,7 @@ A sample is a folder with ``map.yaml`` and ``doors.geojson``. Three ways to writ
 what most of its area is; ``any``, occupied where anything is; ``third``, occupied where 0.3 of it is.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 from shapely import affinity
 
-from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.arrays import BoolArray, CellArray, FloatArray
 from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.geojson import read_doors
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
@@ -33,12 +34,12 @@ METHODS = {
     "rose": replace(preset("paper"), structure="rose"),
     "best": preset("best"),
 }
-# Points a cell is sampled at along each axis.
+# Points a turned cell is sampled at along each axis.
 SAMPLES = 4
 RULES: dict[str, Callable[[FloatArray, FloatArray], BoolArray]] = {
     "most": lambda occupied, free: (occupied > 0) & (occupied >= free) & (occupied >= 1.0 - occupied - free),
-    "any": lambda occupied, _free: occupied > 0,
-    "third": lambda occupied, _free: occupied >= 0.3,
+    "any": lambda occupied, _free: occupied > 1e-6,
+    "third": lambda occupied, _free: occupied >= 0.3 - 1e-9,
 }
 
 
@@ -58,29 +59,48 @@ class Options:
     """Angles that the map is turned by about the origin [degrees], in cells of its own size and by ``third``."""
 
 
-def redrawn(grid: OccupancyGrid, resolution: float, rule: str, angle: float = 0.0) -> OccupancyGrid:
-    """The map turned by ``angle`` [rad] and drawn in cells of ``resolution`` [m]."""
+def redrawn(grid: OccupancyGrid, resolution: float, rule: str) -> OccupancyGrid:
+    """The map drawn in cells of ``resolution`` [m], from the share of each that is occupied and free."""
+    frame = grid.frame
+    size = resolution / frame.resolution
+    rows, cols = (math.ceil(count / size - 1e-9) for count in frame.shape)
+    down, across = _overlaps(frame.rows, rows, size), _overlaps(frame.cols, cols, size)
+    occupied, free = (down @ mask.astype(np.float64) @ across.T for mask in (grid.occupied, grid.free))
+    target = GridFrame(resolution, frame.origin_x, frame.origin_y, rows, cols)
+    return OccupancyGrid(target, _cells(occupied, free, rule))
+
+
+def _overlaps(count: int, wanted: int, size: float) -> FloatArray:
+    """Share of each new cell, ``size`` old ones long, that lies in each old one, shape (wanted, count)."""
+    starts, cells = np.arange(wanted)[:, None] * size, np.arange(count)[None, :]
+    return np.maximum(np.minimum(starts + size, cells + 1) - np.maximum(starts, cells), 0.0) / size
+
+
+def turned(grid: OccupancyGrid, angle: float) -> OccupancyGrid:
+    """The map turned about the origin by ``angle`` [rad], in cells of its own size and by ``third``."""
     c, s = math.cos(angle), math.sin(angle)
     turn = np.array([[c, s], [-s, c]])
     x0, y0, x1, y1 = grid.frame.bounds
     corners = np.array([(x0, y0), (x1, y0), (x0, y1), (x1, y1)]) @ turn
-    low = corners.min(axis=0)
-    cols, rows = np.ceil((corners.max(axis=0) - low) / resolution - 1e-9).astype(int)
+    low, resolution = corners.min(axis=0), grid.frame.resolution
+    cols, rows = np.ceil((corners.max(axis=0) - low) / resolution).astype(int)
     frame = GridFrame(resolution, float(low[0]), float(low[1]), int(rows), int(cols))
     points = frame.to_points(np.stack(np.indices(frame.shape), axis=-1))
     occupied, free = np.zeros(frame.shape), np.zeros(frame.shape)
     places = ((np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5) * resolution
-    for dx in places:
-        for dy in places:
-            cells = grid.frame.to_cells((points + np.array([dx, dy])) @ turn.T)
-            inside = grid.frame.contains(cells)
-            row, col = np.where(inside, cells[..., 0], 0), np.where(inside, cells[..., 1], 0)
-            occupied += inside & grid.occupied[row, col]
-            free += inside & grid.free[row, col]
-    occupied, free = occupied / SAMPLES**2, free / SAMPLES**2
-    values = np.where(free >= 0.5, FREE, UNKNOWN)
+    for dx, dy in itertools.product(places, places):
+        cells = grid.frame.to_cells((points + np.array([dx, dy])) @ turn.T)
+        inside = grid.frame.contains(cells)
+        row, col = np.where(inside, cells[..., 0], 0), np.where(inside, cells[..., 1], 0)
+        occupied += inside & grid.occupied[row, col]
+        free += inside & grid.free[row, col]
+    return OccupancyGrid(frame, _cells(occupied / SAMPLES**2, free / SAMPLES**2, "third"))
+
+
+def _cells(occupied: FloatArray, free: FloatArray, rule: str) -> CellArray:
+    values = np.where(free >= 0.5, FREE, UNKNOWN).astype(np.int8)
     values[RULES[rule](occupied, free)] = OCCUPIED
-    return OccupancyGrid(frame, values.astype(np.int8))
+    return values
 
 
 def turned_door(door: ClosedDoor, angle: float) -> ClosedDoor:
@@ -120,7 +140,7 @@ def measure(folder: Path, options: Options) -> dict[tuple[str, str], tuple[float
                 found[f"{size:g} m, {rule}", method] = agreement(usual[method], rooms(other, doors, method))
     for degrees in options.turn:
         angle = math.radians(degrees)
-        other = redrawn(window, window.frame.resolution, "third", angle)
+        other = turned(window, angle)
         moved = [turned_door(door, angle) for door in doors]
         for method in options.methods:
             found[f"turned {degrees:g}", method] = agreement(usual[method], rooms(other, moved, method, angle))
