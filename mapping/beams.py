@@ -103,8 +103,7 @@ def clean_alike(scans: Sequence[LaserScan], *, max_range: float) -> list[Beams]:
     outlines[:, 0::2] = units * crossed[:, :, None]
     outlines[:, 1::2] = halves * np.minimum(crossed, following)[:, :, None]
     if not wrap:
-        outlines[:, 1:] = outlines[:, :-1].copy()
-        outlines[:, 0] = 0.0
+        outlines = np.concatenate((np.zeros((len(scans), 1, 2)), outlines[:, :-1]), axis=1)
     ends = units * np.where(surface, steady, 0.0)[:, :, None]
     if first.robot_T_sensor != (0.0, 0.0, 0.0):
         ends, outlines = sensor.transform(ends), sensor.transform(outlines)

@@ -37,7 +37,7 @@ def few(hits: int) -> LaserScan:
         [noisy(i, mount=MOUNT) for i in range(3)],
         [noisy(0), noisy(1, beams=180), noisy(2), noisy(3, mount=MOUNT)],
         [few(hits) for hits in (0, 1, 2, 3, 90)],
-        [noisy(0, beams=1), noisy(0, beams=2)],
+        [noisy(0, beams=1), noisy(0, beams=2), LaserScan(np.zeros(0), 0.0, 0.1, 20.0)],
     ],
 )
 def test_many_scans_at_once_give_what_each_gives_alone(scans: list[LaserScan]) -> None:
