@@ -220,10 +220,11 @@ def _observed_room(scene: _Scene, region: BoolArray, index: int) -> BoolArray:
     walls: Any = cv2.morphologyEx(scene.now.occupied.astype(np.uint8), cv2.MORPH_CLOSE, _square(GAP, scene.frame))
     left = scene.masks[index] & (walls == 0)
     left_image: Any = cv2.morphologyEx(left.astype(np.uint8), cv2.MORPH_OPEN, SQUARE)
-    both = region | (left_image > 0)
+    inside = region & (walls == 0)  # a beam that slipped through a wall opens no way either
+    both = inside | (left_image > 0)
     _, parts = cv2.connectedComponents(both.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
-    joined: BoolArray = np.isin(np.asarray(parts), np.unique(np.asarray(parts)[region])) & both
-    return joined
+    joined: BoolArray = np.isin(np.asarray(parts), np.unique(np.asarray(parts)[inside])) & both
+    return joined | region
 
 
 def _square(side: float, frame: GridFrame) -> Any:

@@ -72,10 +72,11 @@ def test_of_a_room_seen_in_part_the_rest_of_the_prediction_stays() -> None:
     assert iou(after.rooms[0], 1.0, 2.1, 5.0, 6.0) > 0.9
 
 
-def test_nothing_is_left_of_a_prediction_behind_a_gap_between_two_hits() -> None:
+@pytest.mark.parametrize("gap", [-1, 0])
+def test_nothing_is_left_of_a_prediction_behind_a_gap_between_two_hits(gap: int) -> None:
     before = predicted(Room(box(2.0, 2.15, 7.0, 5.0), ("d00",)))
     cells = look_into(corridor(), 2.0, 2.15, 4.0, 5.0)
-    cells[60:64, 80:82] = -1  # a gap of 0.2 m in the wall at x = 4
+    cells[60:64, 80:82] = gap  # of 0.2 m in the wall at x = 4, unknown or crossed by a beam
     after = update(before, OccupancyGrid(FRAME, cells), doors=[DOOR])
     (room,) = after.rooms
     assert room.polygon.bounds[2] < 4.2
