@@ -228,9 +228,10 @@ def _observed_room(scene: _Scene, region: BoolArray, index: int) -> BoolArray:
 
 
 def _square(side: float, frame: GridFrame) -> Any:
-    """A structuring element of a side [m]."""
-    cells = max(math.floor(side / frame.resolution + 1e-9), 1)
-    return np.ones((cells, cells), dtype=np.uint8)
+    """A structuring element that closes gaps of a side [m]; odd, or what it closes would move by a cell."""
+    cells = math.floor(side / frame.resolution + 1e-9)
+    odd = cells + 1 - cells % 2
+    return np.ones((odd, odd), dtype=np.uint8)
 
 
 def _cut(scene: _Scene, observed: list[BoolArray], index: int, room: Room) -> Shape | None:
