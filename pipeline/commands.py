@@ -261,3 +261,7 @@ COMMANDS: dict[str, tuple[str, Callable[[Sequence[str]], int]]] = {
         _robustness,
     ),
 }
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -234,6 +234,13 @@ def test_wrong_usage_is_status_2(words: tuple[str, ...]) -> None:
     assert call(*words) == 2
 
 
+def test_the_module_runs_as_the_program_does() -> None:
+    words = [sys.executable, "-m", "closedrooms.pipeline.commands", "teleport"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "unknown command 'teleport'" in done.stderr
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert call(command, "--help") == 0
