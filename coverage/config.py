@@ -1,7 +1,7 @@
 """Settings of graph and tour; lengths in metres. Imports nothing heavy."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Literal
 
 from closedrooms.core.errors import InvalidInputError
@@ -49,17 +49,8 @@ class GraphConfig:
     walls measure 0.3 m, and the leaf may hang on either face."""
 
     def __post_init__(self) -> None:
-        lengths = (
-            "doorway",
-            "opening_radius",
-            "speck_area",
-            "gap_width",
-            "nook_width",
-            "corner_ratio",
-            "wall_thickness",
-        )
-        for name in (*lengths, "nook_area"):
-            value = getattr(self, name)
+        for item in fields(self):
+            name, value = item.name, getattr(self, item.name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise InvalidInputError(f"{name} {value}", expected="a finite number of at least 0")
         if self.doorway <= 0.0:

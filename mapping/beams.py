@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 
@@ -203,10 +203,24 @@ def directions(angle_min: float, increment: float, beams: int) -> tuple[FloatArr
 
 def thin(points: FloatArray, spacing: float, most: int) -> FloatArray:
     """Points of a scan, shape (n, 2), in beam order, at about ``spacing`` [m] along it and at most ``most`` of them."""
-    if len(points) < 3:
-        return points
-    steps = np.hypot(np.diff(points[:, 0]), np.diff(points[:, 1]))
-    way = np.concatenate(([0.0], np.cumsum(np.minimum(steps, spacing))))
-    ticks = np.floor(way / max(spacing, way[-1] / most))
-    keep = np.concatenate(([True], ticks[1:] > ticks[:-1]))
-    return points[keep]
+    return points[spaced(points, np.array([len(points)]), spacing, most)]
+
+
+def spaced(points: FloatArray, counts: IntArray, spacing: float, most: int) -> BoolArray:
+    """Which points of each scan :func:`thin` keeps, shape (..., n).
+
+    Args:
+        points: In beam order, shape (..., n, 2) [m]; what stands after the first ``counts`` of a scan does not count.
+        counts: How many points each scan has, shape (..., 1).
+        spacing: Between those kept, along the scan [m].
+        most: How many are kept of a scan.
+    """
+    number = np.arange(points.shape[-2])
+    steps = np.hypot(np.diff(points[..., 0]), np.diff(points[..., 1]))
+    way = np.zeros(points.shape[:-1])
+    np.cumsum(np.where(number[1:] < counts, np.minimum(steps, spacing), 0.0), axis=-1, out=way[..., 1:])
+    ticks = np.floor(way / np.maximum(spacing, way[..., -1:] / most))
+    keep: BoolArray = (number < counts) & (counts < 3)
+    keep[..., :1] = counts > 0
+    keep[..., 1:] |= ticks[..., 1:] > ticks[..., :-1]
+    return keep

@@ -85,8 +85,10 @@ class Search:
         bounds = self._levels.bounds(half, coarse_cells)  # (angles, blocks)
         bounds -= _penalties(self._turns, self._shifts, coarse_cells, self._resolution, prior_sigmas)
         self._bounds = bounds.ravel()
-        self._cells = coarse_cells
-        self._small = next(cells for cells in (2, 3, coarse_cells) if coarse_cells % cells == 0)
+        divisors = (2, 3, coarse_cells) if coarse_cells > LARGE_BLOCK else (coarse_cells,)
+        self._small = next(cells for cells in divisors if coarse_cells % cells == 0)
+        self._parts = _pairs(np.arange(0, coarse_cells, self._small))
+        self._inner = _pairs(np.arange(self._small))
 
     def best(self, *, away_from: tuple[Pose2, float] | None = None, floor: float = -math.inf) -> Found:
         """The pose of the window with the highest mean likelihood, less what the prior takes.
@@ -113,10 +115,10 @@ class Search:
             if opened.size == 0:
                 break
             angles, chosen = np.divmod(opened, len(self._shifts))
-            angles, corners, cells = self._split(angles, self._shifts[chosen], best)
+            angles, corners = self._split(angles, self._shifts[chosen], best)
             if corners.size == 0:
                 continue
-            fine = corners[:, None, :] + _pairs(np.arange(cells))  # (opened, cells of a block, 2)
+            fine = corners[:, None, :] + self._inner  # (opened, cells of a block, 2)
             scores = _opened_scores(self._values, self._flat[angles], fine)
             flat_fine = fine.reshape(-1, 2)
             turns = np.repeat(self._turns[angles], fine.shape[1])
@@ -132,7 +134,7 @@ class Search:
                 best_pose = Pose2(guess.x + float(dx), guess.y + float(dy), guess.theta + float(turns[k]))
         return Found(best_pose, best_score)
 
-    def _split(self, angles: IntArray, corners: IntArray, best: float) -> tuple[IntArray, IntArray, int]:
+    def _split(self, angles: IntArray, corners: IntArray, best: float) -> tuple[IntArray, IntArray]:
         """Large blocks cut into small ones, less those whose bound is not above ``best``.
 
         Args:
@@ -141,16 +143,16 @@ class Search:
             best: What a pose has to beat.
 
         Returns:
-            The same for the blocks that are left, and how many cells wide they are.
+            The same for the blocks that are left.
         """
-        if self._cells <= LARGE_BLOCK:
-            return angles, corners, self._cells
-        parts = corners[:, None, :] + _pairs(np.arange(0, self._cells, self._small))
+        if len(self._parts) == 1:
+            return angles, corners
+        parts = corners[:, None, :] + self._parts
         bounds = self._levels.bounds_of(angles, parts, self._small).ravel()
         angles, corners = np.repeat(angles, parts.shape[1]), parts.reshape(-1, 2)
         bounds -= _penalty(self._turns[angles], corners, self._small, self._resolution, self._sigmas)
         left = bounds > best
-        return angles[left], corners[left], self._small
+        return angles[left], corners[left]
 
 
 def search_heading(field: LikelihoodField, points: FloatArray, guess: Pose2, sigma: float, reach: float) -> Pose2:

@@ -9,7 +9,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.beams import Beams, clean_alike, directions
+from closedrooms.mapping.beams import Beams, clean_alike, directions, spaced
 from closedrooms.mapping.config import MapperConfig
 
 TOGETHER = 64
@@ -46,7 +46,7 @@ def _sensor(scan: LaserScan) -> tuple[object, ...]:
 
 def _thin_alike(scans: Sequence[LaserScan], config: MapperConfig) -> list[FloatArray]:
     """The hits of scans of one sensor, thinned, as ``thin(hit_points(...))`` does it; of shape (n, 2) each [m]."""
-    first, spacing = scans[0], config.matcher.point_spacing
+    first = scans[0]
     ranges = np.stack([scan.ranges for scan in scans])
     hits = (ranges >= first.range_min) & (ranges < min(config.max_range, first.range_max))
     # The hits of each scan, one beside the other from the left.
@@ -56,12 +56,5 @@ def _thin_alike(scans: Sequence[LaserScan], config: MapperConfig) -> list[FloatA
     points = units[order] * np.take_along_axis(np.where(hits, ranges, 0.0), order, axis=1)[:, :, None]
     if first.robot_T_sensor != (0.0, 0.0, 0.0):
         points = Pose2(*first.robot_T_sensor).transform(points)
-    steps = np.hypot(np.diff(points[:, :, 0], axis=1), np.diff(points[:, :, 1], axis=1))
-    number = np.arange(ranges.shape[1])
-    way = np.zeros(ranges.shape)
-    np.cumsum(np.where(number[1:] < counts, np.minimum(steps, spacing), 0.0), axis=1, out=way[:, 1:])
-    ticks = np.floor(way / np.maximum(spacing, way[:, -1:] / config.matcher.max_points))
-    keep = (number < counts) & (counts < 3)
-    keep[:, :1] = counts > 0
-    keep[:, 1:] |= ticks[:, 1:] > ticks[:, :-1]
+    keep = spaced(points, counts, config.matcher.point_spacing, config.matcher.max_points)
     return [seen[kept] for seen, kept in zip(points, keep, strict=True)]

@@ -7,9 +7,9 @@ import shapely
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
+from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid, is_free, is_occupied
 from closedrooms.predictor.prediction import Shape
-from closedrooms.predictor.window import MAX_CELLS, is_free, is_occupied
+from closedrooms.predictor.window import MAX_CELLS
 
 
 def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Shape]) -> OccupancyGrid:

@@ -8,8 +8,7 @@ import shapely
 from shapely.geometry import LineString, Polygon
 
 from closedrooms.core.arrays import FloatArray, IntArray
-from closedrooms.core.grid import UNKNOWN, OccupancyGrid
-from closedrooms.predictor.window import is_free, is_occupied
+from closedrooms.core.grid import UNKNOWN, OccupancyGrid, is_free, is_occupied
 
 # Thicker than this is no interior wall but something built in [m].
 MAX_WALL = 0.60

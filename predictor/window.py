@@ -1,12 +1,10 @@
 """The part of a map that is known, at the resolution that the predictor works at."""
 
-import math
-
 import numpy as np
 
-from closedrooms.core.arrays import BoolArray, CellArray, FloatArray
+from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.grid import FREE, FREE_BELOW, OCCUPIED, OCCUPIED_ABOVE, UNKNOWN, GridFrame, OccupancyGrid
+from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 
 # What of an interpolated cell must be occupied to stay so: below a half, as slanted walls one cell thick touch at
 # corners only.
@@ -15,16 +13,6 @@ STAYS = 0.4
 MAX_CELLS = 100_000_000
 # Width of the Gaussian that evens out staircases [coarse cells].
 SMOOTH = 0.5
-
-
-def is_free(values: CellArray) -> BoolArray:
-    """Which of some cells are free: the grid's rule where only few of its cells are asked for."""
-    return np.less(values.view(np.uint8), math.ceil(FREE_BELOW))
-
-
-def is_occupied(values: CellArray) -> BoolArray:
-    """Which of some cells are occupied."""
-    return np.asarray(values > OCCUPIED_ABOVE)
 
 
 def known_window(grid: OccupancyGrid, *, margin: int = 8) -> OccupancyGrid | None:
