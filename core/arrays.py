@@ -11,6 +11,16 @@ BoolArray: TypeAlias = npt.NDArray[np.bool_]
 CellArray: TypeAlias = npt.NDArray[np.int8]
 
 
+def handed_over(cells: CellArray) -> CellArray:
+    """The cells themselves, read-only: :func:`frozen` then takes them as they are, and no copy of a large map is made.
+
+    Args:
+        cells: That nobody else holds.
+    """
+    cells.flags.writeable = False
+    return cells
+
+
 def frozen(values: npt.ArrayLike, dtype: npt.DTypeLike = np.float64) -> npt.NDArray[Any]:
     """A read-only, C-contiguous array of ``dtype``; copies only when the input is writable or of another type."""
     array = np.asarray(values, dtype=dtype, order="C")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from closedrooms.core.arrays import BoolArray, CellArray, FloatArray, IntArray, frozen
+from closedrooms.core.arrays import BoolArray, CellArray, FloatArray, IntArray, frozen, handed_over
 from closedrooms.core.errors import InvalidInputError
 
 UNKNOWN, FREE, OCCUPIED = -1, 0, 100
@@ -144,12 +144,14 @@ class OccupancyGrid:
     @property
     def unknown(self) -> BoolArray:
         """Cells neither free nor occupied, shape (rows, cols)."""
-        return ~(self.free | self.occupied)
+        known = self.known
+        return np.logical_not(known, out=known)
 
     @property
     def known(self) -> BoolArray:
         """Cells free or occupied, shape (rows, cols)."""
-        return self.free | self.occupied
+        free = self.free
+        return np.logical_or(free, self.occupied, out=free)
 
     def known_bounds(self) -> tuple[int, int, int, int] | None:
         """Window ``(row, col, rows, cols)`` of the known cells, ``None`` when all is unknown."""
@@ -165,6 +167,10 @@ class OccupancyGrid:
         Raises:
             InvalidInputError: ``frame`` has another resolution or is not shifted by whole cells.
         """
+        return self if frame == self.frame else OccupancyGrid(frame, handed_over(self.cells_on(frame)))
+
+    def cells_on(self, frame: GridFrame) -> CellArray:
+        """A copy to draw in of the cells that :meth:`on` gives, int8, shape ``frame.shape``."""
         shift = np.array([self.frame.origin_x - frame.origin_x, self.frame.origin_y - frame.origin_y])
         cells_shift = shift / frame.resolution
         if (
@@ -178,4 +184,4 @@ class OccupancyGrid:
         r1, c1 = min(row + self.frame.rows, frame.rows), min(col + self.frame.cols, frame.cols)
         if r1 > r0 and c1 > c0:
             cells[r0:r1, c0:c1] = self.cells[r0 - row : r1 - row, c0 - col : c1 - col]
-        return OccupancyGrid(frame, cells)
+        return cells

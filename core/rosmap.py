@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import yaml
 
-from closedrooms.core.arrays import BoolArray
+from closedrooms.core.arrays import BoolArray, CellArray, handed_over
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import read_text, write_bytes
-from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
+from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid, is_free, is_occupied
 
 # 205 is p = 0.196078: a free_thresh of 0.196 keeps it unknown, 0.25 would reload it as free.
 FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
@@ -30,11 +30,12 @@ def write_map(stem: Path, grid: OccupancyGrid) -> None:
     """
     import cv2
 
-    pixels = np.full(grid.frame.shape, PIXEL_UNKNOWN, dtype=np.uint8)
-    pixels[grid.free] = PIXEL_FREE
-    pixels[grid.occupied] = PIXEL_OCCUPIED
+    values = np.arange(256).astype(np.uint8).view(np.int8)  # every cell value, at its place as a byte without sign
+    shades = np.full(256, PIXEL_UNKNOWN, dtype=np.uint8)
+    shades[is_free(values)] = PIXEL_FREE
+    shades[is_occupied(values)] = PIXEL_OCCUPIED
     picture = stem.with_name(stem.name + ".png")
-    write_bytes(picture, cv2.imencode(".png", pixels[::-1])[1].tobytes())
+    write_bytes(picture, cv2.imencode(".png", shades[grid.cells[::-1].view(np.uint8)])[1].tobytes())
     frame = grid.frame
     text = (
         f"image: {picture.name}\n"
@@ -77,19 +78,22 @@ def read_map(path: Path) -> OccupancyGrid:
         raise InvalidInputError(f"map mode {mode!r}", expected="trinary, scale or raw", where=path)
     pixels, opaque = _read_picture(_picture_path(fields, path))
     if mode == "raw":
-        cells = np.where(pixels <= 100, pixels, 255).astype(np.int16)
-        cells[cells == 255] = UNKNOWN
+        levels = np.arange(256)
+        table = np.where(levels <= 100, levels, UNKNOWN).astype(np.int8)
     else:
-        cells = _interpret(pixels, fields, mode, path)
-    cells[~opaque] = UNKNOWN
+        table = _meanings(fields, mode, path)
+    cells: CellArray = table[pixels[::-1]]
+    if opaque is not None:
+        cells[~opaque[::-1]] = UNKNOWN
     try:
         frame = GridFrame(resolution, float(origin[0]), float(origin[1]), *pixels.shape)
     except InvalidInputError as error:
         raise InvalidInputError(str(error), where=path) from error
-    return OccupancyGrid(frame, cells[::-1].astype(np.int8))
+    return OccupancyGrid(frame, handed_over(cells))
 
 
-def _interpret(pixels: np.ndarray[Any, np.dtype[np.uint8]], fields: dict[str, Any], mode: str, path: Path) -> Any:
+def _meanings(fields: dict[str, Any], mode: str, path: Path) -> CellArray:
+    """The cell that each grey value stands for, shape (256,)."""
     negate = fields.get("negate", 0)
     if negate not in (0, 1, "0", "1"):  # True and False are 1 and 0
         raise InvalidInputError(f"map negate {_short(repr(negate))}", expected="0 or 1", where=path)
@@ -104,16 +108,16 @@ def _interpret(pixels: np.ndarray[Any, np.dtype[np.uint8]], fields: dict[str, An
         )
     levels = np.arange(256)
     p = (levels if negate else 255 - levels) / 255.0
-    table = np.full(256, UNKNOWN, dtype=np.int16)
+    table = np.full(256, UNKNOWN, dtype=np.int8)
     if mode == "scale":
         between = (p - free_below) / (occupied_above - free_below) * 98.0 + 1.0
-        table = np.clip(np.rint(between), 1, 99).astype(np.int16)
+        table = np.clip(np.rint(between), 1, 99).astype(np.int8)
     table[p > occupied_above] = OCCUPIED
     table[p < free_below] = FREE
     if mode == "trinary" and not negate:
         # Others write 204 or 206 for unknown, or a free_thresh (0.25) that turns 205 into free.
         table[PIXEL_UNKNOWN - 1 : PIXEL_UNKNOWN + 2] = UNKNOWN
-    return table[pixels]
+    return table
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:
@@ -168,8 +172,8 @@ def _short(text: str, *, longest: int = 80) -> str:
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
-def _read_picture(path: Path) -> tuple[np.ndarray[Any, np.dtype[np.uint8]], BoolArray]:
-    """Grey values and the mask of opaque pixels, of a picture whose size is checked before it is decoded."""
+def _read_picture(path: Path) -> tuple[np.ndarray[Any, np.dtype[np.uint8]], BoolArray | None]:
+    """Grey values and, where some may be transparent, which pixels are not; the size is checked before decoding."""
     from PIL import Image
 
     Image.MAX_IMAGE_PIXELS = None
@@ -184,8 +188,9 @@ def _read_picture(path: Path) -> tuple[np.ndarray[Any, np.dtype[np.uint8]], Bool
             if has_alpha:
                 rgba = np.asarray(image.convert("RGBA"))
                 return np.asarray(image.convert("L")), rgba[..., 3] > 0
-            grey = np.asarray(image.convert("L")) if image.mode not in {"I", "I;16"} else _sixteen_bits(image)
-            return grey, np.ones(grey.shape, dtype=np.bool_)
+            if image.mode in {"I", "I;16"}:
+                return _sixteen_bits(image), None
+            return np.asarray(image if image.mode == "L" else image.convert("L")), None
     except InvalidInputError:
         raise
     except (OSError, ValueError, SyntaxError, EOFError) as error:

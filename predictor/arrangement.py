@@ -1,16 +1,19 @@
 """Faces between lines: the planar arrangement, exactly (paper, section 3.1)."""
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.predictor.lines import Line
 
+# An array of shapely geometries.
+Geometries = npt.NDArray[Any]
 # Slanted lines that meet nearly in a point leave slivers; smaller faces and shorter edges mean nothing [m2, m].
 MIN_FACE, MIN_EDGE = 1e-6, 1e-4
 # Corners closer than this are one where a union comes out wrong [m].
@@ -64,7 +67,7 @@ def arrange(lines: Sequence[Line], boundary: Sequence[Line]) -> Arrangement:
     pieces = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
     middles = shapely.get_coordinates(shapely.centroid(pieces))
     kept = shapely.contains_xy(box, middles[:, 0], middles[:, 1]) & (shapely.area(pieces) > MIN_FACE)
-    faces = _ordered([shapely.geometry.polygon.orient(p) for p in pieces[kept]])
+    faces = _ordered(shapely.orient_polygons(pieces[kept]))
     return _connect((*lines, *boundary), faces, box)
 
 
@@ -96,31 +99,47 @@ def _string(line: Line, centre: FloatArray, reach: float) -> LineString:
     return LineString((foot - reach * line.along, foot + reach * line.along))
 
 
-def _ordered(faces: list[Polygon]) -> tuple[Polygon, ...]:
+def _ordered(faces: Geometries) -> tuple[Polygon, ...]:
     """Faces in an order that depends on where they are only."""
-    return tuple(sorted(faces, key=lambda face: tuple(np.round(face.centroid.coords[0], 6))))
+    x, y = np.round(shapely.get_coordinates(shapely.centroid(faces)), 6).T
+    return tuple(faces[np.lexsort((y, x))])
 
 
 def _connect(lines: tuple[Line, ...], faces: tuple[Polygon, ...], box: Polygon) -> Arrangement:
-    """Adjacency from a dictionary of edges: noding gives both faces of an edge the same two points."""
-    sides: dict[tuple[tuple[float, ...], tuple[float, ...]], list[int]] = {}
-    for number, face in enumerate(faces):
-        ring = [tuple(point) for point in shapely.get_coordinates(face.exterior)]
-        for start, end in itertools.pairwise(ring):
-            sides.setdefault((min(start, end), max(start, end)), []).append(number)
-    kept = [(ends, owners) for ends, owners in sorted(sides.items()) if np.hypot(*np.subtract(*ends)) > MIN_EDGE]
-    edges = np.array([ends for ends, _ in kept], dtype=np.float64).reshape(-1, 2, 2)
-    edge_faces = np.array([([*owners, -1])[:2] for _, owners in kept], dtype=np.int64).reshape(-1, 2)
-    border = np.zeros(len(faces), dtype=np.bool_)
-    boundary = (edge_faces[:, 1] < 0) & (
-        shapely.distance(shapely.points(edges.mean(axis=1)), box.exterior) < 10 * MIN_EDGE
-    )
+    """Adjacency from equal edges: noding gives both faces of an edge the same two points."""
+    edges, edge_faces = _edges(faces)
+    edge_lengths = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
+    kept = edge_lengths > MIN_EDGE
+    edges, edge_faces, edge_lengths = edges[kept], edge_faces[kept], edge_lengths[kept]
+    outer = np.flatnonzero(edge_faces[:, 1] < 0)
+    away = shapely.distance(shapely.points(edges[outer].mean(axis=1)), box.exterior)
+    boundary, border = np.zeros(len(edges), dtype=np.bool_), np.zeros(len(faces), dtype=np.bool_)
+    boundary[outer[away < 10 * MIN_EDGE]] = True
     border[edge_faces[boundary, 0]] = True
     neighbours: tuple[dict[int, int], ...] = tuple({} for _ in faces)
     for edge, (a, b) in enumerate(edge_faces.tolist()):
         if b >= 0:
             neighbours[a][b] = edge
             neighbours[b][a] = edge
-    areas = np.array([face.area for face in faces])
-    edge_lengths = np.hypot(*(edges[:, 1] - edges[:, 0]).T) if len(edges) else np.zeros(0)
+    areas = shapely.area(np.array(faces, dtype=object))
     return Arrangement(lines, faces, areas, edges, edge_faces, edge_lengths, boundary, border, neighbours)
+
+
+def _edges(faces: tuple[Polygon, ...]) -> tuple[FloatArray, IntArray]:
+    """Ends of every edge, the smaller first, in their order, shape (m, 2, 2), and its faces or -1, shape (m, 2)."""
+    outlines = shapely.get_exterior_ring(np.array(faces, dtype=object))
+    points, face = shapely.get_coordinates(outlines, return_index=True)
+    same = face[1:] == face[:-1]
+    start, end, face = points[:-1][same], points[1:][same], face[1:][same]
+    swapped = (start[:, 0] > end[:, 0]) | ((start[:, 0] == end[:, 0]) & (start[:, 1] > end[:, 1]))
+    sides = np.where(swapped[:, None], np.hstack((end, start)), np.hstack((start, end)))
+    order = np.lexsort((*sides.T[::-1],))
+    sides, face = sides[order], face[order]
+    differs = np.ones(len(sides), dtype=np.bool_)
+    differs[1:] = (sides[1:] != sides[:-1]).any(axis=1)
+    first = np.flatnonzero(differs)
+    owners = np.full((len(first), 2), -1, dtype=np.int64)
+    owners[:, 0] = face[first]
+    shared = np.diff(np.append(first, len(face))) > 1
+    owners[shared, 1] = face[first[shared] + 1]
+    return sides[first].reshape(-1, 2, 2), owners

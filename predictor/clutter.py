@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from closedrooms.core.arrays import handed_over
 from closedrooms.core.door import Point
 from closedrooms.core.grid import FREE, OccupancyGrid
 from closedrooms.predictor.rose import find_rose
@@ -59,7 +60,7 @@ def free_islands(grid: OccupancyGrid, area: float, doors: Sequence[Point], reach
 
     if area <= 0.0:
         return grid
-    _, pieces, figures, _ = cv2.connectedComponentsWithStats((~grid.free).astype(np.uint8), connectivity=8)
+    _, pieces, figures, _ = cv2.connectedComponentsWithStats((~grid.free).view(np.uint8), connectivity=8)
     cells = figures[:, cv2.CC_STAT_AREA] * grid.frame.resolution**2
     edge = np.concatenate((pieces[0], pieces[-1], pieces[:, 0], pieces[:, -1]))
     gone = np.zeros(len(figures), dtype=np.bool_)
@@ -71,4 +72,6 @@ def free_islands(grid: OccupancyGrid, area: float, doors: Sequence[Point], reach
         gone[piece] = sides.min() >= THIN and cells[piece] >= FILLED * sides.prod() and all(away)
     if not gone.any():
         return grid
-    return OccupancyGrid(grid.frame, np.where(gone[pieces], np.int8(FREE), grid.cells))
+    cleared = grid.cells.copy()
+    cleared[gone[pieces]] = FREE
+    return OccupancyGrid(grid.frame, handed_over(cleared))

@@ -1,15 +1,24 @@
 """Directions of edges in a map, and whether they are those of walls or of noise."""
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from closedrooms.core.arrays import FloatArray, IntArray
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.grid import OccupancyGrid, is_free, is_occupied
+
+Picture = npt.NDArray[np.float32]
 
 QUARTER = math.pi / 2
 # Blur before a gradient is taken [cells]: a wall's staircase on the raster vanishes.
 BLUR = 2.5
+# Rows that the blur of a row asks for on either side: OpenCV cuts the kernel at four times its width.
+HALO = 11
+# Cells drawn at once: 16 MB a picture.
+STRIP = 4_000_000
 # An edge rises at least this many times as steeply as the steepest.
 STEEP = 0.3
 # Occupied cells that hang together are no speck from this many on: half a metre of wall in cells of 0.05 m.
@@ -31,19 +40,74 @@ def shows_walls(grid: OccupancyGrid) -> bool:
     """
     import cv2
 
-    _, pieces, figures, _ = cv2.connectedComponentsWithStats(grid.occupied.astype(np.uint8), connectivity=8)
-    wall = figures[:, cv2.CC_STAT_AREA] >= PIECE
-    wall[0] = False
-    occupied = cv2.GaussianBlur(wall[pieces].astype(np.float32), (0, 0), BLUR)
-    known = cv2.GaussianBlur(grid.known.astype(np.float32), (0, 0), BLUR)
-    share = occupied / np.maximum(known, np.float32(1e-3))
-    gx, gy = cv2.Sobel(share, cv2.CV_32F, 1, 0), cv2.Sobel(share, cv2.CV_32F, 0, 1)
-    slope = np.hypot(gx, gy) * grid.free
-    edge = slope > STEEP * float(slope.max(initial=0.0))
-    if not edge.any():
+    _, pieces, figures, _ = cv2.connectedComponentsWithStats(grid.occupied.view(np.uint8), connectivity=8)
+    large = figures[:, cv2.CC_STAT_AREA] >= PIECE
+    large[0] = False
+    walls = large[pieces]
+    del pieces
+
+    def share(rows: slice) -> Picture:
+        occupied = cv2.GaussianBlur(walls[rows].astype(np.float32), (0, 0), BLUR)
+        cells = grid.cells[rows]
+        known = cv2.GaussianBlur((is_free(cells) | is_occupied(cells)).astype(np.float32), (0, 0), BLUR)
+        return np.asarray(occupied / np.maximum(known, np.float32(1e-3)))
+
+    edges = find_edges(grid, share, among_free=True)
+    if not edges.angles.size:
         return False
-    votes = votes_by_degree(wrapped(np.arctan2(gy[edge], gx[edge]).astype(np.float64)))
-    return float(votes.max() / votes.mean() - 1.0) * math.sqrt(np.count_nonzero(edge)) >= LEAST
+    votes = votes_by_degree(wrapped(edges.angles))
+    return float(votes.max() / votes.mean() - 1.0) * math.sqrt(edges.angles.size) >= LEAST
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edges:
+    """Free cells where a picture of the map rises steeply.
+
+    Attributes:
+        cells: Their places in the flattened map, ascending, shape (n,).
+        angles: Which way up [rad], shape (n,).
+    """
+
+    cells: IntArray
+    angles: FloatArray
+
+
+def find_edges(
+    grid: OccupancyGrid, picture: Callable[[slice], Picture], *, among_free: bool, strip: int = STRIP
+) -> Edges:
+    """Free cells where a picture rises at least :data:`STEEP` times as steeply as anywhere.
+
+    Some rows are drawn at a time: a large map in numbers of four bytes, several times over, fills the memory.
+
+    Args:
+        grid: The map.
+        picture: Of some of its rows, blurred by :data:`BLUR`.
+        among_free: The steepest place is looked for among free cells only.
+        strip: Cells drawn at once.
+    """
+    import cv2
+
+    rows, cols = grid.frame.shape
+    step = max(strip // cols, 1)
+    steepest, found = 0.0, []
+    for first in range(0, rows, step):
+        last = min(first + step, rows)
+        # One row more for the gradient on either side, and what the blur of that one asks for.
+        low, high = max(first - 1, 0), min(last + 1, rows)
+        wide = slice(max(low - HALO, 0), min(high + HALO, rows))
+        drawn = np.ascontiguousarray(picture(wide)[low - wide.start : high - wide.start])
+        own = slice(first - low, last - low)
+        gx, gy = (cv2.Sobel(drawn, cv2.CV_32F, dx, 1 - dx)[own] for dx in (1, 0))
+        free = is_free(grid.cells[first:last])
+        slope = np.hypot(gx, gy)
+        if among_free:
+            slope *= free
+        steepest = max(steepest, float(slope.max(initial=0.0)))
+        at = np.flatnonzero((slope > STEEP * steepest) & free)
+        found.append((at + first * cols, slope.ravel()[at], gx.ravel()[at], gy.ravel()[at]))
+    cells, slopes, across, up = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    steep = slopes > STEEP * steepest
+    return Edges(cells[steep], np.arctan2(up[steep], across[steep]).astype(np.float64))
 
 
 def votes_by_degree(angles: FloatArray) -> IntArray:

@@ -5,11 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.arrays import BoolArray, FloatArray, handed_over
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid, is_free, is_occupied
 from closedrooms.predictor.prediction import Shape
 from closedrooms.predictor.window import MAX_CELLS
+
+# Rows of cells drawn at once.
+STRIP = 512
 
 
 def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Shape]) -> OccupancyGrid:
@@ -36,7 +39,7 @@ def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Sha
             expected=f"at most {MAX_CELLS} cells; is the map's resolution in metres?",
         )
     frame = grid.frame.covering(x0 - 2 * resolution, y0 - 2 * resolution, x1 + 2 * resolution, y1 + 2 * resolution)
-    cells = grid.on(frame).cells.copy()
+    cells = grid.cells_on(frame)
     inside = np.zeros(frame.shape, dtype=np.bool_)
     ring = np.zeros(frame.shape, dtype=np.bool_)
     for shape in shapes:
@@ -46,14 +49,15 @@ def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Sha
     for passage in passages:
         fill_shape(passage, frame, cleared)
     # Where nothing is drawn nothing is asked: maps are large and rooms small.
-    (r0, c0), (r1, c1) = np.maximum(frame.to_cells(np.array([[x0, y0], [x1, y1]])), 0)
-    drawn = slice(r0, r1 + 1), slice(c0, c1 + 1)
-    part = cells[drawn]
-    unknown = ~(is_free(part) | is_occupied(part))
-    part[unknown & inside[drawn] & ~ring[drawn]] = FREE
-    part[unknown & ring[drawn]] = OCCUPIED
-    part[cleared[drawn]] = FREE
-    return OccupancyGrid(frame, cells)
+    (r0, c0), (r1, c1) = np.maximum(frame.to_cells(np.array([[x0, y0], [x1, y1]])), 0).tolist()
+    for row in range(r0, r1 + 1, STRIP):
+        drawn = slice(row, min(row + STRIP, r1 + 1)), slice(c0, c1 + 1)
+        part = cells[drawn]
+        unknown = ~(is_free(part) | is_occupied(part))
+        part[unknown & inside[drawn] & ~ring[drawn]] = FREE
+        part[unknown & ring[drawn]] = OCCUPIED
+        part[cleared[drawn]] = FREE
+    return OccupancyGrid(frame, handed_over(cells))
 
 
 def fill_shape(shape: Shape, frame: GridFrame, mask: BoolArray) -> None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import shapely
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.config import StructureConfig
@@ -75,14 +76,19 @@ def find_lines(
 
 def _chain(ends: FloatArray, reach: float) -> IntArray:
     """Connected components of segments closer than ``reach``, shape (k,); ends are (along, across), shape (k, 2, 2)."""
-    from scipy.sparse import csr_array
+    from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     low, high = ends[..., 0].min(axis=1), ends[..., 0].max(axis=1)
     across = ends[..., 1].mean(axis=1)
-    gap = np.maximum(np.maximum(low[:, None] - high[None, :], low[None, :] - high[:, None]), 0.0)
-    near = np.hypot(gap, across[:, None] - across[None, :]) <= reach
-    return np.asarray(connected_components(csr_array(near), directed=False)[1], dtype=np.int64)
+    # What a tree finds, a little further than need be, is measured: a table of all pairs fills the memory.
+    tree = shapely.STRtree(shapely.box(low, across, high, across))
+    further = reach + 1e-6
+    i, j = tree.query(shapely.box(low - further, across - further, high + further, across + further))
+    gap = np.maximum(np.maximum(low[i] - high[j], low[j] - high[i]), 0.0)
+    near = np.hypot(gap, across[i] - across[j]) <= reach
+    graph = coo_array((np.ones(np.count_nonzero(near), dtype=np.bool_), (i[near], j[near])), shape=(len(ends),) * 2)
+    return np.asarray(connected_components(graph.tocsr(), directed=False)[1], dtype=np.int64)
 
 
 def _covered(ends: FloatArray) -> float:
@@ -98,42 +104,44 @@ def _merge(ends: FloatArray, walls: IntArray, reach: float) -> list[tuple[float,
     """Offset and members of each line: the two closest lines join until all are ``reach`` apart."""
     across = ends[..., 1].mean(axis=1)
     length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
-    found = [np.flatnonzero(walls == wall) for wall in np.unique(walls)]
+    order = np.argsort(walls, kind="stable")
+    found = np.split(order, np.flatnonzero(np.diff(walls[order])) + 1)
     groups = sorted(((_median(across[members], length[members]), members) for members in found), key=lambda g: g[0])
-    while len(groups) > 1:
-        gaps = np.diff([offset for offset, _ in groups])
+    members = [own for _, own in groups]
+    offsets = np.array([offset for offset, _ in groups])
+    wall = np.array([length[own].sum() for own in members])
+    while len(members) > 1:
+        gaps = np.diff(offsets)
         if gaps.min() >= reach:
             break
-        chains = _join_closest([members for _, members in groups], gaps, length)
-        groups = [
-            groups[chain[0]] if len(chain) == 1 else _joined([groups[i][1] for i in chain], across, length)
-            for chain in chains
-        ]
-    return groups
+        # From the last on, so that the places of the others stay.
+        for first, last in reversed(_join_closest(wall, gaps)):
+            whole = np.concatenate(members[first : last + 1])
+            members[first : last + 1] = [whole]
+            offsets[first], wall[first] = _median(across[whole], length[whole]), length[whole].sum()
+            gone = slice(first + 1, last + 1)
+            offsets, wall = np.delete(offsets, gone), np.delete(wall, gone)
+    return list(zip(offsets.tolist(), members, strict=True))
 
 
-def _joined(parts: list[IntArray], across: FloatArray, length: FloatArray) -> tuple[float, IntArray]:
-    members = np.concatenate(parts)
-    return _median(across[members], length[members]), members
-
-
-def _join_closest(groups: list[IntArray], gaps: FloatArray, length: FloatArray) -> list[list[int]]:
+def _join_closest(wall: FloatArray, gaps: FloatArray) -> list[tuple[int, int]]:
     """Which neighbours to join: the closest two; of equally close ones those with most wall, all where that is equal.
 
     Offsets lie on the lattice of the cells, so that equal gaps are common: taking the first would depend on the side
     one comes from.
+
+    Args:
+        wall: Length of wall of each line [m], shape (k,).
+        gaps: From each line to the next [m], shape (k - 1,).
+
+    Returns:
+        First and last line of each run to join, in their order.
     """
-    closest = gaps <= gaps.min() + 1e-9
-    walls = np.array([length[members].sum() for members in groups])
-    pairs = walls[:-1] + walls[1:]
-    joined = closest & (pairs >= pairs[closest].max() - 1e-9)
-    chains = [[0]]
-    for number, join in enumerate(joined.tolist(), start=1):
-        if join:
-            chains[-1].append(number)
-        else:
-            chains.append([number])
-    return chains
+    closest = np.flatnonzero(gaps <= gaps.min() + 1e-9)
+    pairs = wall[closest] + wall[closest + 1]
+    joined = closest[pairs >= pairs.max() - 1e-9]
+    runs = np.split(joined, np.flatnonzero(np.diff(joined) > 1) + 1)
+    return [(int(run[0]), int(run[-1]) + 1) for run in runs]
 
 
 def _median(values: FloatArray, weights: FloatArray) -> float:

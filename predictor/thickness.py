@@ -58,9 +58,12 @@ def measure_thickness(grid: OccupancyGrid, directions: FloatArray) -> float:
 def _runs(grid: OccupancyGrid, starts: IntArray, angle: float, longest: int, clear: int) -> FloatArray:
     """Lengths [cells] of the walls across a direction whose first occupied cell is one of ``starts``, shape (k,)."""
     normal = np.array([np.cos(angle), -np.sin(angle)])  # (row, col) of one cell across the wall
-    steps = np.arange(-clear, longest + clear + 1)
+    steps, last = np.arange(-clear, longest + clear + 1), np.array(grid.frame.shape) - 1
+    # Nine in ten have no free cell right before them.
+    before = np.clip(np.rint(starts - normal).astype(np.int64), 0, last)
+    starts = starts[is_free(grid.cells[before[:, 0], before[:, 1]])]
     cells = np.rint(starts[:, None, :] + steps[None, :, None] * normal).astype(np.int64)  # (k, steps, 2)
-    cells = np.clip(cells, 0, np.array(grid.frame.shape) - 1)
+    cells = np.clip(cells, 0, last)
     values = grid.cells[cells[..., 0], cells[..., 1]]
     free, occupied = is_free(values), is_occupied(values)
     before, behind = free[:, :clear].all(axis=1), free[:, clear:]

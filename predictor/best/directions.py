@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from closedrooms.core.arrays import FloatArray
+from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.grid import OccupancyGrid
-from closedrooms.predictor.edges import BLUR, QUARTER, STEEP, votes_by_degree, wrapped
+from closedrooms.core.grid import GridFrame, OccupancyGrid, is_free
+from closedrooms.predictor.edges import BLUR, QUARTER, Picture, find_edges, votes_by_degree, wrapped
 
 # A second direction needs this share of the strongest one's walls: less is furniture or noise.
 MIN_SHARE = 0.12
@@ -25,12 +25,14 @@ class WallDirections:
 
     Attributes:
         angles: In (-pi/4, pi/4] [rad], strongest first, shape (k,).
-        points: Cells on edges of free space in the map frame [m], shape (n, 2).
-        edge_angles: Direction of the edge at each point modulo a right angle [rad], shape (n,).
+        frame: Of the map.
+        cells: On edges of free space, places in the flattened map, ascending, shape (n,).
+        edge_angles: Direction of the edge at each cell modulo a right angle [rad], shape (n,).
     """
 
     angles: FloatArray
-    points: FloatArray
+    frame: GridFrame
+    cells: IntArray
     edge_angles: FloatArray
 
     def at(self, door: ClosedDoor, *, reach: float = 2.0) -> float:
@@ -43,10 +45,16 @@ class WallDirections:
         if door.segment is not None:
             (x0, y0), (x1, y1) = door.segment
             return self._snapped(float(wrapped(math.atan2(y1 - y0, x1 - x0))))
-        near = np.hypot(*(self.points - np.array(door.midpoint)).T) <= reach
+        # Of rows within reach only.
+        row = (door.midpoint[1] - self.frame.origin_y) / self.frame.resolution
+        rows = reach / self.frame.resolution + 1.0
+        low, high = (math.floor(row - rows) * self.frame.cols, math.ceil(row + rows) * self.frame.cols)
+        within = slice(*np.searchsorted(self.cells, (low, high)).tolist())
+        points = self.frame.to_points(np.stack(np.divmod(self.cells[within], self.frame.cols), axis=-1))
+        near = np.hypot(*(points - np.array(door.midpoint)).T) <= reach
         if not near.any():
             return float(self.angles[0])
-        votes = [(np.abs(wrapped(self.edge_angles[near] - a)) < APART).sum() for a in self.angles]
+        votes = [(np.abs(wrapped(self.edge_angles[within][near] - a)) < APART).sum() for a in self.angles]
         # The strongest direction wins unless another one is clearly seen around the door.
         scores = np.array(votes, dtype=float)
         scores[0] *= 1.5
@@ -67,13 +75,14 @@ def find_wall_directions(grid: OccupancyGrid) -> WallDirections | None:
         Directions, strongest first; ``None`` with fewer than 20 occupied cells or no edge.
     """
     occupied = np.argwhere(grid.occupied)
-    image = cv2.GaussianBlur(grid.free.astype(np.float32), (0, 0), BLUR)
-    gx, gy = cv2.Sobel(image, cv2.CV_32F, 1, 0), cv2.Sobel(image, cv2.CV_32F, 0, 1)
-    edge = (np.hypot(gx, gy) > STEEP * float(np.hypot(gx, gy).max(initial=0.0))) & grid.free
-    cells = np.argwhere(edge)
-    if len(occupied) < 20 or len(cells) == 0:
+
+    def space(rows: slice) -> Picture:
+        return np.asarray(cv2.GaussianBlur(is_free(grid.cells[rows]).astype(np.float32), (0, 0), BLUR))
+
+    edges = find_edges(grid, space, among_free=False)
+    if len(occupied) < 20 or not edges.cells.size:
         return None
-    angles = wrapped(np.arctan2(gy[edge], gx[edge]).astype(np.float64))
+    angles = wrapped(edges.angles)
     smooth = votes_by_degree(angles)
     peaks: list[float] = []
     for index in sorted(range(90), key=lambda i: (-smooth[i], i)):
@@ -85,7 +94,7 @@ def find_wall_directions(grid: OccupancyGrid) -> WallDirections | None:
             peaks.append(float(wrapped(angle + float(wrapped(angles[near] - angle).mean()))))
     points = grid.frame.to_points(occupied)
     refined = [_sharpest(points, peak) for peak in peaks]
-    return WallDirections(np.array(refined), grid.frame.to_points(cells), angles)
+    return WallDirections(np.array(refined), grid.frame, edges.cells, angles)
 
 
 def _sharpest(points: FloatArray, angle: float, *, window: float = math.radians(1.5), steps: int = 31) -> float:
