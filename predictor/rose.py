@@ -1,8 +1,10 @@
 """Dominant directions and structural cells from the spectrum of a map (ROSE; paper, section 4.2)."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import OccupancyGrid
@@ -10,6 +12,7 @@ from closedrooms.predictor.config import StructureConfig
 from closedrooms.predictor.directions import Directions, angle_between
 from closedrooms.predictor.segments import angles_of, lengths_of
 
+Spectrum = npt.NDArray[np.complex64]
 # As published: a peak's prominence in the range of the profile; how far from pi apart a pair of opposite peaks may
 # be [rad]; half width of the spectral band [bins]; the share of the largest response that makes a cell structural.
 PROMINENCE, PAIR_TOLERANCE, BAND, STRUCTURAL = 0.2, 0.1, 2.5, 0.18
@@ -51,31 +54,49 @@ def find_rose(grid: OccupancyGrid) -> RoseStructure | None:
     size += size % 2
     padded = np.zeros((size, size), dtype=np.float32)
     padded[: occupied.shape[0], : occupied.shape[1]] = occupied
-    spectrum = fft.fftshift(fft.fft2(padded))
-    normals = _dominant(np.abs(spectrum))
+    spectrum = fft.fft2(padded)
+    del padded
+    normals = _dominant(spectrum)
     if normals.size < 2:
         return None
-    frequencies = np.arange(size) - size // 2
-    band = np.zeros((size, size), dtype=np.bool_)
-    for normal in normals:  # distance of (fy, fx) from the line through the centre along the normal
-        distance = np.cos(normal) * frequencies[:, None] - np.sin(normal) * frequencies[None, :]
-        band |= np.abs(distance) <= BAND
-    kept = np.abs(fft.ifft2(fft.ifftshift(np.where(band, spectrum, 0.0))))
-    response = kept[: occupied.shape[0], : occupied.shape[1]] * occupied
-    structural = occupied & (response >= STRUCTURAL * response.max())
+    _keep_bands(spectrum, normals)
+    kept = fft.ifft2(spectrum, overwrite_x=True)
+    del spectrum
+    response = np.abs(kept[: occupied.shape[0], : occupied.shape[1]][occupied])
+    structural = occupied.copy()
+    structural[occupied] = response >= STRUCTURAL * response.max(initial=0.0)
     return RoseStructure((normals + np.pi / 2) % np.pi, structural)
 
 
-def _dominant(magnitude: FloatArray) -> FloatArray:
+def _keep_bands(spectrum: Spectrum, normals: FloatArray) -> None:
+    """Clear a spectrum but for a narrow band around the lines through its origin along some normals."""
+    size = spectrum.shape[0]
+    frequencies = np.roll(np.arange(size) - size // 2, -(size // 2))
+    for row, frequency in enumerate(frequencies):
+        outside = np.ones(size, dtype=np.bool_)
+        for normal in normals:  # distance of (fy, fx) from the line
+            outside &= np.abs(np.cos(normal) * frequency - np.sin(normal) * frequencies) > BAND
+        spectrum[row, outside] = 0.0
+
+
+def _centred(spectrum: Spectrum) -> npt.NDArray[np.float32]:
+    """The magnitude, frequency 0 in the middle."""
+    size, middle = spectrum.shape[0], spectrum.shape[0] // 2
+    magnitude = np.empty((size, size), dtype=np.float32)
+    halves = (slice(None, middle), slice(middle, None))
+    for rows, cols in itertools.product((0, 1), (0, 1)):
+        np.abs(spectrum[halves[rows], halves[cols]], out=magnitude[halves[1 - rows], halves[1 - cols]])
+    return magnitude
+
+
+def _dominant(spectrum: Spectrum) -> FloatArray:
     """Directions in [0, pi) [rad] along which the magnitude sums to a peak, strongest first, shape (k,)."""
     import cv2
     from scipy.signal import find_peaks
 
-    size = magnitude.shape[0]
+    size = spectrum.shape[0]
     centre = float(size // 2)
-    polar = cv2.warpPolar(
-        magnitude.astype(np.float32), (size // 2, BINS), (centre, centre), centre, cv2.WARP_POLAR_LINEAR
-    )
+    polar = cv2.warpPolar(_centred(spectrum), (size // 2, BINS), (centre, centre), centre, cv2.WARP_POLAR_LINEAR)
     profile = polar[:, 2:].sum(axis=1).astype(np.float64)  # (BINS,); the centre itself has no direction
     if np.ptp(profile) < FLAT * profile.max():
         return np.zeros(0)

@@ -77,6 +77,7 @@ def start_rooms(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: Predic
     if not window.free.any():
         return None, {door.id: "the map holds no free cell" for door in doors}
     working = at_resolution(window, config.lines.resolution)
+    del window  # a copy of a large map
     working = free_islands(working, config.clutter_area, [door.midpoint for door in waiting], config.door_reach)
     structure = find_structure(working, config) if shows_walls(working) else None
     if structure is None:

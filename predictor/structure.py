@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.arrays import FloatArray, IntArray, handed_over
 from closedrooms.core.grid import FREE, OCCUPIED, OccupancyGrid
 from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.directions import find_directions
@@ -46,8 +44,10 @@ def find_structure(grid: OccupancyGrid, config: PredictorConfig) -> WallLines | 
         rose = find_rose(grid)
         if rose is None:
             return None
-        walls = np.where(rose.structural, OCCUPIED, np.where(grid.occupied, FREE, grid.cells))
-        segments = find_segments(OccupancyGrid(grid.frame, walls), config.lines)
+        walls = grid.cells.copy()
+        walls[grid.occupied & ~rose.structural] = FREE
+        walls[rose.structural] = OCCUPIED
+        segments = find_segments(OccupancyGrid(grid.frame, handed_over(walls)), config.lines)
         directions = rose_directions(segments, rose, config.lines)
     else:
         segments = find_segments(grid, config.lines)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
-from closedrooms.predictor.best.frame import DoorFrame, Table, Window, integral
+from closedrooms.predictor.best.frame import DoorFrame, Table, Window, integral, laid_out
 
 # Slack of a wall's thickness when known space is looked for behind it [cells].
 SLACK = 4
@@ -34,6 +34,8 @@ FRONT = (4, 24)
 # Back walls beside a room are looked for this far to either side [cells], 5 m, from 1.5 m behind the door's wall to
 # 0.4 m before the room's own back.
 BESIDE, PASSED = 100, (30, 8)
+# Rows or columns of cells looked at at once.
+STRIP = 512
 
 FEATURES = (
     "log area",
@@ -74,6 +76,7 @@ FEATURES = (
 )
 
 
+NONE = np.zeros(0, dtype=np.int64)
 UInt8Array = npt.NDArray[np.uint8]
 
 
@@ -87,7 +90,7 @@ class Candidates:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """What a frame says about every possible position of a side, as tables over a window of it.
+    """What a frame says about every possible position of a side, as tables over windows of it.
 
     Each is a table of edges, indexed [along, position], so that any stretch of a side costs four look-ups: v and u for
     left and right, u and v for the back. ``enclosed`` counts cells between known cells of their row or their column,
@@ -112,7 +115,7 @@ def sizes_seen(frame: DoorFrame) -> dict[str, FloatArray]:
 
 
 def window_around(frame: DoorFrame, entry: "Entry", limits: Sequence[float]) -> Window:
-    """What of a frame has a say about the rectangles of a door: as far as sides and walls in line with them reach.
+    """Where the rectangles of a door may lie.
 
     Args:
         frame: Seen from the door.
@@ -120,66 +123,62 @@ def window_around(frame: DoorFrame, entry: "Entry", limits: Sequence[float]) -> 
         limits: Smallest width, largest width, smallest depth, largest depth of a room [cells].
     """
     rows, cols = frame.known.shape
-    wide, deep = int(limits[1]) + 1, int(limits[3]) + 1
-    u, across = int(entry.u), wide + 2 * REACH
+    u, wide, deep = int(entry.u), int(limits[1]) + 1, int(limits[3]) + 1
     return Window(
-        min(max(entry.v0 - REACH, 0), rows),
-        min(max(u - across, 0), cols),
-        max(min(entry.v0 + deep + REACH, rows), 0),
-        max(min(u + across + 1, cols), 0),
+        min(max(entry.v0, 0), rows),
+        min(max(u - wide, 0), cols),
+        max(min(entry.v0 + deep, rows), 0),
+        max(min(u + wide + 1, cols), 0),
     )
 
 
+def in_line(frame: DoorFrame, window: Window, side: str) -> Window:
+    """What has a say about a side of rectangles in a window: as far as walls in line with it are looked for."""
+    return window.grown(*((0, 2 * REACH) if side == "top" else (REACH, 0)), frame.known.shape)
+
+
 def gather(frame: DoorFrame, thickness: int, window: Window, seen: dict[str, FloatArray]) -> Evidence:
-    """Tables for a window of a frame.
+    """Tables for the rectangles in a window of a frame.
 
     Args:
         frame: Seen from the doors.
         thickness: Usual thickness of walls [cells].
-        window: Where.
+        window: Where the rectangles lie.
         seen: Of the whole frame, from :func:`sizes_seen`.
     """
     closed, sliver, gap, tight, same, outer = {}, {}, {}, {}, {}, {}
-    inside = frame.known[window.of]
     for side, opposite in (("right", "left"), ("left", "right"), ("top", "bottom")):
-        known = _canonical(inside, side)
-        own, other = (_canonical(_edges(frame, name, window), side) for name in (side, opposite))
+        line = in_line(frame, window, side)
+        # As far as anything is looked for behind a side: positions nearer to the edge are cut off again.
+        behind = thickness + GAP + OUTER
+        wide_line = line.grown(*((behind, 0) if side == "top" else (0, behind)), frame.known.shape)
+        known = laid_out(_canonical(frame.known[wide_line.of], side))
+        own, other = (_canonical(frame.faces(name, wide_line), side) for name in (side, opposite))
+
+        def table(edges: BoolArray, side: str = side, line: Window = line, wide_line: Window = wide_line) -> Table:
+            return _running(edges, side, line, wide_line)
+
         near = _within(known, thickness + SLACK)
         wide = _within(known, thickness + SLIVER)
-        gap[side] = _running(_within(known, thickness + GAP) & ~wide, side, window)
+        gap[side] = table(_within(known, thickness + GAP) & ~wide)
         wide &= ~near
-        outer[side] = _running(_blurred(own & ~_beyond(known), 2), side, window)
+        outer[side] = table(_blurred(own & ~_beyond(known), 2))
         shifted = np.zeros_like(other)
         shifted[:, : other.shape[1] - thickness] = other[:, thickness:]
-        closed[side], sliver[side] = _running(near, side, window), _running(wide, side, window)
-        tight[side] = _running(_blurred(shifted, 3), side, window)
-        same[side] = _running(_blurred(own, 2), side, window)
-    enclosed = integral(_enclosed(frame.known, window), window.v0, window.u0)
-    taken = integral(frame.taken[window.of], window.v0, window.u0)
+        closed[side], sliver[side] = table(near), table(wide)
+        tight[side] = table(_blurred(shifted, 3))
+        same[side] = table(_blurred(own, 2))
+    enclosed = integral(_enclosed(frame, window), window.v0, window.u0)
+    taken = integral(frame.taken(window), window.v0, window.u0)
     return Evidence(closed, sliver, gap, tight, same, outer, enclosed, taken, seen)
 
 
-def _edges(frame: DoorFrame, side: str, window: Window) -> BoolArray:
-    """Wall faces of a side in a window: one more column of edges than of cells, one more row for top and bottom."""
-    rows, cols = window.of
-    if side in {"left", "right"}:
-        return frame.sharp[side][rows, cols.start : cols.stop + 1]
-    return frame.sharp[side][rows.start : rows.stop + 1, cols]
-
-
-def _enclosed(known: BoolArray, window: Window) -> BoolArray:
+def _enclosed(frame: DoorFrame, window: Window) -> BoolArray:
     """Cells of a window between the first and the last known cell of their row or of their column."""
     rows, cols = window.of
-    return _spanned(known[rows], cols) | _spanned(known[:, cols].T, rows).T
-
-
-def _spanned(known: BoolArray, cols: slice) -> BoolArray:
-    """Cells between the first and the last known cell of their row, in some columns."""
-    length = known.shape[1]
-    first, last = known.argmax(axis=1), length - known[:, ::-1].argmax(axis=1)
-    last[~known.any(axis=1)] = 0
-    at = np.arange(cols.start, cols.stop)
-    return np.asarray((at >= first[:, None]) & (at < last[:, None]))
+    u, v = np.arange(cols.start, cols.stop), np.arange(rows.start, rows.stop)[:, None]
+    (left, right), (low, high) = frame.row_ends[:, rows, None], frame.col_ends[:, cols]
+    return np.asarray(((u >= left) & (u < right)) | ((v >= low) & (v < high)))
 
 
 def _spans(frame: DoorFrame, start: str, end: str, *, longest: int = 500) -> FloatArray:
@@ -189,34 +188,49 @@ def _spans(frame: DoorFrame, start: str, end: str, *, longest: int = 500) -> Flo
     corridor, free space goes on much longer than it is wide: it says nothing about rooms.
     """
     upright = start == "left"
-    first, second = (frame.sharp[name] if upright else frame.sharp[name].T for name in (start, end))
-    free = frame.free if upright else frame.free.T
-    cols = first.shape[1]
-    starts, ends = (np.flatnonzero(np.ascontiguousarray(edges)) for edges in (first, second))
-    before = np.searchsorted(starts, ends, side="right") - 1
-    ends, starts = ends[before >= 0], starts[before[before >= 0]]
-    row = ends // cols
-    whole = (row == starts // cols) & (ends - starts >= 20) & (ends - starts < longest)
-    row, ends, starts = row[whole], ends[whole], starts[whole]
-    middle = np.minimum((starts % cols + ends % cols) // 2, free.shape[1] - 1)
-    lengths = ends - starts
-    rooms = _run_along(free, row, middle) <= CORRIDOR_RATIO * lengths
+    rows, cols = frame.free.shape if upright else frame.free.shape[::-1]
+    found = []
+    for first in range(0, rows, STRIP):
+        last = min(first + STRIP, rows)
+        strip = Window(first, 0, last, cols) if upright else Window(0, first, cols, last)
+        one, other = (frame.faces(side, strip) for side in (start, end))
+        found.append(_lengths(one, other, first) if upright else _lengths(one.T, other.T, first))
+    row, middle, lengths = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    whole = (lengths >= 20) & (lengths < longest)
+    row, middle, lengths = row[whole], np.minimum(middle[whole], cols - 1), lengths[whole]
+    rooms = _run_along(frame.free if upright else frame.free.T, row, middle) <= CORRIDOR_RATIO * lengths
     counts = np.bincount(lengths[rooms], minlength=longest).astype(np.float64)
     smooth = np.convolve(counts, np.array([1, 2, 3, 4, 5, 4, 3, 2, 1]) / 5.0, mode="same")
     return np.asarray(smooth / (smooth + 0.5 * smooth.max(initial=0.0) + 1.0))
 
 
+def _lengths(first: BoolArray, second: BoolArray, row: int) -> tuple[IntArray, IntArray, IntArray]:
+    """Row, middle and length of every stretch from an edge of ``first`` to the next one of ``second`` in some rows."""
+    cols = first.shape[1]
+    starts, ends = (np.flatnonzero(laid_out(edges)) for edges in (first, second))
+    before = np.searchsorted(starts, ends, side="right") - 1
+    ends, starts = ends[before >= 0], starts[before[before >= 0]]
+    same = ends // cols == starts // cols
+    ends, starts = ends[same], starts[same]
+    return ends // cols + row, (starts % cols + ends % cols) // 2, ends - starts
+
+
 def _run_along(free: BoolArray, row: IntArray, col: IntArray) -> IntArray:
     """Length of the run of free cells up and down the column through each of the cells, 0 where the cell is not."""
-    # Columns end to end, each closed off by a cell that is not free.
-    columns = np.zeros((free.shape[1], free.shape[0] + 1), dtype=np.bool_)
-    columns[:, :-1] = free.T
-    flat = columns.ravel()
-    changes = np.flatnonzero(flat[1:] != flat[:-1]) + 1
-    at = col * columns.shape[1] + row
-    after = np.searchsorted(changes, at, side="right")
-    ends, starts = np.append(changes, flat.size), np.concatenate(([0], changes))
-    return np.asarray(np.where(flat[at], ends[after] - starts[after], 0))
+    runs = np.zeros(len(row), dtype=np.int64)
+    for first in range(0, free.shape[1], STRIP):
+        here = (col >= first) & (col < first + STRIP)
+        # Columns end to end, each closed off by a cell that is not free.
+        strip = free[:, first : first + STRIP].T
+        columns = np.zeros((strip.shape[0], strip.shape[1] + 1), dtype=np.bool_)
+        columns[:, :-1] = laid_out(strip)
+        flat = columns.ravel()
+        changes = np.flatnonzero(flat[1:] != flat[:-1]) + 1
+        at = (col[here] - first) * columns.shape[1] + row[here]
+        after = np.searchsorted(changes, at, side="right")
+        ends, starts = np.append(changes, flat.size), np.concatenate(([0], changes))
+        runs[here] = np.where(flat[at], ends[after] - starts[after], 0)
+    return runs
 
 
 def _canonical(mask: BoolArray, side: str) -> BoolArray:
@@ -238,18 +252,19 @@ def _beyond(known: BoolArray) -> BoolArray:
 
 
 def _bytes(mask: BoolArray) -> UInt8Array:
-    return np.ascontiguousarray(mask).view(np.uint8)
+    return laid_out(mask).view(np.uint8)
 
 
 def _blurred(edges: BoolArray, reach: int) -> BoolArray:
     return np.asarray(cv2.dilate(_bytes(edges), np.ones((1, 2 * reach + 1), np.uint8)) > 0)
 
 
-def _running(edges: BoolArray, side: str, window: Window) -> Table:
-    """Table of the edges of a window, in the frame's own orientation."""
+def _running(edges: BoolArray, side: str, line: Window, wide: Window) -> Table:
+    """Table over ``line`` of the edges of the wider window ``wide``, in the frame's own orientation."""
     if side == "top":
-        return integral(edges, window.u0, window.v0)
-    return integral(edges[:, ::-1] if side == "left" else edges, window.v0, window.u0)
+        return integral(edges[:, line.v0 - wide.v0 : line.v1 - wide.v0 + 1], line.u0, line.v0)
+    edges = edges[:, ::-1] if side == "left" else edges
+    return integral(edges[:, line.u0 - wide.u0 : line.u1 - wide.u0 + 1], line.v0, line.u0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -287,8 +302,11 @@ def propose(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int, 
     """
     narrow, wide, shallow, deep = limits
     v0 = entry.v0
-    cut = frame.taken[v0 + FRONT[0] : v0 + FRONT[1]]
-    cut_at = np.flatnonzero(cut.mean(axis=0) > 0.5) if cut.size else np.zeros(0, dtype=np.int64)
+    # Known space that cuts in behind the door's wall, as far as a side may lie.
+    near = window_around(frame, entry, limits)
+    rows = len(frame.known)
+    front = Window(min(max(v0 + FRONT[0], 0), rows), near.u0, min(max(v0 + FRONT[1], 0), rows), near.u1)
+    cut_at = np.flatnonzero(frame.taken(front).mean(axis=0) > 0.5) + near.u0 if front.cells > 0 else NONE
     right = _positions(evidence, entry, thickness, "right", wide, also=cut_at[cut_at > entry.u + 4][:1])
     left = _positions(evidence, entry, thickness, "left", wide, also=cut_at[cut_at < entry.u - 4][-1:] + 1)
     back = _positions(evidence, entry, thickness, "top", deep)
@@ -452,12 +470,10 @@ def _sticks_out(evidence: Evidence, boxes: IntArray) -> FloatArray:
 
 
 def _outside(frame: DoorFrame, boxes: IntArray) -> FloatArray:
-    """Share of each rectangle beyond the bounding box of what is known; rows of single cells are noise."""
+    """Share of each rectangle beyond the bounding box of what is known."""
     u0, v0, u1, v1 = boxes.T
-    inside = np.ones(len(boxes))
-    for axis, low, high in ((0, u0, u1), (1, v0, v1)):
-        known = np.flatnonzero(np.count_nonzero(frame.known, axis=axis) >= 5)
-        first, last = (int(known[0]), int(known[-1]) + 1) if known.size else (0, 0)
+    inside, extent = np.ones(len(boxes)), frame.extent
+    for low, high, first, last in ((u0, u1, extent.u0, extent.u1), (v0, v1, extent.v0, extent.v1)):
         inside *= np.maximum(np.minimum(high, last) - np.maximum(low, first), 0) / (high - low)
     return 1.0 - inside
 

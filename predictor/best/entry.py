@@ -9,7 +9,7 @@ import numpy as np
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.predictor.best.candidates import Entry
-from closedrooms.predictor.best.frame import DoorFrame, TurnedMap
+from closedrooms.predictor.best.frame import DoorFrame, TurnedMap, Window
 
 # Doors whose walls are closer than this belong to one wall [cells], 1.5 m.
 SAME_WALL = 30
@@ -61,17 +61,17 @@ def face_door(door: ClosedDoor, turned: TurnedMap, *, reach: float) -> Facing | 
     cells = round(reach / turned.resolution)
     col, row = (math.floor(v) for v in at)
     rows, cols = turned.known.shape
-    near = turned.known[max(row - cells, 0) : max(row + cells + 1, 0), max(col - cells, 0) : max(col + cells + 1, 0)]
+    around = turned.known[max(row - cells, 0) : max(row + cells + 1, 0), max(col - cells, 0) : max(col + cells + 1, 0)]
     free = turned.free[max(row - cells, 0) : max(row + cells + 1, 0), max(col - cells, 0) : max(col + cells + 1, 0)]
-    if not (0 <= row < rows and 0 <= col < cols) or not near.any():
+    if not (0 <= row < rows and 0 <= col < cols) or not around.any():
         return "it lies outside the known map"
-    if not (near & ~free).any():
+    if not (around & ~free).any():
         return f"no wall within {reach:g} m"
     scores, ahead = [], []
     for quarter in range(4):
-        unknown = _share(~turned.known, at, quarter, 8, 28)
+        unknown = float((~_sampled(turned.known, at, quarter, 8, 28)).mean())
         ahead.append(unknown)
-        scores.append(unknown + _share(turned.free, at, quarter, -16, -4))
+        scores.append(unknown + float(_sampled(turned.free, at, quarter, -16, -4).mean()))
     best = int(np.argmax(np.round(scores, 6)))
     if ahead[best] < 0.25:
         return "no unknown space behind it"
@@ -80,15 +80,15 @@ def face_door(door: ClosedDoor, turned: TurnedMap, *, reach: float) -> Facing | 
     return Facing(door, turned.angle, best)
 
 
-def _share(mask: BoolArray, at: FloatArray, quarter: int, low: int, high: int) -> float:
-    """Share of cells set between ``low`` and ``high`` cells ahead of a point, 0.3 m to either side."""
+def _sampled(mask: BoolArray, at: FloatArray, quarter: int, low: int, high: int) -> BoolArray:
+    """The cells between ``low`` and ``high`` cells ahead of a point, 0.3 m to either side."""
     inward = np.array([(0, 1), (-1, 0), (0, -1), (1, 0)][quarter], dtype=np.float64)
     along = np.array([inward[1], -inward[0]])
     steps, sides = np.arange(low, high), np.arange(-5, 6)
     points = at + steps[:, None, None] * inward + sides[None, :, None] * along
     cells = np.floor(points).astype(int)
     col, row = np.clip(cells[..., 0], 0, mask.shape[1] - 1), np.clip(cells[..., 1], 0, mask.shape[0] - 1)
-    return float(mask[row, col].mean())
+    return np.asarray(mask[row, col], dtype=np.bool_)
 
 
 def enter(frame: DoorFrame, facing: Facing, facings: Sequence[Facing], thickness: int) -> tuple[Entry, float]:
@@ -104,9 +104,13 @@ def enter(frame: DoorFrame, facing: Facing, facings: Sequence[Facing], thickness
         The entry, and the door's position across the wall [cells].
     """
     u, v = (float(x) for x in frame.to_frame(np.array(facing.door.midpoint)))
-    low = max(int(v) - FACE_BEFORE, 0)
-    window = frame.sharp["top"][low : max(int(v) + 2, 0), max(int(u) - FACE_ALONG, 0) : max(int(u) + FACE_ALONG, 0)]
-    seen = window.sum(axis=1)
+    near = Window(
+        max(int(v) - FACE_BEFORE, 0),
+        max(int(u) - FACE_ALONG, 0),
+        int(v) + 1,
+        min(int(u) + FACE_ALONG, frame.free.shape[1]),
+    )
+    low, seen = near.v0, frame.faces("top", near).sum(axis=1)
     face = low + int(seen.argmax()) - v if seen.size and seen.max() >= 8 else 0.0
     v0 = round(v + max(min(face + thickness, thickness / 2), 0.5))
     left = right = None

@@ -32,6 +32,11 @@ class Window:
         """To index a raster of the frame with."""
         return slice(self.v0, self.v1), slice(self.u0, self.u1)
 
+    def grown(self, v: int, u: int, shape: tuple[int, ...]) -> "Window":
+        """``v`` more rows and ``u`` more columns on either side, as far as a raster of ``shape`` goes."""
+        rows, cols = shape
+        return Window(max(self.v0 - v, 0), max(self.u0 - u, 0), min(self.v1 + v, rows), min(self.u1 + u, cols))
+
     def joined(self, other: "Window") -> "Window":
         """The smallest window that holds both."""
         return Window(min(self.v0, other.v0), min(self.u0, other.u0), max(self.v1, other.v1), max(self.u1, other.u1))
@@ -83,7 +88,8 @@ def integral(mask: BoolArray, row: int = 0, col: int = 0) -> Table:
 class DoorFrame:
     """Raster of the map turned so that the doors of one side of one wall direction look along +v.
 
-    Positions are edges between cells: edge ``e`` lies between cells ``e - 1`` and ``e``.
+    Positions are edges between cells: edge ``e`` lies between cells ``e - 1`` and ``e``. What is derived from the
+    cells is computed window by window: maps are large and what has a say about a door is not.
 
     Attributes:
         angle: Direction of +u in the map frame [rad]; +v is 90 degrees to its left.
@@ -91,9 +97,10 @@ class DoorFrame:
         resolution: Cell size [m].
         free: Known free cells, indexed [v, u].
         known: Known cells, free or occupied.
-        taken: Cells that a wall of the usual thickness around known space fills.
-        sharp: Edges where a wall face was seen, by side: ``right`` has free space left of the edge and wall right of
-            it, ``left`` the reverse, ``top`` free space below, ``bottom`` above.
+        thickness: Usual thickness of walls [cells].
+        row_ends: First known cell and the one after the last of every row, shape (2, rows); (0, 0) where none is.
+        col_ends: The same of every column, shape (2, cols).
+        extent: Window of rows and columns with five known cells and more: those of single cells are noise.
     """
 
     angle: float
@@ -101,8 +108,43 @@ class DoorFrame:
     resolution: float
     free: BoolArray
     known: BoolArray
-    taken: BoolArray
-    sharp: dict[str, BoolArray]
+    thickness: int
+    row_ends: IntArray
+    col_ends: IntArray
+    extent: Window
+
+    def faces(self, side: str, window: Window) -> BoolArray:
+        """Edges of a window where a wall face was seen.
+
+        Args:
+            side: ``right`` has free space left of the edge and wall right of it, ``left`` the reverse, ``top`` free
+                space below, ``bottom`` above.
+            window: Where.
+
+        Returns:
+            One more column than the window for left and right, one more row for top and bottom.
+        """
+        upright = side in {"left", "right"}
+        free, known = (mask if upright else mask.T for mask in (self.free, self.known))
+        low, high, first, last = (window.v0, window.v1, window.u0, window.u1)
+        if not upright:
+            low, high, first, last = (first, last, low, high)
+        start, end = max(first - FACE_DEPTH - 1, 0), min(last + FACE_DEPTH + 1, free.shape[1])
+        free, known = free[low:high, start:end], known[low:high, start:end]
+        if side in {"left", "bottom"}:
+            found = wall_faces(free[:, ::-1], known[:, ::-1])[:, ::-1]
+        else:
+            found = wall_faces(free, known)
+        found = found[:, first - start : last - start + 1]
+        return found if upright else found.T
+
+    def taken(self, window: Window) -> BoolArray:
+        """Cells of a window that a wall of the usual thickness around known space fills."""
+        wide = window.grown(self.thickness, self.thickness, self.free.shape)
+        kernel = np.ones((2 * self.thickness + 1,) * 2, np.uint8)
+        taken = cv2.dilate(np.ascontiguousarray(self.free[wide.of]).view(np.uint8), kernel)
+        rows, cols = window.v0 - wide.v0, window.u0 - wide.u0
+        return taken[rows : rows + window.v1 - window.v0, cols : cols + window.u1 - window.u0] > 0
 
     def to_frame(self, points: FloatArray) -> FloatArray:
         """Map points [m], shape (..., 2), as continuous edges ``(u, v)`` [cells]."""
@@ -153,7 +195,7 @@ def turn_map(grid: OccupancyGrid, angle: float, *, margin: float) -> TurnedMap:
     base = (first - np.array([x0, y0])) / resolution - 0.5
     matrix = np.array([[c, -s, base[0]], [s, c, base[1]]])
     flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
-    values = grid.free.astype(np.uint8) + 2 * grid.known.astype(np.uint8)
+    values = grid.free.view(np.uint8) | (grid.known.view(np.uint8) << 1)
     turned = np.asarray(cv2.warpAffine(values, matrix, (int(cols), int(rows)), flags=flags, borderValue=0.0), np.uint8)
     return TurnedMap(angle, origin, resolution, (turned & 1) > 0, (turned & 2) > 0)
 
@@ -170,37 +212,56 @@ def door_frame(turned: TurnedMap, quarter: int, thickness: int) -> DoorFrame:
     low = turned.origin
     high = low + np.array(turned.free.shape[::-1]) * turned.resolution
     origin = np.array([(low[0], low[1]), (low[1], -high[0]), (-high[0], -high[1]), (-high[1], low[0])][quarter])
-    kernel = np.ones((2 * thickness + 1, 2 * thickness + 1), np.uint8)
-    taken = cv2.dilate(free.astype(np.uint8), kernel) > 0
-    faces = {
-        "right": wall_faces(free, known & ~free),
-        "left": wall_faces(free[:, ::-1], (known & ~free)[:, ::-1])[:, ::-1],
-        "top": wall_faces(free.T, (known & ~free).T).T,
-        "bottom": wall_faces(free.T[:, ::-1], (known & ~free).T[:, ::-1])[:, ::-1].T,
-    }
+    often = [np.flatnonzero(np.count_nonzero(known, axis=axis) >= 5) for axis in (0, 1)]
+    (u0, u1), (v0, v1) = ((int(at[0]), int(at[-1]) + 1) if at.size else (0, 0) for at in often)
     return DoorFrame(
         angle=turned.angle + quarter * math.pi / 2,
         origin=origin,
         resolution=turned.resolution,
         free=free,
         known=known,
-        taken=taken,
-        sharp=faces,
+        thickness=thickness,
+        row_ends=_ends(known),
+        col_ends=_ends(known.T),
+        extent=Window(v0, u0, v1, u1),
     )
 
 
+def _ends(known: BoolArray) -> IntArray:
+    """First known cell and the one after the last of every row, shape (2, rows); (0, 0) where none is."""
+    ends = np.stack((known.argmax(axis=1), known.shape[1] - known[:, ::-1].argmax(axis=1)))
+    ends[1, ~known.any(axis=1)] = 0
+    return ends
+
+
 def _quarter(mask: BoolArray, quarter: int) -> BoolArray:
-    turned = (mask, mask.T[::-1], mask[::-1, ::-1], mask.T[:, ::-1])[quarter]
-    return np.ascontiguousarray(turned)
+    return (mask, mask.T[::-1], mask[::-1, ::-1], mask.T[:, ::-1])[quarter]
 
 
-def wall_faces(free: BoolArray, occupied: BoolArray) -> BoolArray:
+def laid_out(mask: BoolArray) -> BoolArray:
+    """The same mask row after row in memory."""
+    if mask.flags.c_contiguous or abs(mask.strides[1]) == 1 or not mask.size:
+        return np.ascontiguousarray(mask)
+    # Three times as quick as numpy.
+    return np.asarray(cv2.transpose(np.ascontiguousarray(mask.T).view(np.uint8))).view(np.bool_)
+
+
+def wall_faces(free: BoolArray, known: BoolArray) -> BoolArray:
     """Edges with a free cell on their left and an occupied one at most FACE_DEPTH cells right.
+
+    Args:
+        free: Free cells.
+        known: Cells free or occupied.
 
     Returns:
         Shape (rows, cols + 1).
     """
-    wall = cv2.dilate(np.ascontiguousarray(occupied).view(np.uint8), np.ones((1, FACE_DEPTH), np.uint8), anchor=(0, 0))
+    free = laid_out(free)
+    occupied = laid_out(known) > free
     edges = np.zeros((free.shape[0], free.shape[1] + 1), dtype=np.bool_)
-    edges[:, 1:-1] = free[:, :-1] & ~free[:, 1:] & (wall[:, 1:] > 0)
+    if not free.size:
+        return edges
+    wall = cv2.dilate(occupied.view(np.uint8), np.ones((1, FACE_DEPTH), np.uint8), anchor=(0, 0))
+    np.greater(free[:, :-1], free[:, 1:], out=edges[:, 1:-1])
+    edges[:, 1:-1] &= wall[:, 1:].view(np.bool_)
     return edges

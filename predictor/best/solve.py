@@ -60,6 +60,7 @@ def predict_best(
     if window is None:
         return Prediction(grid, (), {door.id: "the map is all unknown" for door in doors})
     working = at_resolution(window, RESOLUTION)
+    del window  # a copy of a large map
     working = free_islands(working, config.clutter_area, [door.midpoint for door in waiting], config.door_reach)
     directions = find_wall_directions(working) if shows_walls(working) else None
     if directions is None:

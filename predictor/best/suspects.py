@@ -11,6 +11,7 @@ from closedrooms.predictor.best.candidates import (
     Candidates,
     Entry,
     gather,
+    in_line,
     propose,
     sizes_seen,
     window_around,
@@ -23,8 +24,8 @@ from closedrooms.predictor.best.weights import SIDE_WEIGHTS, weights_of
 
 # Narrowest and widest, shallowest and deepest room [cells]: 0.8 m to 24 m.
 LIMITS = (16, 480, 16, 480)
-# Rooms share tables up to so many cells, whose tables take 170 bytes each (measured): 0.85 GB. What has a say about one
-# door alone is at most 2563 x 1282 cells.
+# Rooms share tables up to so many cells in line with their sides: 25 to 50 bytes each. For one door alone they are 2.5
+# million at most.
 MAX_WINDOW = 5_000_000
 
 
@@ -82,17 +83,19 @@ def _propose_all(
     for window, doors in _windows(frame, rooms):
         evidence = gather(frame, thickness, window, seen)
         found |= {key: propose(frame, evidence, rooms[key], thickness, LIMITS) for key in doors}
+        del evidence
     return {key: found[key] for key in rooms}
 
 
 def _windows(frame: DoorFrame, rooms: dict[tuple[int, ...], Entry]) -> list[tuple[Window, list[tuple[int, ...]]]]:
-    """Windows that hold what has a say about each room; near rooms share one."""
+    """Windows that hold the rectangles of each room; near rooms share one."""
     groups: list[tuple[Window, list[tuple[int, ...]]]] = []
     for key in sorted(rooms, key=lambda key: (rooms[key].v0, rooms[key].u)):
         own = window_around(frame, rooms[key], LIMITS)
         for number, (window, doors) in enumerate(groups):
-            if own.joined(window).cells <= MAX_WINDOW:
-                groups[number] = own.joined(window), [*doors, key]
+            both = own.joined(window)
+            if sum(in_line(frame, both, side).cells for side in ("right", "top")) <= MAX_WINDOW:
+                groups[number] = both, [*doors, key]
                 break
         else:
             groups.append((own, [key]))

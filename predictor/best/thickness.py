@@ -3,7 +3,7 @@
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, IntArray
-from closedrooms.predictor.best.frame import TurnedMap, wall_faces
+from closedrooms.predictor.best.frame import TurnedMap, laid_out, wall_faces
 
 # Walls thicker than this are no walls but shafts [cells], 0.95 m.
 THICKEST = 19
@@ -11,13 +11,17 @@ THICKEST = 19
 CLEAR = 8
 # Thickness where too few walls were seen from both sides [cells], 0.2 m: usual for inner walls.
 DEFAULT, FEWEST = 4, 20
+# Rows of cells looked at at once.
+STRIP = 512
 
 
 def wall_thickness(turned: TurnedMap) -> int:
     """Median thickness of the walls seen from both sides [cells], by their length."""
     counts = np.zeros(THICKEST + 1, dtype=np.int64)
     for free, known in ((turned.free, turned.known), (turned.free.T, turned.known.T)):
-        counts += _thicknesses(np.ascontiguousarray(free), np.ascontiguousarray(known))
+        for row in range(0, len(free), STRIP):
+            strip = slice(row, row + STRIP)
+            counts += _thicknesses(laid_out(free[strip]), laid_out(known[strip]))
     if counts.sum() < FEWEST:
         return DEFAULT
     return max(int(np.searchsorted(np.cumsum(counts), counts.sum() / 2)), 2)
@@ -26,8 +30,7 @@ def wall_thickness(turned: TurnedMap) -> int:
 def _thicknesses(free: BoolArray, known: BoolArray) -> IntArray:
     """Cells of wall by thickness, across the columns."""
     rows, cols = free.shape
-    occupied = known & ~free
-    right, left = wall_faces(free, occupied), wall_faces(free[:, ::-1], occupied[:, ::-1])[:, ::-1]
+    right, left = wall_faces(free, known), wall_faces(free[:, ::-1], known[:, ::-1])[:, ::-1]
     total = np.zeros((rows, cols + 1), dtype=np.int32)
     np.cumsum(free, axis=1, out=total[:, 1:])
     before, after = np.zeros_like(right), np.zeros_like(left)

@@ -45,8 +45,8 @@ def test_stretch_agrees_with_slicing(mask: np.ndarray, position: int, low: int, 
 
 def test_a_face_is_free_space_before_a_wall() -> None:
     free = np.array([[True, True, False, False, False, True]])
-    occupied = np.array([[False, False, False, True, False, False]])
-    assert wall_faces(free, occupied).tolist() == [[False, False, True, False, False, False, False]]
+    known = free | np.array([[False, False, False, True, False, False]])
+    assert wall_faces(free, known).tolist() == [[False, False, True, False, False, False, False]]
 
 
 @given(st.sampled_from([0.0, 0.3, -0.7]), st.integers(0, 3))

@@ -14,6 +14,7 @@ from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.predictor import unknown
 from closedrooms.predictor.arrangement import arrange
 from closedrooms.predictor.best.directions import WallDirections
+from closedrooms.predictor.best.frame import Window, door_frame, turn_map
 from closedrooms.predictor.edges import STRIP, find_edges
 from closedrooms.predictor.lines import Line, _chain, _join_closest
 
@@ -87,3 +88,19 @@ def test_faces_counted_strip_by_strip_have_the_same_shares(slanted, monkeypatch)
     assert whole[0].max() > 0.9
     monkeypatch.setattr(unknown, "STRIP", 3)
     assert np.array_equal(unknown.observed_shares(arrangement, slanted), whole)
+
+
+@pytest.mark.parametrize("quarter", range(4))
+def test_wall_faces_and_walls_in_a_window_are_those_of_the_whole_frame(slanted, quarter):
+    frame = door_frame(turn_map(slanted, 0.0, margin=0.5), quarter, 4)
+    rows, cols = frame.free.shape
+    whole = Window(0, 0, rows, cols)
+    assert frame.taken(whole).sum() > frame.free.sum()
+    for window in (Window(40, 55, 90, 120), Window(0, 0, 33, cols), Window(rows - 50, cols - 40, rows, cols)):
+        assert np.array_equal(frame.taken(window), frame.taken(whole)[window.of])
+        for side in ("left", "right", "top", "bottom"):
+            upright = side in {"left", "right"}
+            edges = slice(window.v0, window.v1 + (not upright)), slice(window.u0, window.u1 + upright)
+            seen = frame.faces(side, whole)
+            assert seen.sum() > 50
+            assert np.array_equal(frame.faces(side, window), seen[edges])
