@@ -8,6 +8,7 @@ from closedrooms.core.room import Room, RoomKind
 from closedrooms.predictor.arrangement import joined
 from closedrooms.predictor.border import border_rooms
 from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.doorway import DoorInWall, find_doorways
 from closedrooms.predictor.expansion import Growth
 from closedrooms.predictor.inpaint import passage
 from closedrooms.predictor.prediction import Shape
@@ -37,6 +38,10 @@ def finish_rooms(start: Start, growth: Growth, config: PredictorConfig) -> tuple
     if thickness is None:
         thickness = measure_thickness(start.grid, start.structure.angles)
     shapes = {room: free_interior(shape, start.grid, thickness) for room, shape in shapes.items()}
+    inward = [DoorInWall(e.door, start.along(room), start.inward(room)) for room, e in enumerate(start.entrances)]
+    for room, doorway in enumerate(find_doorways(start.grid, inward, width=config.door_width)):
+        if doorway is not None:
+            shapes[room] = doorway.joined(shapes[room], start.grid.frame.resolution)
     rooms, passages = [], []
     for room, entrance in enumerate(start.entrances):
         kind: RoomKind = "border" if room in outside else "dependent" if growth.touches(room) else "independent"

@@ -1,14 +1,17 @@
 """What known space leaves of a rectangle (preset ``best``)."""
 
 import math
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
+import shapely
 from shapely.geometry import Polygon
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.predictor.best.entry import Facing
 from closedrooms.predictor.best.frame import TurnedMap
+from closedrooms.predictor.doorway import Doorway
 
 # A rectangle that known space takes less of than this stays a rectangle.
 CLEAN = 0.01
@@ -19,17 +22,34 @@ NARROW = 7
 
 
 def room_shape(
-    turned: TurnedMap, corners: FloatArray, thickness: int, facing: Facing, *, narrow: int = NARROW
+    turned: TurnedMap,
+    corners: FloatArray,
+    thickness: int,
+    facing: Facing,
+    doorways: Sequence[Doorway],
+    *,
+    narrow: int = NARROW,
 ) -> Polygon | None:
-    """The free interior of a room, or ``None`` where nothing is left.
+    """The free interior of a room up to the leaves of its doors, or ``None`` where nothing is left.
 
     Args:
         turned: The map along the room's walls.
         corners: Of the rectangle in the map frame [m], shape (4, 2).
-        thickness: Usual thickness of walls [cells].
+        thickness: What a wall around known space takes at least [cells].
         facing: Its door: of several pieces the one at the door stays.
+        doorways: Openings of its doors.
         narrow: Strips narrower than this are no room [cells].
     """
+    shape = _interior(turned, corners, thickness, facing, doorways, narrow)
+    for doorway in doorways:
+        shape = None if shape is None else doorway.joined(shape, turned.resolution)
+    return shape
+
+
+def _interior(
+    turned: TurnedMap, corners: FloatArray, thickness: int, facing: Facing, doorways: Sequence[Doorway], narrow: int
+) -> Polygon | None:
+    """What known space and its walls leave of a rectangle, as one polygon."""
     c, s = math.cos(turned.angle), math.sin(turned.angle)
     to_turned = np.array([[c, -s], [s, c]])
     cells = (corners @ to_turned - turned.origin) / turned.resolution
@@ -41,6 +61,12 @@ def room_shape(
     r0, r1, c0, c1 = max(y0 - pad, 0), min(y1 + pad, rows), max(x0 - pad, 0), min(x1 + pad, cols)
     if r1 > r0 and c1 > c0:
         window[r0 - y0 + pad : r1 - y0 + pad, c0 - x0 + pad : c1 - x0 + pad] = turned.free[r0:r1, c0:c1]
+    for doorway in doorways:
+        # Free space in an opening ends at a leaf, not at a wall.
+        recess = shapely.get_coordinates(doorway.stretch(doorway.face, doorway.leaf + turned.resolution))
+        ends = (recess @ to_turned - turned.origin) / turned.resolution - (x0 - pad, y0 - pad)
+        (left, low), (right, high) = np.floor(ends.min(axis=0)).astype(int), np.ceil(ends.max(axis=0)).astype(int)
+        window[max(low, 0) : max(high, 0), max(left, 0) : max(right, 0)] = 0
     taken = cv2.dilate(window, np.ones((2 * thickness + 1,) * 2, np.uint8)) > 0
     open_ = ~taken[pad:-pad, pad:-pad]
     if open_.mean() > 1.0 - CLEAN:

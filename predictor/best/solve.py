@@ -25,6 +25,7 @@ from closedrooms.predictor.best.suspects import Suspects, suspect
 from closedrooms.predictor.best.thickness import wall_thickness
 from closedrooms.predictor.clutter import free_islands
 from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.doorway import DoorInWall, find_doorways
 from closedrooms.predictor.edges import shows_walls
 from closedrooms.predictor.inpaint import inpaint, passage
 from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
@@ -69,18 +70,22 @@ def predict_best(
     turned, facings, facing_nothing = _face_all(working, waiting, directions, config)
     failures |= facing_nothing
     # 2. Rectangles and their evidence, door by door.
-    thickness = wall_thickness(turned[float(directions.angles[0])])
+    walls = wall_thickness(turned[float(directions.angles[0])])
+    thickness = walls.usual
     suspects = suspect(turned, facings, thickness)
     # 3. The joint choice, and two doors to one room where that scores better.
     groups, cut = _choose_all(facings, suspects, thickness)
-    # 4. Rooms are what known space and its walls leave of the rectangles.
+    # 4. Rooms are what known space and its walls leave of the rectangles, up to the leaves of their doors.
+    inward = [DoorInWall(facing.door, facing.along, facing.inward) for facing in facings]
+    openings = find_doorways(working, inward, width=config.door_width)
     rooms, passages = [], []
     for group in groups:
         facing = facings[group.doors[0]]
-        shape = room_shape(turned[facing.angle], group.corners, thickness, facing)
+        doorways = [doorway for i in group.doors if (doorway := openings[i]) is not None]
+        shape = room_shape(turned[facing.angle], group.corners, walls.least, facing, doorways)
         if shape is None:
-            # A nook narrower than the usual walls around it.
-            shape = room_shape(turned[facing.angle], group.corners, 1, facing, narrow=3)
+            # A nook narrower than the walls around it.
+            shape = room_shape(turned[facing.angle], group.corners, 1, facing, doorways, narrow=3)
         names = tuple(facings[i].door.id for i in group.doors)
         if shape is None:
             failures |= dict.fromkeys(names, "no room fits behind it")

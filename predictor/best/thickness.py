@@ -1,5 +1,7 @@
 """How thick the walls of a map are (preset ``best``)."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, IntArray
@@ -13,18 +15,34 @@ CLEAR = 8
 DEFAULT, FEWEST = 4, 20
 # Rows of cells looked at at once.
 STRIP = 512
+# No wall is thinner [cells].
+THINNEST = 2
 
 
-def wall_thickness(turned: TurnedMap) -> int:
-    """Median thickness of the walls seen from both sides [cells], by their length."""
+@dataclass(frozen=True, slots=True)
+class WallThickness:
+    """Thickness of the walls of a map [cells].
+
+    Attributes:
+        usual: Half of all wall is thinner: what a wall that was not seen is expected to have.
+        least: A quarter of all wall is thinner: what is left of a room that lies behind a wall has at least this.
+    """
+
+    usual: int
+    least: int
+
+
+def wall_thickness(turned: TurnedMap) -> WallThickness:
+    """Of the walls seen from both sides, by their length."""
     counts = np.zeros(THICKEST + 1, dtype=np.int64)
     for free, known in ((turned.free, turned.known), (turned.free.T, turned.known.T)):
         for row in range(0, len(free), STRIP):
             strip = slice(row, row + STRIP)
             counts += _thicknesses(laid_out(free[strip]), laid_out(known[strip]))
     if counts.sum() < FEWEST:
-        return DEFAULT
-    return max(int(np.searchsorted(np.cumsum(counts), counts.sum() / 2)), 2)
+        return WallThickness(DEFAULT, DEFAULT)
+    least, usual = np.searchsorted(np.cumsum(counts), counts.sum() * np.array([0.25, 0.5]))
+    return WallThickness(max(int(usual), THINNEST), max(int(least), THINNEST))
 
 
 def _thicknesses(free: BoolArray, known: BoolArray) -> IntArray:

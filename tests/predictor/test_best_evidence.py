@@ -18,7 +18,7 @@ from closedrooms.predictor.best.frame import door_frame, integral, turn_map, wal
 from closedrooms.predictor.best.joint import Suspect, choose
 from closedrooms.predictor.best.pairs import PAIR_FEATURES, pair_features
 from closedrooms.predictor.best.solve import predict_best
-from closedrooms.predictor.best.thickness import DEFAULT, wall_thickness
+from closedrooms.predictor.best.thickness import DEFAULT, WallThickness, wall_thickness
 from closedrooms.predictor.config import preset
 
 MASKS = hnp.arrays(np.bool_, st.tuples(st.integers(3, 12), st.integers(3, 12)))
@@ -91,13 +91,19 @@ def _walled(thickness: int) -> OccupancyGrid:
 
 @pytest.mark.parametrize("thickness", [2, 4, 9])
 def test_measures_the_thickness_of_a_wall_seen_from_both_sides(thickness: int) -> None:
-    assert wall_thickness(turn_map(_walled(thickness), 0.0, margin=1.0)) == thickness
+    assert wall_thickness(turn_map(_walled(thickness), 0.0, margin=1.0)).usual == thickness
 
 
 def test_a_map_without_walls_seen_twice_has_the_usual_thickness() -> None:
     cells = np.full((40, 40), FREE, dtype=np.int8)
     turned = turn_map(OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 40, 40), cells), 0.0, margin=1.0)
-    assert wall_thickness(turned) == DEFAULT
+    assert wall_thickness(turned) == WallThickness(DEFAULT, DEFAULT)
+
+
+def test_the_least_thickness_is_that_of_thin_walls_and_the_usual_one_that_of_most() -> None:
+    cells = np.concatenate((_walled(9).cells[10:70], _walled(4).cells[10:40]))
+    grid = OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 90, 100), cells)
+    assert wall_thickness(turn_map(grid, 0.0, margin=1.0)) == WallThickness(usual=9, least=4)
 
 
 def test_pair_features_are_the_same_seen_from_either_door() -> None:
