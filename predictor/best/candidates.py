@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
-from closedrooms.predictor.best.frame import DoorFrame, Table, Window, integral, laid_out
+from closedrooms.predictor.best.frame import STRIP, DoorFrame, Table, Window, integral, laid_out
 
 # Slack of a wall's thickness when known space is looked for behind it [cells].
 SLACK = 4
@@ -34,8 +34,6 @@ FRONT = (4, 24)
 # Back walls beside a room are looked for this far to either side [cells], 5 m, from 1.5 m behind the door's wall to
 # 0.4 m before the room's own back.
 BESIDE, PASSED = 100, (30, 8)
-# Rows or columns of cells looked at at once.
-STRIP = 512
 
 FEATURES = (
     "log area",

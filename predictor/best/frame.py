@@ -11,6 +11,8 @@ from closedrooms.core.grid import OccupancyGrid
 
 # A face of a wall is free space with an occupied cell at most this far behind it [cells]: scan matching smears walls.
 FACE_DEPTH = 3
+# Rows of cells looked at at once.
+STRIP = 512
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,8 +231,12 @@ def door_frame(turned: TurnedMap, quarter: int, thickness: int) -> DoorFrame:
 
 def _ends(known: BoolArray) -> IntArray:
     """First known cell and the one after the last of every row, shape (2, rows); (0, 0) where none is."""
-    ends = np.stack((known.argmax(axis=1), known.shape[1] - known[:, ::-1].argmax(axis=1)))
-    ends[1, ~known.any(axis=1)] = 0
+    ends = np.zeros((2, len(known)), dtype=np.int64)
+    for first in range(0, len(known), STRIP):
+        strip = laid_out(known[first : first + STRIP])
+        some = strip.any(axis=1)
+        ends[0, first : first + STRIP] = strip.argmax(axis=1)
+        ends[1, first : first + STRIP] = (strip.shape[1] - strip[:, ::-1].argmax(axis=1)) * some
     return ends
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, IntArray
-from closedrooms.predictor.best.frame import TurnedMap, laid_out, wall_faces
+from closedrooms.predictor.best.frame import STRIP, TurnedMap, laid_out, wall_faces
 
 # Walls thicker than this are no walls but shafts [cells], 0.95 m.
 THICKEST = 19
@@ -13,8 +13,6 @@ THICKEST = 19
 CLEAR = 8
 # Thickness where too few walls were seen from both sides [cells], 0.2 m: usual for inner walls.
 DEFAULT, FEWEST = 4, 20
-# Rows of cells looked at at once.
-STRIP = 512
 # No wall is thinner [cells].
 THINNEST = 2
 
@@ -47,18 +45,12 @@ def wall_thickness(turned: TurnedMap) -> WallThickness:
 
 def _thicknesses(free: BoolArray, known: BoolArray) -> IntArray:
     """Cells of wall by thickness, across the columns."""
-    rows, cols = free.shape
     right, left = wall_faces(free, known), wall_faces(free[:, ::-1], known[:, ::-1])[:, ::-1]
-    total = np.zeros((rows, cols + 1), dtype=np.int32)
-    np.cumsum(free, axis=1, out=total[:, 1:])
-    before, after = np.zeros_like(right), np.zeros_like(left)
-    before[:, CLEAR:] = total[:, CLEAR:] - total[:, :-CLEAR] == CLEAR
-    after[:, :-CLEAR] = total[:, CLEAR:] - total[:, :-CLEAR] == CLEAR
-    right, left = right & before, left & after
-    counts = np.zeros(THICKEST + 1, dtype=np.int64)
-    row, col = np.nonzero(right)
-    for thick in range(1, THICKEST + 1):
-        inside = col + thick <= cols
-        r, c = row[inside], col[inside]
-        counts[thick] = (left[r, c + thick] & (total[r, c + thick] == total[r, c])).sum()
-    return counts
+    # Runs of free cells from edge to edge; a wall lies between one and the next of its row.
+    padded = np.pad(free, ((0, 0), (1, 1)))
+    starts, ends = np.flatnonzero(padded[:, 1:] != padded[:, :-1]).reshape(-1, 2).T
+    clear = ends - starts >= CLEAR
+    before, after = clear[:-1] & right.ravel()[ends[:-1]], clear[1:] & left.ravel()[starts[1:]]
+    row = starts // right.shape[1]
+    thick = (starts[1:] - ends[:-1])[before & after & (row[1:] == row[:-1])]
+    return np.bincount(thick[thick <= THICKEST], minlength=THICKEST + 1)
