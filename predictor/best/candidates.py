@@ -35,6 +35,9 @@ FRONT = (4, 24)
 # 0.4 m before the room's own back.
 BESIDE, PASSED = 100, (30, 8)
 
+# So many walls of the other half are tried for each side.
+MIRRORED = 3
+
 FEATURES = (
     "log area",
     "log area squared",
@@ -71,10 +74,14 @@ FEATURES = (
     "passage end",
     "width seen",
     "depth seen",
+    "side mirrored",
+    "back mirrored",
+    "mirrored free",
 )
 
 
 NONE = np.zeros(0, dtype=np.int64)
+NOTHING = np.zeros((0, 0), dtype=np.bool_)
 UInt8Array = npt.NDArray[np.uint8]
 
 
@@ -93,7 +100,8 @@ class Evidence:
     Each is a table of edges, indexed [along, position], so that any stretch of a side costs four look-ups: v and u for
     left and right, u and v for the back. ``enclosed`` counts cells between known cells of their row or their column,
     ``taken`` those that a wall of the usual thickness around known space fills. ``seen`` is how usual each width and
-    depth is in the whole frame.
+    depth is in the whole frame. ``mirrored`` is ``same`` and ``mirrored_free`` the free cells of the other half of a
+    symmetric building, empty where there is none.
     """
 
     closed: dict[str, Table]
@@ -105,6 +113,8 @@ class Evidence:
     enclosed: Table
     taken: Table
     seen: dict[str, FloatArray]
+    mirrored: dict[str, Table]
+    mirrored_free: Table
 
 
 def sizes_seen(frame: DoorFrame) -> dict[str, FloatArray]:
@@ -135,7 +145,9 @@ def in_line(frame: DoorFrame, window: Window, side: str) -> Window:
     return window.grown(*((0, 2 * REACH) if side == "top" else (REACH, 0)), frame.known.shape)
 
 
-def gather(frame: DoorFrame, thickness: int, window: Window, seen: dict[str, FloatArray]) -> Evidence:
+def gather(
+    frame: DoorFrame, thickness: int, window: Window, seen: dict[str, FloatArray], twin: DoorFrame | None = None
+) -> Evidence:
     """Tables for the rectangles in a window of a frame.
 
     Args:
@@ -143,8 +155,9 @@ def gather(frame: DoorFrame, thickness: int, window: Window, seen: dict[str, Flo
         thickness: Usual thickness of walls [cells].
         window: Where the rectangles lie.
         seen: Of the whole frame, from :func:`sizes_seen`.
+        twin: The frame of the mirrored map where the building is symmetric.
     """
-    closed, sliver, gap, tight, same, outer = {}, {}, {}, {}, {}, {}
+    closed, sliver, gap, tight, same, outer, mirrored = {}, {}, {}, {}, {}, {}, {}
     for side, opposite in (("right", "left"), ("left", "right"), ("top", "bottom")):
         line = in_line(frame, window, side)
         # As far as anything is looked for behind a side: positions nearer to the edge are cut off again.
@@ -166,9 +179,12 @@ def gather(frame: DoorFrame, thickness: int, window: Window, seen: dict[str, Flo
         closed[side], sliver[side] = table(near), table(wide)
         tight[side] = table(_blurred(shifted, 3))
         same[side] = table(_blurred(own, 2))
+        if twin is not None:
+            mirrored[side] = table(_blurred(_canonical(twin.faces(side, wide_line), side), 2))
     enclosed = integral(_enclosed(frame, window), window.v0, window.u0)
     taken = integral(frame.taken(window), window.v0, window.u0)
-    return Evidence(closed, sliver, gap, tight, same, outer, enclosed, taken, seen)
+    theirs = integral(twin.free[window.of] if twin is not None else NOTHING, window.v0, window.u0)
+    return Evidence(closed, sliver, gap, tight, same, outer, enclosed, taken, seen, mirrored, theirs)
 
 
 def _enclosed(frame: DoorFrame, window: Window) -> BoolArray:
@@ -353,6 +369,8 @@ def _positions(
     strength = total(evidence.same[side], along) + total(evidence.tight[side], along)
     strength += 2.0 * (total(evidence.same[side], near) + total(evidence.tight[side], near))
     found = _peaks(positions, strength, keep)
+    if evidence.mirrored:
+        found += _peaks(positions, total(evidence.mirrored[side], near), MIRRORED, least=20.0)
     extra: list[float] = [float(at) for at in also]
     # Where known space begins, less a wall.
     share = total(evidence.closed[side], near) / max(near[1] - near[0], 1)
@@ -453,6 +471,13 @@ def describe(frame: DoorFrame, evidence: Evidence, entry: Entry, thickness: int,
     columns["front closed"] = (running[np.clip(u1, 0, last)] - running[np.clip(u0, 0, last)]) / width
     columns["beyond front"] = (np.maximum(entry.front[0] - u0, 0) + np.maximum(u1 - entry.front[1], 0)) / width
     columns["sticks out"] = _sticks_out(evidence, boxes)
+    # Where the building is symmetric: sides where the other half shows walls, and space that is free there.
+    columns["side mirrored"] = columns["back mirrored"] = np.zeros(len(boxes))
+    if evidence.mirrored:
+        right, left = (evidence.mirrored[side].stretch(at, v0, v1) for side, at in (("right", u1), ("left", u0)))
+        columns["side mirrored"] = (right + left) / depth
+        columns["back mirrored"] = evidence.mirrored["top"].stretch(v1, u0, u1) / width
+    columns["mirrored free"] = evidence.mirrored_free.count(v0, u0, v1, u1) / (width * depth)
     return np.stack([columns[name] for name in FEATURES], axis=-1)
 
 

@@ -20,6 +20,7 @@ from closedrooms.predictor.best.entry import Facing, enter
 from closedrooms.predictor.best.frame import DoorFrame, TurnedMap, Window, door_frame
 from closedrooms.predictor.best.joint import SHORTLIST, Suspect
 from closedrooms.predictor.best.shared import between, spans
+from closedrooms.predictor.best.symmetry import mirrored
 from closedrooms.predictor.best.weights import SIDE_WEIGHTS, weights_of
 
 # Narrowest and widest, shallowest and deepest room [cells]: 0.8 m to 24 m.
@@ -52,6 +53,7 @@ def suspect(turned: dict[float, TurnedMap], facings: list[Facing], thickness: in
     """
     alone: dict[int, Suspect] = {}
     shared: dict[tuple[int, int], Suspect] = {}
+    twins = {angle: mirrored(whole) for angle, whole in turned.items()}
     for angle, quarter in sorted({(facing.angle, facing.quarter) for facing in facings}):
         frame = door_frame(turned[angle], quarter, thickness)
         here = [i for i, facing in enumerate(facings) if (facing.angle, facing.quarter) == (angle, quarter)]
@@ -61,7 +63,9 @@ def suspect(turned: dict[float, TurnedMap], facings: list[Facing], thickness: in
             left, right = entries[i][0], entries[j][0]
             if left.right == right.u and right.left == left.u:
                 rooms[i, j] = between(left, right)
-        for doors, found in _propose_all(frame, rooms, thickness).items():
+        whole = twins[angle]
+        twin = None if whole is None else door_frame(whole, quarter, thickness)
+        for doors, found in _propose_all(frame, twin, rooms, thickness).items():
             across = entries[doors[0]][1]
             if len(doors) == 1:
                 alone[doors[0]] = _suspect(found, rooms[doors], across, frame, turned[angle], quarter)
@@ -75,13 +79,13 @@ def suspect(turned: dict[float, TurnedMap], facings: list[Facing], thickness: in
 
 
 def _propose_all(
-    frame: DoorFrame, rooms: dict[tuple[int, ...], Entry], thickness: int
+    frame: DoorFrame, twin: DoorFrame | None, rooms: dict[tuple[int, ...], Entry], thickness: int
 ) -> dict[tuple[int, ...], Candidates]:
     """Rectangles of every room in a frame, window by window: one window's tables are in memory at a time."""
     seen = sizes_seen(frame)
     found: dict[tuple[int, ...], Candidates] = {}
     for window, doors in _windows(frame, rooms):
-        evidence = gather(frame, thickness, window, seen)
+        evidence = gather(frame, thickness, window, seen, twin)
         found |= {key: propose(frame, evidence, rooms[key], thickness, LIMITS) for key in doors}
         del evidence
     return {key: found[key] for key in rooms}
