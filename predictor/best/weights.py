@@ -6,7 +6,8 @@ weights of a log-linear model that expects the largest IoU (L-BFGS, ridge of 0.1
 0.3 with the previous weights, which were tuned on all 88 of the authors' maps and 18 other plans, then coordinate
 search on the IoU after the joint choice. Those maps are therefore in sample; docs/prediction-failures.md gives the
 figures with whole buildings held out. The three of symmetric buildings were set by hand, with one of the authors'
-buildings in view; halves and doubles were tried on 55 maps of other floors. Features are shares or logarithms, so that weights have no unit.
+buildings in view; halves and doubles of them were tried on 55 maps of other floors. Features are shares or logarithms,
+so that weights have no unit.
 """
 
 from closedrooms.core.arrays import FloatArray
