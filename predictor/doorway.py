@@ -80,7 +80,7 @@ class Doorway:
         whole = room.union(self.stretch(self.leaf, float(np.median(begins)) + step))
         whole = whole.buffer(SAME, join_style="mitre").buffer(-SAME, join_style="mitre")
         parts = [part for part in shapely.get_parts(whole).tolist() if isinstance(part, Polygon)]
-        return Polygon(max(parts, key=lambda part: part.area).exterior)
+        return max(parts, key=lambda part: part.area)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -89,3 +89,11 @@ def test_a_room_far_behind_its_door_or_beside_it_stays_as_it_is() -> None:
     doorway = Doorway(np.zeros(2), np.array([1.0, 0.0]), np.array([0.0, 1.0]), -0.4, 0.4, 0.0, -0.1)
     for room in (box(-2.0, 1.5, 2.0, 4.0), box(0.2, 0.1, 3.0, 4.0)):
         assert doorway.joined(room, 0.05) is room
+
+
+def test_a_pillar_in_a_room_stays_a_hole_in_it() -> None:
+    doorway = Doorway(np.zeros(2), np.array([1.0, 0.0]), np.array([0.0, 1.0]), -0.4, 0.4, 0.0, -0.1)
+    room = box(-2.0, 0.2, 2.0, 4.0).difference(box(0.5, 2.0, 1.0, 2.5))
+    whole = doorway.joined(room, 0.05)
+    assert len(whole.interiors) == 1
+    assert whole.area == pytest.approx(room.area + 0.8 * 0.2, abs=0.01)
