@@ -65,11 +65,15 @@ def _flip(source: BoolArray, target: BoolArray, total: int) -> None:
 def find_axis(free: BoolArray, known: BoolArray) -> Axis | None:
     """The axis across the columns about which the faces of walls are symmetric.
 
-    Faces that run along the columns decide: those along the rows have a counterpart about any axis.
+    Faces along the axis and faces across it are counted apart, and the fewer counterparts decide: the walls of a
+    corridor alone are symmetric about any axis across it, its side walls about its own middle.
 
     Args:
-        free: Free cells.
-        known: Known cells.
+        free: Free cells, shape (rows, cols).
+        known: Known cells, of the same shape.
+
+    Returns:
+        ``None`` where no axis is clear.
     """
     from scipy import fft
 
