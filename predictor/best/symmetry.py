@@ -75,12 +75,10 @@ def find_axis(free: BoolArray, known: BoolArray) -> Axis | None:
     Returns:
         ``None`` where no axis is clear.
     """
-    from scipy import fft
-
-    size = fft.next_fast_len(2 * (free.shape[1] // BLOCK + 1), real=True)
+    size = cv2.getOptimalDFTSize(2 * (free.shape[1] // BLOCK + 1))
 
     def spectrum(mask: BoolArray) -> ComplexArray:
-        return np.asarray(fft.rfft(mask.astype(np.float32), size, axis=1))
+        return np.asarray(np.fft.rfft(mask.astype(np.float32), size, axis=1))
 
     # Faces across the axis have their counterpart facing the other way, those along it facing the same way.
     alike, seen, walls = np.zeros((2, size)), np.zeros((2, size)), np.zeros(2)
@@ -98,8 +96,8 @@ def find_axis(free: BoolArray, known: BoolArray) -> Axis | None:
         for family, pairs in enumerate((((0, 1), (1, 0)), ((2, 2), (3, 3)))):
             for one, other in pairs:
                 walls[family] += np.count_nonzero(faces[one])
-                alike[family] += fft.irfft((own[one] * others[other]).sum(axis=0), size)
-                seen[family] += fft.irfft((own[one] * place).sum(axis=0), size)
+                alike[family] += np.fft.irfft((own[one] * others[other]).sum(axis=0), size)
+                seen[family] += np.fft.irfft((own[one] * place).sum(axis=0), size)
     if not walls.all():
         return None
     share = np.where(seen >= KNOWN * walls[:, None], alike / np.maximum(seen, 1.0), 0.0).min(axis=0)
