@@ -116,29 +116,8 @@ class DoorFrame:
     extent: Window
 
     def faces(self, side: str, window: Window) -> BoolArray:
-        """Edges of a window where a wall face was seen.
-
-        Args:
-            side: ``right`` has free space left of the edge and wall right of it, ``left`` the reverse, ``top`` free
-                space below, ``bottom`` above.
-            window: Where.
-
-        Returns:
-            One more column than the window for left and right, one more row for top and bottom.
-        """
-        upright = side in {"left", "right"}
-        free, known = (mask if upright else mask.T for mask in (self.free, self.known))
-        low, high, first, last = (window.v0, window.v1, window.u0, window.u1)
-        if not upright:
-            low, high, first, last = (first, last, low, high)
-        start, end = max(first - FACE_DEPTH - 1, 0), min(last + FACE_DEPTH + 1, free.shape[1])
-        free, known = free[low:high, start:end], known[low:high, start:end]
-        if side in {"left", "bottom"}:
-            found = wall_faces(free[:, ::-1], known[:, ::-1])[:, ::-1]
-        else:
-            found = wall_faces(free, known)
-        found = found[:, first - start : last - start + 1]
-        return found if upright else found.T
+        """Edges of a window where a wall face was seen, see :func:`faces_of`."""
+        return faces_of(self.free, self.known, side, window)
 
     def taken(self, window: Window) -> BoolArray:
         """Cells of a window that a wall of the usual thickness around known space fills."""
@@ -250,6 +229,34 @@ def laid_out(mask: BoolArray) -> BoolArray:
         return np.ascontiguousarray(mask)
     # Three times as quick as numpy.
     return np.asarray(cv2.transpose(np.ascontiguousarray(mask.T).view(np.uint8))).view(np.bool_)
+
+
+def faces_of(free: BoolArray, known: BoolArray, side: str, window: Window) -> BoolArray:
+    """Edges of a window of a raster where a wall face was seen.
+
+    Args:
+        free: Free cells of the whole raster.
+        known: Cells free or occupied.
+        side: ``right`` has free space left of the edge and wall right of it, ``left`` the reverse, ``top`` free
+            space below, ``bottom`` above.
+        window: Where.
+
+    Returns:
+        One more column than the window for left and right, one more row for top and bottom.
+    """
+    upright = side in {"left", "right"}
+    low, high, first, last = (window.v0, window.v1, window.u0, window.u1)
+    if not upright:
+        free, known = free.T, known.T
+        low, high, first, last = (first, last, low, high)
+    start, end = max(first - FACE_DEPTH - 1, 0), min(last + FACE_DEPTH + 1, free.shape[1])
+    free, known = free[low:high, start:end], known[low:high, start:end]
+    if side in {"left", "bottom"}:
+        found = wall_faces(free[:, ::-1], known[:, ::-1])[:, ::-1]
+    else:
+        found = wall_faces(free, known)
+    found = found[:, first - start : last - start + 1]
+    return found if upright else found.T
 
 
 def wall_faces(free: BoolArray, known: BoolArray) -> BoolArray:

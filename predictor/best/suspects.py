@@ -53,7 +53,7 @@ def suspect(turned: dict[float, TurnedMap], facings: list[Facing], thickness: in
     """
     alone: dict[int, Suspect] = {}
     shared: dict[tuple[int, int], Suspect] = {}
-    twins = {angle: mirrored(whole) for angle, whole in turned.items()}
+    twins = {angle: mirrored(turned[angle]) for angle in {facing.angle for facing in facings}}
     for angle, quarter in sorted({(facing.angle, facing.quarter) for facing in facings}):
         frame = door_frame(turned[angle], quarter, thickness)
         here = [i for i, facing in enumerate(facings) if (facing.angle, facing.quarter) == (angle, quarter)]

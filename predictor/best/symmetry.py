@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray
-from closedrooms.predictor.best.frame import FACE_DEPTH, STRIP, TurnedMap, laid_out, wall_faces
+from closedrooms.predictor.best.frame import STRIP, TurnedMap, Window, faces_of
 
 # Faces are counted in blocks of so many cells [cells], 0.1 m, and mirrored onto each other within one block.
 BLOCK = 2
@@ -83,16 +83,14 @@ def find_axis(free: BoolArray, known: BoolArray) -> Axis | None:
     # Faces across the axis have their counterpart facing the other way, those along it facing the same way.
     alike, seen, walls = np.zeros((2, size)), np.zeros((2, size)), np.zeros(2)
     for first in range(0, len(free), STRIP):
-        rows = slice(max(first - FACE_DEPTH - 1, 0), first + STRIP + FACE_DEPTH + 1)
-        inside, around = laid_out(free[rows]), laid_out(known[rows])
-        cut = slice(first - rows.start, first - rows.start + min(STRIP, len(free) - first))
-        right = wall_faces(inside[cut], around[cut])
-        left = wall_faces(inside[cut, ::-1], around[cut, ::-1])[:, ::-1]
-        top = wall_faces(laid_out(inside.T), laid_out(around.T)).T[:-1][cut]
-        bottom = wall_faces(laid_out(inside[::-1].T), laid_out(around[::-1].T)).T[::-1][:-1][cut]
-        place = spectrum(_blocks(np.pad(around[cut], ((0, 0), (0, 1)))))
-        faces = [_blocks(edges) for edges in (right, left, top, bottom)]
-        own, others = [spectrum(edges) for edges in faces], [spectrum(_wide(edges)) for edges in faces]
+        strip = Window(first, 0, min(first + STRIP, len(free)), free.shape[1])
+        place = spectrum(_blocks(np.pad(known[strip.of], ((0, 0), (0, 1)))))
+        # Of edges between rows those below each cell.
+        edges = [
+            faces_of(free, known, side, strip)[: strip.v1 - strip.v0] for side in ("right", "left", "top", "bottom")
+        ]
+        faces = [_blocks(found) for found in edges]
+        own, others = [spectrum(found) for found in faces], [spectrum(_wide(found)) for found in faces]
         for family, pairs in enumerate((((0, 1), (1, 0)), ((2, 2), (3, 3)))):
             for one, other in pairs:
                 walls[family] += np.count_nonzero(faces[one])
@@ -112,10 +110,8 @@ def _refined(free: BoolArray, known: BoolArray, total: int) -> int:
     """The place of an axis to the cell."""
     counts = dict.fromkeys(range(total - BLOCK, total + 2 * BLOCK + 1), 0)
     for first in range(0, len(free), STRIP):
-        rows = slice(first, first + STRIP)
-        inside, around = laid_out(free[rows]), laid_out(known[rows])
-        right = wall_faces(inside, around)
-        left = wall_faces(inside[:, ::-1], around[:, ::-1])[:, ::-1]
+        strip = Window(first, 0, min(first + STRIP, len(free)), free.shape[1])
+        right, left = (faces_of(free, known, side, strip) for side in ("right", "left"))
         for at in counts:
             counterpart = np.zeros_like(left)
             # Edges, of which there is one more than cells.
