@@ -31,12 +31,12 @@ from typing import Any
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
 from closedrooms.core.geojson import read_rooms
-from closedrooms.pipeline.metrics import mean, room_iou
+from closedrooms.pipeline.scores import mean, room_iou
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.geometry import wall_area
 from closedrooms.worlds.library import load_world
 
-PROGRAM = (sys.executable, "-c", "import sys; from closedrooms.pipeline.commands import main; sys.exit(main())")
+PROGRAM = (sys.executable, "-c", "import sys; from closedrooms.cli.commands import main; sys.exit(main())")
 HEAD = (
     "floor", "size [m]", "rooms", "closed", "area mapped [%]", "doors seen", "ATE [m]", "IoU best", "IoU paper",
     "tour error closed / baseline / predicted [%]", "simulated [s]", "wall [s]", "CPU [s]", "peak [MB]", "remark",

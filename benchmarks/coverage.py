@@ -21,13 +21,13 @@ from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.core.random import stream
 from closedrooms.core.rosmap import read_map
-from closedrooms.coverage.blocks import metric
-from closedrooms.coverage.build import build_graph
+from closedrooms.coverage.biconnected import metric
 from closedrooms.coverage.config import CoverageConfig, TourConfig
-from closedrooms.coverage.cover import solve_tour
-from closedrooms.coverage.freespace import clean_free_space
+from closedrooms.coverage.free_space import clean_free_space
 from closedrooms.coverage.graph import TopologicalGraph
+from closedrooms.coverage.graph_builder import build_graph
 from closedrooms.coverage.skeleton import thin, trace_skeleton
+from closedrooms.coverage.tour_planner import solve_tour
 
 SIZES = ((40.0, 30.0), (100.0, 75.0), (200.0, 150.0))
 

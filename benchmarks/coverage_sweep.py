@@ -3,7 +3,7 @@
     python benchmarks/coverage_sweep.py --out DIR [WORLD ...] [--seeds 3] [--noise medium] [--picture PNG]
 
 Every world is explored once a seed with all doors open; the maps with a third, two thirds and all of the closable doors
-closed are redrawn from it (``closedrooms.pipeline.dataset``). Rows go to ``DIR/sweep.csv`` as they come; what stands
+closed are redrawn from it (``closedrooms.experiments.dataset``). Rows go to ``DIR/sweep.csv`` as they come; what stands
 there is not done again. One process.
 """
 
@@ -19,13 +19,14 @@ import numpy as np
 from closedrooms.core.geojson import write_doors
 from closedrooms.core.random import stream
 from closedrooms.core.rosmap import write_map
-from closedrooms.coverage.cover import plan_coverage
 from closedrooms.coverage.estimates import errors_of_lengths
 from closedrooms.coverage.tour import CoverageTour
-from closedrooms.mapping.config import MapperConfig, NavigationConfig
-from closedrooms.pipeline.dataset.erase import Eraser
-from closedrooms.pipeline.dataset.open_survey import survey_open
-from closedrooms.pipeline.metrics import mean, room_iou, rooms_seen
+from closedrooms.coverage.tour_planner import plan_coverage
+from closedrooms.experiments.dataset.erase import Eraser
+from closedrooms.experiments.dataset.open_survey import survey_open
+from closedrooms.mapping.config import MapperConfig
+from closedrooms.navigation.config import NavigationConfig
+from closedrooms.pipeline.scores import mean, room_iou, rooms_seen
 from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.predict import predict
 from closedrooms.sim.config import SimConfig, noise_level

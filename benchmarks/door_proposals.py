@@ -21,8 +21,8 @@ import numpy as np
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.geojson import read_doors
 from closedrooms.core.rosmap import read_map
-from closedrooms.mapping.proposals import SMOOTH, DoorProposal, propose_doors
-from closedrooms.mapping.proposals_config import ProposalConfig
+from closedrooms.predictor.structure.door_proposal_config import ProposalConfig
+from closedrooms.predictor.structure.door_proposals import SMOOTH, DoorProposal, propose_doors
 
 THRESHOLDS = (0.1, 0.3, 0.5, 0.7, 0.9)
 

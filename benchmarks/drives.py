@@ -67,7 +67,7 @@ def montage(folders: list[Path], picture: Path, *, width: int = 760) -> None:
     """The pictures of the driven ways, two in a row."""
     from PIL import Image, ImageDraw
 
-    from closedrooms.pipeline.canvas import font
+    from closedrooms.visualization.canvas import font
 
     tiles = []
     for folder in folders:

@@ -16,13 +16,13 @@ import numpy as np
 
 from closedrooms.core.geojson import read_doors, read_rooms
 from closedrooms.core.rosmap import read_map
+from closedrooms.experiments.dataset.config import DatasetConfig, MapSource
+from closedrooms.experiments.dataset.sample import Outcome, Task, make
+from closedrooms.experiments.dataset.variants import Variant, find_variants, find_worlds
+from closedrooms.experiments.evaluation.scores import iou
+from closedrooms.experiments.workers import Crew
 from closedrooms.pipeline.config import named_noise
-from closedrooms.pipeline.dataset.config import DatasetConfig, MapSource
-from closedrooms.pipeline.dataset.sample import Outcome, Task, make
-from closedrooms.pipeline.dataset.variants import Variant, find_variants, find_worlds
-from closedrooms.pipeline.evaluation.scores import iou
-from closedrooms.pipeline.metrics import room_iou
-from closedrooms.pipeline.workers import Crew
+from closedrooms.pipeline.scores import room_iou
 from closedrooms.predictor.config import preset
 from closedrooms.predictor.predict import predict
 

@@ -9,13 +9,14 @@ end, trajectory error, doors seen, and milliseconds a scan for sensing, mapping 
 import argparse
 
 from closedrooms.core.random import stream
-from closedrooms.mapping.config import MapperConfig, NavigationConfig
+from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import ate
-from closedrooms.pipeline.explore import explore
-from closedrooms.pipeline.metrics import area_mapped
-from closedrooms.pipeline.terminal import Silent
-from closedrooms.pipeline.witness import Witness
+from closedrooms.navigation.config import NavigationConfig
+from closedrooms.navigation.exploration import explore
+from closedrooms.pipeline.progress import Silent
+from closedrooms.pipeline.run_log import Witness
+from closedrooms.pipeline.scores import area_mapped
 from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.closing import closable_rooms, draw_closed

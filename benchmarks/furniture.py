@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from closedrooms.core.random import stream
+from closedrooms.experiments.dataset.erase import Eraser
+from closedrooms.experiments.robustness.drives import furnished, map_drive, record_drive
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.navigation_config import NavigationConfig
-from closedrooms.pipeline.dataset.erase import Eraser
-from closedrooms.pipeline.metrics import room_iou
-from closedrooms.pipeline.robustness.drives import furnished, map_drive, record_drive
+from closedrooms.navigation.config import NavigationConfig
+from closedrooms.pipeline.scores import room_iou
 from closedrooms.pipeline.survey import true_building
 from closedrooms.predictor.config import PredictorConfig, preset
 from closedrooms.predictor.predict import predict

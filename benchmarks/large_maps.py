@@ -25,7 +25,7 @@ from closedrooms.core.geojson import read_doors, write_doors
 from closedrooms.core.grid import UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.rosmap import read_map, write_map
 from closedrooms.predictor.config import PresetName, Structure
-from closedrooms.predictor.window import known_window
+from closedrooms.predictor.structure.known_window import known_window
 
 RESOLUTION = 0.05
 METHODS: dict[str, tuple[PresetName, Structure]] = {
@@ -89,7 +89,7 @@ def only(method: str, folder: Path) -> None:
     """Predict by one method and say what it took."""
     if method in METHODS:
         from closedrooms.pipeline.config import PredictConfig
-        from closedrooms.pipeline.predict_map import predict_map
+        from closedrooms.pipeline.predict import predict_map
 
         preset, structure = METHODS[method]
         files = {"map": folder / "map.yaml", "doors": folder / "doors.geojson", "out": folder / method}

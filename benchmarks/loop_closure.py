@@ -19,15 +19,16 @@ import numpy as np
 
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
-from closedrooms.mapping.config import LoopConfig, MapperConfig, NavigationConfig
+from closedrooms.mapping.config import LoopConfig, MapperConfig
+from closedrooms.mapping.logs.npz import write_scans
+from closedrooms.mapping.logs.recorded_run import RecordedRun, read_run
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.mapping.recorded import RecordedRun, read_run
-from closedrooms.mapping.scanfile import write_scans
 from closedrooms.mapping.trajectory import ate
-from closedrooms.pipeline.explore import explore
-from closedrooms.pipeline.metrics import area_mapped
-from closedrooms.pipeline.terminal import Silent
-from closedrooms.pipeline.witness import Witness
+from closedrooms.navigation.config import NavigationConfig
+from closedrooms.navigation.exploration import explore
+from closedrooms.pipeline.progress import Silent
+from closedrooms.pipeline.run_log import Witness
+from closedrooms.pipeline.scores import area_mapped
 from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.closing import closable_rooms, draw_closed

@@ -23,13 +23,13 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.mapping.beams import clean, hit_points, thin
 from closedrooms.mapping.config import LoopConfig, MapperConfig
-from closedrooms.mapping.evidence import EvidenceGrid
-from closedrooms.mapping.likelihood import LikelihoodField
+from closedrooms.mapping.gauss_newton_matcher import refine
+from closedrooms.mapping.likelihood_field import LikelihoodField
+from closedrooms.mapping.log_odds_grid import EvidenceGrid
+from closedrooms.mapping.logs.recorded_run import RecordedRun, read_run
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.mapping.posegraph import Edge, Solution, optimise
-from closedrooms.mapping.recorded import RecordedRun, read_run
-from closedrooms.mapping.refinement import refine
-from closedrooms.mapping.sweeps import sweeps
+from closedrooms.mapping.pose_graph import Edge, Solution, optimise
+from closedrooms.mapping.scan_preparation import sweeps
 from closedrooms.mapping.trajectory import ate
 
 WITHOUT_LOOPS = MapperConfig(loops=LoopConfig(enabled=False))
@@ -126,7 +126,7 @@ def kiss(run: RecordedRun) -> FloatArray:
 
 
 def gtsam_optimise(poses: FloatArray, edges: list[Edge], *, kernel: float, iterations: int = 20) -> Solution:
-    """What :func:`closedrooms.mapping.posegraph.optimise` does, by gtsam's Levenberg-Marquardt."""
+    """What :func:`closedrooms.mapping.pose_graph.optimise` does, by gtsam's Levenberg-Marquardt."""
     import gtsam
 
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()

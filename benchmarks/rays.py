@@ -17,9 +17,9 @@ from closedrooms.core.pose import Pose2
 from closedrooms.sim.building import building_solids
 from closedrooms.sim.config import LidarConfig, SimConfig, noise_level
 from closedrooms.sim.lidar import Lidar
-from closedrooms.sim.physics import EVERYTHING, PhysicsWorld
+from closedrooms.sim.physics_world import EVERYTHING, PhysicsWorld
 from closedrooms.sim.simulation import Simulation
-from closedrooms.worlds.extrude import extrude
+from closedrooms.worlds.extrusion import extrude
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom, Wall
 

@@ -31,10 +31,10 @@ from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.grid import OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.core.rosmap import read_map
-from closedrooms.pipeline.evaluation.scores import iou, room_masks
-from closedrooms.predictor.clutter import filter_clutter
+from closedrooms.experiments.evaluation.scores import iou, room_masks
 from closedrooms.predictor.config import PredictorConfig, preset
 from closedrooms.predictor.predict import predict
+from closedrooms.predictor.structure.clutter import filter_clutter
 
 Pixel = tuple[int, int]
 Gap = tuple[Pixel, Pixel]

@@ -27,7 +27,7 @@ from closedrooms.core.rosmap import read_map
 from closedrooms.predictor.config import preset
 from closedrooms.predictor.predict import predict
 from closedrooms.predictor.prediction import Shape
-from closedrooms.predictor.window import known_window
+from closedrooms.predictor.structure.known_window import known_window
 
 METHODS = {
     "paper": preset("paper"),

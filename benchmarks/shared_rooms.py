@@ -23,15 +23,15 @@ from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyG
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
 from closedrooms.core.room import Room
-from closedrooms.pipeline.metrics import room_iou
-from closedrooms.pipeline.robustness.doors import true_doors
-from closedrooms.predictor.best import shared
+from closedrooms.experiments.robustness.door_noise import true_doors
+from closedrooms.pipeline.scores import room_iou
+from closedrooms.predictor.best import shared_rooms as shared
 from closedrooms.predictor.config import preset
 from closedrooms.predictor.predict import predict
 from closedrooms.worlds.closing import closable_rooms, draw_closed
 from closedrooms.worlds.library import bundled_names, load_world
 from closedrooms.worlds.plan import FloorPlan
-from closedrooms.worlds.start import start_pose
+from closedrooms.worlds.start_pose import start_pose
 from closedrooms.worlds.truth import reachable, true_rooms, truth_bounds
 
 HERE = Pose2()

@@ -39,7 +39,7 @@ def coverage_errors(
         predicted: Tour on M_pred.
         truth: Tour on M_GT.
         n_rooms: |R|, the rooms that the robot observed: true rooms seen where truth is known, else
-            :func:`closedrooms.coverage.rooms.count_rooms` of M. At least 1: a map that holds a tour holds a room.
+            :func:`closedrooms.coverage.room_count.count_rooms` of M. At least 1: a map that holds a tour holds a room.
         n_doors: |D|, the closed doors in M.
 
     Raises:

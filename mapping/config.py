@@ -3,9 +3,6 @@
 from dataclasses import dataclass, field
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.mapping.navigation_config import NavigationConfig
-
-__all__ = ["LoopConfig", "MapperConfig", "MatcherConfig", "NavigationConfig"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,16 +12,16 @@ from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.beams import clean, hit_points, thin
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.doors import fuse_doors
-from closedrooms.mapping.evidence import EvidenceGrid
-from closedrooms.mapping.growing import GrowingArray
+from closedrooms.mapping.door_fusion import fuse_doors
+from closedrooms.mapping.gauss_newton_matcher import refine
+from closedrooms.mapping.growing_array import GrowingArray
 from closedrooms.mapping.keyframe import Keyframe
-from closedrooms.mapping.localmap import LocalMap
-from closedrooms.mapping.loops import Loop, find_loop
-from closedrooms.mapping.matcher import Motion, match_scan
-from closedrooms.mapping.posegraph import Edge, PoseGraph, optimise
-from closedrooms.mapping.refinement import refine
-from closedrooms.mapping.sweeps import Sweep
+from closedrooms.mapping.local_map import LocalMap
+from closedrooms.mapping.log_odds_grid import EvidenceGrid
+from closedrooms.mapping.loop_closure import Loop, find_loop
+from closedrooms.mapping.pose_graph import Edge, PoseGraph, optimise
+from closedrooms.mapping.scan_matcher import Motion, match_scan
+from closedrooms.mapping.scan_preparation import Sweep
 
 MOVED = (0.015, 0.003)
 """Correction of a keyframe ([m], [rad]) beyond which it is drawn anew."""

@@ -9,7 +9,7 @@ import tyro
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.navigation_config import NavigationConfig
+from closedrooms.navigation.config import NavigationConfig
 from closedrooms.predictor.config import Phi, PredictorConfig, PresetName, Structure
 from closedrooms.sim.config import LidarConfig, NoiseConfig, SimConfig, lidar_preset, noise_level
 

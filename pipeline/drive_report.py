@@ -11,8 +11,8 @@ from closedrooms.core.geojson import Feature
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.coverage.tour import CoverageTour
-from closedrooms.pipeline.drive import DriveResult
-from closedrooms.pipeline.metrics import area_mapped, mean, room_iou
+from closedrooms.navigation.drive import DriveResult
+from closedrooms.pipeline.scores import area_mapped, mean, room_iou
 
 
 def drive_metrics(
@@ -87,8 +87,8 @@ def draw_drive(path: Path, drive: DriveResult, truth_rooms: Sequence[Room]) -> N
         OutputError: The folder cannot be written.
     """
     from closedrooms.core.files import write_bytes
-    from closedrooms.pipeline import colours
-    from closedrooms.pipeline.canvas import Canvas
+    from closedrooms.visualization import colours
+    from closedrooms.visualization.canvas import Canvas
 
     grid = drive.prediction.grid
     window = grid.known_bounds()

@@ -13,28 +13,28 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
 from closedrooms.core.rosmap import write_map
 from closedrooms.core.tum import write_trajectory
-from closedrooms.coverage.cover import plan_coverage
 from closedrooms.coverage.estimates import coverage_errors
-from closedrooms.coverage.features import tour_features
 from closedrooms.coverage.tour import CoverageTour
+from closedrooms.coverage.tour_features import tour_features
+from closedrooms.coverage.tour_planner import plan_coverage
+from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.mapping.scanfile import write_scans
 from closedrooms.mapping.trajectory import ate
+from closedrooms.navigation.drive import DriveResult, drive
+from closedrooms.navigation.exploration import ExplorationResult
+from closedrooms.navigation.observer import Observer
 from closedrooms.pipeline.config import RunConfig, predictor_config, sim_config
-from closedrooms.pipeline.drive import DriveResult, drive
 from closedrooms.pipeline.drive_report import draw_drive, drive_features, drive_metrics
-from closedrooms.pipeline.explore import ExplorationResult
 from closedrooms.pipeline.manifest import resolved, versions
-from closedrooms.pipeline.metrics import area_mapped, mean, room_iou, rooms_seen
-from closedrooms.pipeline.observer import Observer
-from closedrooms.pipeline.recording.opening import open_recording
+from closedrooms.pipeline.progress import Progress, Silent
+from closedrooms.pipeline.run_log import Witness
+from closedrooms.pipeline.scores import area_mapped, mean, room_iou, rooms_seen
 from closedrooms.pipeline.stopwatch import Stopwatch
 from closedrooms.pipeline.survey import Survey, Truth, survey_building, true_building
-from closedrooms.pipeline.terminal import Progress, Silent
-from closedrooms.pipeline.witness import Witness
 from closedrooms.predictor.predict import predict
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.sim.simulation import Simulation
+from closedrooms.visualization.rerun.opening import open_recording
 from closedrooms.worlds.closing import check_closed, closable_rooms, draw_closed
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan
@@ -295,7 +295,7 @@ def _write(
     driven: DriveResult | None,
 ) -> None:
     """Every data file of the run directory, then the picture."""
-    from closedrooms.pipeline.picture import draw_summary
+    from closedrooms.visualization.summary import draw_summary
 
     write_map(folder / "map", survey.grid)
     write_map(folder / "predicted", prediction.grid)

@@ -9,12 +9,12 @@ from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.mapping.navigation_config import NavigationConfig
-from closedrooms.pipeline.explore import ExplorationResult, explore
-from closedrooms.pipeline.observer import NoObserver, Observer
+from closedrooms.navigation.config import NavigationConfig
+from closedrooms.navigation.exploration import ExplorationResult, explore
+from closedrooms.navigation.observer import NoObserver, Observer
+from closedrooms.pipeline.progress import Progress, Silent
+from closedrooms.pipeline.run_log import Witness
 from closedrooms.pipeline.stopwatch import Stopwatch
-from closedrooms.pipeline.terminal import Progress, Silent
-from closedrooms.pipeline.witness import Witness
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.truth import rasterise, true_rooms, truth_bounds
 

@@ -10,11 +10,11 @@ from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.predictor.arrangement import joined
 from closedrooms.predictor.config import PredictorConfig
-from closedrooms.predictor.inpaint import inpaint, passage
+from closedrooms.predictor.inpainting import inpaint, passage
+from closedrooms.predictor.paper.arrangement import joined
+from closedrooms.predictor.paper.initial_layouts import Start, Started, start_rooms
 from closedrooms.predictor.prediction import Prediction, Shape
-from closedrooms.predictor.start import Start, Started, start_rooms
 
 # Rays a baseline casts around a door: half a degree, 0.17 m apart at 20 m.
 RAYS = 720

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.config import PredictorConfig
-from closedrooms.predictor.expansion import Growth, expand
-from closedrooms.predictor.inpaint import inpaint
-from closedrooms.predictor.joint import swap_faces
+from closedrooms.predictor.inpainting import inpaint
+from closedrooms.predictor.paper.expansion import Growth, expand
+from closedrooms.predictor.paper.face_swaps import swap_faces
+from closedrooms.predictor.paper.finished_rooms import finish_rooms
+from closedrooms.predictor.paper.initial_layouts import Started, start_rooms
+from closedrooms.predictor.paper.trace import level_of, trace_of
 from closedrooms.predictor.prediction import Level, Prediction
-from closedrooms.predictor.rooms import finish_rooms
-from closedrooms.predictor.start import Started, start_rooms
-from closedrooms.predictor.trace import level_of, trace_of
 
 
 def predict(
@@ -45,7 +45,7 @@ def predict(
             in; a completed map of too many cells, where those of the input are tiny.
     """
     if config.preset == "best":
-        from closedrooms.predictor.best.solve import predict_best
+        from closedrooms.predictor.best.method import predict_best
 
         return predict_best(grid, doors, config, trace)
     wanted = config.keep_trace if trace is None else trace

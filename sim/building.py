@@ -10,10 +10,10 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.sim.config import SimConfig
 from closedrooms.sim.contacts import Obstacles, edges_of, leaf_edges
-from closedrooms.sim.drive import Drive
-from closedrooms.sim.leaves import Leaf, door_leaves
-from closedrooms.sim.physics import MovingPart, PhysicsWorld, upright
-from closedrooms.worlds.extrude import extrude
+from closedrooms.sim.differential_drive import Drive
+from closedrooms.sim.door_leaves import Leaf, door_leaves
+from closedrooms.sim.physics_world import MovingPart, PhysicsWorld, upright
+from closedrooms.worlds.extrusion import extrude
 from closedrooms.worlds.geometry import areal, door_gap, wall_area
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
 

@@ -9,7 +9,7 @@ from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.random import stream
 from closedrooms.core.scan import LaserScan
 from closedrooms.sim.config import LidarConfig, NoiseConfig
-from closedrooms.sim.physics import PhysicsWorld
+from closedrooms.sim.physics_world import PhysicsWorld
 
 # A ray is first cast this much further than its neighbours went last time [share, m]; see ``Lidar.track``.
 FURTHER, MARGIN = 1.05, 0.2

@@ -15,13 +15,13 @@ from closedrooms.core.pose import Pose2
 from closedrooms.sim.building import Building, gap_from
 from closedrooms.sim.config import SimConfig
 from closedrooms.sim.contacts import SKIN
-from closedrooms.sim.drive import RAMP_SECONDS, Drive
+from closedrooms.sim.differential_drive import RAMP_SECONDS, Drive
 from closedrooms.sim.lidar import Lidar
 from closedrooms.sim.observation import Observation
 from closedrooms.sim.odometry import Odometry
-from closedrooms.sim.physics import PhysicsWorld
+from closedrooms.sim.physics_world import PhysicsWorld
 from closedrooms.worlds.plan import FloorPlan
-from closedrooms.worlds.start import start_pose
+from closedrooms.worlds.start_pose import start_pose
 
 
 class Simulation:

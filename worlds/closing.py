@@ -6,9 +6,9 @@ from collections.abc import Collection, Iterable
 import numpy as np
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.worlds.parts import connected_parts
+from closedrooms.worlds.connectivity import connected_parts
 from closedrooms.worlds.plan import FloorPlan
-from closedrooms.worlds.start import start_room
+from closedrooms.worlds.start_pose import start_room
 
 # How many orders are tried when rooms with several doors hinder each other.
 DRAWS = 32

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.worlds.passages import without_entrances
+from closedrooms.worlds.door_hinges import without_entrances
 from closedrooms.worlds.plan import FloorPlan
 
 # An office of about 40 x 30 m.
@@ -60,7 +60,7 @@ def load_world(name_or_path: str, *, level: str | None = None) -> FloorPlan:
 
 def read_world(name_or_path: str, *, level: str | None = None) -> FloorPlan:
     """As :func:`load_world`, entrances included."""
-    from closedrooms.worlds.jsonfile import read_plan
+    from closedrooms.worlds.formats.native import read_plan
 
     if name_or_path in bundled_names():
         _refuse_level(level, name_or_path)
@@ -101,13 +101,13 @@ def importer_of(path: Path) -> Importer:
 
 def importers() -> list[Importer]:
     """Every importer, the more specific ones first."""
-    from closedrooms.worlds.houseexpo import read_houseexpo
-    from closedrooms.worlds.jsonfile import read_plan
-    from closedrooms.worlds.kth import read_kth
-    from closedrooms.worlds.luperto import read_luperto
-    from closedrooms.worlds.pyrobosim import read_pyrobosim
-    from closedrooms.worlds.raster import read_raster
-    from closedrooms.worlds.rmf import read_rmf
+    from closedrooms.worlds.formats.houseexpo import read_houseexpo
+    from closedrooms.worlds.formats.kth import read_kth
+    from closedrooms.worlds.formats.luperto import read_luperto
+    from closedrooms.worlds.formats.native import read_plan
+    from closedrooms.worlds.formats.pyrobosim import read_pyrobosim
+    from closedrooms.worlds.formats.rmf import read_rmf
+    from closedrooms.worlds.formats.rosmap import read_raster
 
     return [
         Importer("picture", "a picture of a map (PNG or PGM)", _is_picture, lambda path, _: read_raster(path)),

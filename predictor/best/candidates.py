@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
-from closedrooms.predictor.best.frame import STRIP, DoorFrame, Table, Window, integral, laid_out
+from closedrooms.predictor.best.door_frame import STRIP, DoorFrame, Table, Window, integral, laid_out
 
 # Slack of a wall's thickness when known space is looked for behind it [cells].
 SLACK = 4

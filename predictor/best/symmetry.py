@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray
-from closedrooms.predictor.best.frame import STRIP, TurnedMap, Window, faces_of
+from closedrooms.predictor.best.door_frame import STRIP, TurnedMap, Window, faces_of
 
 # Faces are counted in blocks of so many cells [cells], 0.1 m, and mirrored onto each other within one block.
 BLOCK = 2

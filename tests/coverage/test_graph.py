@@ -9,10 +9,10 @@ from shapely.geometry import LineString
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import GridFrame, OccupancyGrid
-from closedrooms.coverage.build import build_graph
 from closedrooms.coverage.config import CoverageConfig, GraphConfig
-from closedrooms.coverage.freespace import clean_free_space
-from closedrooms.coverage.sight import is_clear
+from closedrooms.coverage.free_space import clean_free_space
+from closedrooms.coverage.graph_builder import build_graph
+from closedrooms.coverage.line_of_sight import is_clear
 
 
 def _blocked_edges(grid, graph):

@@ -7,12 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.coverage.bound import held_karp_bound
 from closedrooms.coverage.config import TourConfig
-from closedrooms.coverage.cover import solve_tour
 from closedrooms.coverage.graph import TopologicalGraph
-from closedrooms.coverage.localsearch import LocalSearch, search_tour
+from closedrooms.coverage.local_search import LocalSearch, search_tour
+from closedrooms.coverage.lower_bound import held_karp_bound
 from closedrooms.coverage.routing import christofides, tabu_search
+from closedrooms.coverage.tour_planner import solve_tour
 
 
 def _points(seed, n):

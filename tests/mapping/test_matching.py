@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import hit_points, thin
 from closedrooms.mapping.config import MatcherConfig
-from closedrooms.mapping.correlative import Search, Window, search_heading
-from closedrooms.mapping.likelihood import LikelihoodField
-from closedrooms.mapping.matcher import Motion, match_scan
-from closedrooms.mapping.refinement import refine
+from closedrooms.mapping.correlative_matcher import Search, Window, search_heading
+from closedrooms.mapping.gauss_newton_matcher import refine
+from closedrooms.mapping.likelihood_field import LikelihoodField
+from closedrooms.mapping.scan_matcher import Motion, match_scan
 
 
 def shape(n: int = 240) -> np.ndarray:

@@ -15,12 +15,13 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.core.scan import LaserScan
 from closedrooms.coverage.config import CoverageConfig
-from closedrooms.coverage.cover import plan_coverage
-from closedrooms.mapping.config import MapperConfig, NavigationConfig
+from closedrooms.coverage.tour_planner import plan_coverage
+from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.pipeline.drive import DriveResult, drive
+from closedrooms.navigation.config import NavigationConfig
+from closedrooms.navigation.drive import DriveResult, drive
 from closedrooms.predictor.config import PredictorConfig
-from closedrooms.predictor.inpaint import inpaint
+from closedrooms.predictor.inpainting import inpaint
 from closedrooms.predictor.prediction import Prediction
 
 RESOLUTION, BEAMS, RANGE, RADIUS = 0.05, 240, 8.0, 0.2

@@ -9,13 +9,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapely import affinity
 
-import closedrooms.predictor.structure as structure_module
+import closedrooms.predictor.paper.wall_lines as structure_module
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.predictor.config import preset
+from closedrooms.predictor.paper.segments import find_segments
 from closedrooms.predictor.predict import predict
-from closedrooms.predictor.rose import RoseStructure, find_rose
-from closedrooms.predictor.segments import find_segments
+from closedrooms.predictor.structure.rose import RoseStructure, find_rose
 
 METHODS = {
     "paper": preset("paper"),

@@ -11,12 +11,12 @@ from scipy.sparse.csgraph import connected_components
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame, OccupancyGrid
-from closedrooms.predictor import unknown
-from closedrooms.predictor.arrangement import arrange
-from closedrooms.predictor.best.directions import WallDirections
-from closedrooms.predictor.best.frame import Window, door_frame, turn_map
-from closedrooms.predictor.edges import STRIP, find_edges
-from closedrooms.predictor.lines import Line, _chain, _join_closest
+from closedrooms.predictor.best.door_frame import Window, door_frame, turn_map
+from closedrooms.predictor.paper import unknown_faces as unknown
+from closedrooms.predictor.paper.arrangement import arrange
+from closedrooms.predictor.paper.lines import Line, _chain, _join_closest
+from closedrooms.predictor.structure.edges import STRIP, find_edges
+from closedrooms.predictor.structure.wall_directions import WallDirections
 
 SPREAD = st.floats(-3.0, 3.0)
 

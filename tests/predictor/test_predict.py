@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapely import affinity
 
-import closedrooms.predictor.structure as structure_module
+import closedrooms.predictor.paper.wall_lines as structure_module
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.geojson import read_doors
@@ -17,8 +17,8 @@ from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyG
 from closedrooms.core.rosmap import read_map
 from closedrooms.predictor.baselines import geometric, line_of_sight
 from closedrooms.predictor.config import preset
+from closedrooms.predictor.paper.segments import find_segments
 from closedrooms.predictor.predict import predict
-from closedrooms.predictor.segments import find_segments
 
 PAPER = preset("paper")
 AUTHORS = Path(__file__).parents[2].parent / "shared" / "data" / "authors"

@@ -8,12 +8,12 @@ from shapely.geometry import box
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.predictor.baselines import geometric, line_of_sight
-from closedrooms.predictor.clutter import filter_clutter, free_islands
 from closedrooms.predictor.config import preset
-from closedrooms.predictor.inpaint import inpaint, passage
+from closedrooms.predictor.inpainting import inpaint, passage
 from closedrooms.predictor.predict import predict
-from closedrooms.predictor.rose import find_rose
-from closedrooms.predictor.thickness import free_interior, measure_thickness
+from closedrooms.predictor.structure.clutter import filter_clutter, free_islands
+from closedrooms.predictor.structure.rose import find_rose
+from closedrooms.predictor.structure.wall_thickness import free_interior, measure_thickness
 
 PAPER = preset("paper")
 

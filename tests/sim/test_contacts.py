@@ -13,7 +13,7 @@ from shapely.geometry import Point, Polygon, box
 from closedrooms.core.pose import Pose2
 from closedrooms.sim.config import RobotConfig, SimConfig, noise_level
 from closedrooms.sim.contacts import SKIN, Obstacles, edges_of, move_disc
-from closedrooms.sim.drive import Drive, Motion
+from closedrooms.sim.differential_drive import Drive, Motion
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.library import bundled_names, load_world
 from closedrooms.worlds.plan import FloorPlan

@@ -12,7 +12,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
 from closedrooms.sim.building import building_solids
 from closedrooms.sim.config import LidarConfig, NoiseConfig, SimConfig, noise_level
-from closedrooms.sim.leaves import door_leaves
+from closedrooms.sim.door_leaves import door_leaves
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.geometry import door_gap, door_leaf
 from closedrooms.worlds.plan import FloorPlan, Furniture

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from closedrooms.core.pose import Pose2
 from closedrooms.sim.config import NOISE_LEVELS, NoiseConfig
-from closedrooms.sim.drive import Motion
+from closedrooms.sim.differential_drive import Motion
 from closedrooms.sim.odometry import Odometry
 
 RUNS = 700

@@ -13,7 +13,7 @@ from closedrooms.core.grid import GridFrame
 from closedrooms.core.pose import Pose2
 from closedrooms.sim.config import LidarConfig, SimConfig, noise_level
 from closedrooms.sim.lidar import Lidar
-from closedrooms.sim.physics import PhysicsWorld
+from closedrooms.sim.physics_world import PhysicsWorld
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.closing import draw_closed
 from closedrooms.worlds.library import bundled_names, load_world

@@ -201,7 +201,7 @@ def test_the_configuration_imports_nothing_heavy() -> None:
 
 
 def test_pybullet_keeps_quiet_when_it_is_imported() -> None:
-    code = "from closedrooms.sim.physics import PhysicsWorld\nwith PhysicsWorld(): pass"
+    code = "from closedrooms.sim.physics_world import PhysicsWorld\nwith PhysicsWorld(): pass"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout + done.stderr == ""
 

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.worlds.jsonfile import read_plan, write_plan
+from closedrooms.worlds.formats.native import read_plan, write_plan
 from closedrooms.worlds.library import DEFAULT_WORLD, bundled_names, load_world, read_world
 from closedrooms.worlds.plan import FloorPlan, PlanDoor
 

@@ -12,7 +12,7 @@ from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.geometry import room_interior, wall_area
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan
-from closedrooms.worlds.start import start_pose
+from closedrooms.worlds.start_pose import start_pose
 from closedrooms.worlds.truth import rasterise, reachable, true_rooms, truth_bounds
 
 

@@ -1,0 +1,193 @@
+"""What of a map is free, cleaned of noise and cut to size (paper, section 5.1: "the clean map")."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.grid import GridFrame, OccupancyGrid
+from closedrooms.coverage.config import GraphConfig
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeSpace:
+    """Free cells in a window around them, with at least one cell of border that is not free.
+
+    Attributes:
+        frame: The window; same lattice as the map.
+        mask: Free, wide enough, and without specks: what is thinned. Shape ``frame.shape``.
+        passable: Cells that an edge may cross: ``mask`` and every cell that the map calls free.
+        clearance: Distance from each cell of ``mask`` to the next cell outside it [m].
+        parts: Connected part of each cell of ``mask``, numbered from 1 by falling area; 0 elsewhere.
+        areas: Area of each part with its nooks [m2], ``areas[0]`` is 0.
+    """
+
+    frame: GridFrame
+    mask: BoolArray
+    passable: BoolArray
+    clearance: FloatArray
+    parts: IntArray
+    areas: FloatArray
+
+
+def clean_free_space(grid: OccupancyGrid, config: GraphConfig) -> FreeSpace:
+    """Filter clutter, fill specks, take off the ragged edge, crop, and tell unconnected parts apart.
+
+    Args:
+        grid: The map.
+        config: Widths and areas.
+
+    Raises:
+        InvalidInputError: No free space that is wide enough.
+    """
+    filtered = _without_clutter(grid) if config.clutter_filter else grid
+    # Door leaves stand in the wall around what is free: they belong to the window.
+    margin = math.ceil(config.wall_thickness / grid.frame.resolution) + 1
+    free, occupied, frame = _cropped(filtered, margin)
+    resolution = frame.resolution
+    free = _without_hollows(free, occupied, grid.on(frame).occupied & free)
+    free = _without_gaps(free, occupied, config.gap_width / resolution)
+    passable = _without_specks(free, config.speck_area / resolution**2)
+    mask = _without_corner_contacts(_opened(passable, config.opening_radius / resolution))
+    parts, areas = _parts(mask, resolution, least=config.doorway**2)
+    mask = _without_nooks(parts > 0, config.nook_width / 2.0 / resolution, config.nook_area / resolution**2)
+    mask = _without_corner_contacts(mask)
+    parts[~mask] = 0
+    if not mask.any():
+        raise InvalidInputError(
+            "a map without free space to cover", expected=f"free space wider than {2 * config.opening_radius:.2f} m"
+        )
+    return FreeSpace(frame, mask, passable, _clearance(mask) * resolution, parts, areas)
+
+
+def _without_clutter(grid: OccupancyGrid) -> OccupancyGrid:
+    from closedrooms.predictor.structure.clutter import filter_clutter
+
+    return filter_clutter(grid)
+
+
+def _cropped(grid: OccupancyGrid, margin: int) -> tuple[BoolArray, BoolArray, GridFrame]:
+    """Free and occupied cells in a window around the free ones, with a border of ``margin`` cells."""
+    free = grid.free
+    rows, cols = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
+    if rows.size == 0:
+        raise InvalidInputError("a map without free space", expected="at least one free room")
+    r0, r1, c0, c1 = int(rows[0]), int(rows[-1]) + 1, int(cols[0]), int(cols[-1]) + 1
+    frame = grid.frame.cropped(r0 - margin, c0 - margin, r1 - r0 + 2 * margin, c1 - c0 + 2 * margin)
+    window = grid.on(frame)
+    return window.free, window.occupied, frame
+
+
+def _without_hollows(free: BoolArray, occupied: BoolArray, removed: BoolArray) -> BoolArray:
+    """Fill what no scan saw inside of furniture that the filter took out: its outline is gone, so is the rest of it."""
+    import cv2
+
+    if not removed.any():
+        return free
+    count, labels = cv2.connectedComponents((~free).astype(np.uint8), connectivity=8)
+    beside = cv2.dilate(removed.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    hollow = np.zeros(count, dtype=np.bool_)
+    hollow[labels[beside]] = True
+    hollow[labels[occupied]] = False
+    hollow[labels[0, 0]] = False  # what lies around the map
+    hollow[0] = False
+    filled: BoolArray = free | hollow[labels]
+    return filled
+
+
+def _without_gaps(free: BoolArray, occupied: BoolArray, width: float) -> BoolArray:
+    """Fill what is not free and narrower than ``width`` cells, where no cell is occupied."""
+    import cv2
+
+    side = math.floor(width + 1e-9) + 1
+    if side < 2:
+        return free
+    solid = cv2.morphologyEx((~free).astype(np.uint8), cv2.MORPH_OPEN, np.ones((side, side), np.uint8), borderValue=1)
+    filled: BoolArray = free | ((solid == 0) & ~occupied)
+    filled[[0, -1]] = filled[:, [0, -1]] = False
+    return filled
+
+
+def _without_specks(free: BoolArray, cells: float) -> BoolArray:
+    """Fill patches of at most ``cells`` cells that free space surrounds."""
+    import cv2
+
+    _, labels, stats, _ = cv2.connectedComponentsWithStats((~free).astype(np.uint8), connectivity=8)
+    speck = stats[:, cv2.CC_STAT_AREA] <= cells
+    speck[labels[0, 0]] = False  # what lies around the map, whatever its size
+    filled: BoolArray = free | speck[labels]
+    return filled
+
+
+def _opened(free: BoolArray, radius: float) -> BoolArray:
+    """Morphological opening with a disc of ``radius`` cells."""
+    import cv2
+
+    reach = math.floor(radius + 1e-9)
+    if reach < 1:
+        return free
+    rows, cols = np.ogrid[-reach : reach + 1, -reach : reach + 1]
+    disc = (rows**2 + cols**2 <= radius**2).astype(np.uint8)
+    opened: BoolArray = cv2.morphologyEx(free.astype(np.uint8), cv2.MORPH_OPEN, disc, borderValue=0) > 0
+    return opened
+
+
+def _without_nooks(free: BoolArray, radius: float, cells: float) -> BoolArray:
+    """Leave out dead ends of at most ``cells`` cells that a disc of ``radius`` cells cannot enter.
+
+    A dead end touches what the disc can reach in one place only; passages, which touch it in two, stay, and so does a
+    part of the map that the disc cannot enter at all.
+    """
+    import cv2
+
+    wide = _opened(free, radius)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats((free & ~wide).astype(np.uint8), connectivity=8)
+    nook = np.zeros(count, dtype=np.bool_)
+    for piece in (1 + np.flatnonzero(stats[1:, cv2.CC_STAT_AREA] <= cells)).tolist():
+        x, y, width, height = stats[piece, :4].tolist()
+        window = (slice(y - 1, y + height + 1), slice(x - 1, x + width + 1))
+        around = cv2.dilate((labels[window] == piece).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        # Side by side only: through a slanted doorway both its ends may touch at a corner.
+        contacts, _ = cv2.connectedComponents((around & wide[window]).astype(np.uint8), connectivity=4)
+        nook[piece] = contacts == 2  # one, and what is none
+    return np.asarray(free & ~nook[labels])
+
+
+def _without_corner_contacts(free: BoolArray) -> BoolArray:
+    """Part free cells that touch at a corner only: a slanted wall one cell wide must hold.
+
+    Thinning joins cells over corners, and such a wall is a row of cells that touch at corners.
+    """
+    free = free.copy()
+    while True:
+        a, b, c, d = free[:-1, :-1], free[:-1, 1:], free[1:, :-1], free[1:, 1:]
+        falling, rising = a & d & ~b & ~c, b & c & ~a & ~d
+        if not (falling.any() or rising.any()):
+            return free
+        a[falling] = False
+        b[rising] = False
+
+
+def _parts(mask: BoolArray, resolution: float, *, least: float) -> tuple[IntArray, FloatArray]:
+    """Connected parts (8 neighbours, as thinning keeps them) by falling area, those below ``least`` [m2] left out."""
+    import cv2
+
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    areas = stats[1:, cv2.CC_STAT_AREA] * resolution**2
+    order = np.argsort(-areas, kind="stable")
+    order = order[areas[order] >= least]
+    renumbered = np.zeros(len(stats), dtype=np.int64)
+    renumbered[order + 1] = np.arange(1, len(order) + 1)
+    return renumbered[labels], np.concatenate(([0.0], areas[order]))
+
+
+def _clearance(mask: BoolArray) -> FloatArray:
+    """Distance to the next cell outside, in cells, between centres."""
+    import cv2
+
+    distance: FloatArray = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE).astype(
+        np.float64
+    )
+    return distance

@@ -1,0 +1,1 @@
+"""Ground-truth datasets, evaluation, robustness, and the workers that they share."""

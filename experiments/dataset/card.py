@@ -1,0 +1,124 @@
+"""The dataset card: what is in it, how large, in which units, under which licence, and how it was made."""
+
+from collections.abc import Mapping, Sequence
+
+from closedrooms.experiments.dataset.config import DatasetConfig
+from closedrooms.experiments.dataset.variants import SPLITS, Variant, World
+from closedrooms.worlds.library import bundled_names
+
+# Size classes of the Hugging Face hub, by their upper end.
+SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
+MADE = {
+    "erased": (
+        "Each building was explored once with all doors open. For a sample, scans taken behind its closed doors were "
+        "dropped, every other ray was cut at the closed leaf on the true geometry and ends there as a hit with the "
+        "sensor's noise, and the map was drawn anew from the scans at their estimated poses. `surveys/` holds the "
+        "explorations."
+    ),
+    "simulated": "Every sample was explored by a simulated robot while its doors were closed.",
+}
+
+POSES = {"erased": "the scans that make the map", "simulated": "every scan"}
+
+
+def card(
+    config: DatasetConfig, worlds: Sequence[World], made: Sequence[Variant], failed: Mapping[str, str], size: int
+) -> str:
+    """The text of ``README.md``.
+
+    Args:
+        config: As given.
+        worlds: The buildings.
+        made: The samples that there are.
+        failed: Why others are missing, by id.
+        size: Bytes of all samples and surveys.
+    """
+    bundled = set(bundled_names())
+    ours = all(world.source in bundled for world in worlds)
+    licence = "mit" if ours else "other"
+    size_class = next((name for limit, name in SIZES if len(made) < limit), "n>1M")
+    head = [
+        "---",
+        f"license: {licence}",
+        "pretty_name: Maps with closed doors",
+        "task_categories: [image-to-image]",
+        "tags: [robotics, occupancy-grid, floor-plan, slam]",
+        f"size_categories: [{size_class}]",
+        "---",
+    ]
+    return "\n".join([*head, "", *_body(config, worlds, made, failed, size, ours=ours), ""])
+
+
+def _body(
+    config: DatasetConfig,
+    worlds: Sequence[World],
+    made: Sequence[Variant],
+    failed: Mapping[str, str],
+    size: int,
+    *,
+    ours: bool,
+) -> list[str]:
+    rights = (
+        "The buildings are closedrooms' own; the dataset is under the MIT licence."
+        if ours
+        else "The buildings come from files: their licences hold for what was made of them."
+    )
+    return [
+        "# Maps with closed doors",
+        "",
+        "Occupancy grids of a robot that explored a building while some doors were closed, with the doors that it saw "
+        "and the true building: ground truth for predicting the rooms behind closed doors.",
+        "",
+        f"{len(made)} samples of {len(worlds)} buildings, {size / 1e6:.1f} MB; seed {config.seed}, noise "
+        f"`{config.noise}`, maps `{config.maps}`, {config.repetitions} orders of closing, at most {config.max_closed} "
+        "closed doors.",
+        "",
+        "| split | buildings | samples |",
+        "| --- | ---: | ---: |",
+        *(_split_row(split, worlds, made) for split in SPLITS),
+        "",
+        "No building is in two splits.",
+        "",
+        "## A sample",
+        "",
+        "A folder `SPLIT/BUILDING/rRR-cNN`: order of closing RR, NN closed doors. A door closed among n stays closed "
+        "among n + 1 of the same order.",
+        "",
+        "| file | what |",
+        "| --- | --- |",
+        "| `map.png`, `map.yaml` | the robot's map, as ROS map_server reads it |",
+        "| `truth.png`, `truth.yaml` | the true map, on the same frame |",
+        "| `doors.geojson` | the closed doors that the robot saw, map frame |",
+        "| `truth_rooms.geojson` | the rooms behind the closed doors, map frame |",
+        f"| `trajectory.tum`, `trajectory_truth.tum` | estimated and true poses of {POSES[config.maps]} |",
+        *(["| `scans.npz` | the scans with odometry, estimated and true pose |"] if config.keep_scans else []),
+        *(["| `run.rrd` | recording for the rerun viewer |"] if config.record else []),
+        "| `run.json` | configuration, seed, versions, figures, SHA-256 of the files |",
+        "",
+        "Metres, radians, seconds; pictures at "
+        f"{config.mapper.resolution:g} m a cell: white is free, black is occupied, grey is unknown. The map frame is "
+        "the robot's first pose, x forward, y left.",
+        "",
+        "Each split has a `metadata.parquet`, so that Hugging Face's `datasets` loads the folder as it is: "
+        '`load_dataset("imagefolder", data_dir=...)` gives the columns `map`, `truth` and the figures. '
+        "`sha256sum -c SHA256SUMS` checks the files.",
+        "",
+        "## How it was made",
+        "",
+        MADE[config.maps],
+        "`manifest.json` has versions, seeds and the whole configuration.",
+        "",
+        rights,
+        *_failures(failed),
+    ]
+
+
+def _split_row(split: str, worlds: Sequence[World], made: Sequence[Variant]) -> str:
+    names = [world.name for world in worlds if world.split == split]
+    return f"| {split} | {', '.join(names) or 'none'} | {sum(v.world.split == split for v in made)} |"
+
+
+def _failures(failed: Mapping[str, str]) -> list[str]:
+    if not failed:
+        return []
+    return ["", "## Missing samples", "", *(f"- `{name}`: {reason}" for name, reason in sorted(failed.items()))]

@@ -1,0 +1,72 @@
+"""Options of ``closedrooms dataset``."""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.options import check_least
+from closedrooms.mapping.config import MapperConfig
+from closedrooms.navigation.config import NavigationConfig
+from closedrooms.pipeline.config import NoiseName
+from closedrooms.sim.config import SimConfig
+
+MapSource = Literal["erased", "simulated"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DatasetConfig:
+    """Which buildings, how often, with how many doors closed, and how their maps are made."""
+
+    worlds: tyro.conf.Positional[tuple[str, ...]]
+    """Names of bundled worlds or files that the importers read; ``all`` names the 20 bundled worlds."""
+
+    out: Path
+    """Folder to write; the same command again goes on where it stopped."""
+
+    repetitions: int = 15
+    """Orders in which the doors of a world are closed one after the other (paper, section 5: 15)."""
+
+    max_closed: int = 15
+    """Most closed doors in a world, where it has so many that close a room (paper, table 1: 15)."""
+
+    seed: int = 0
+    """The one seed: orders of closing, splits and every source of noise."""
+
+    noise: NoiseName = "medium"
+    """Noise of lidar and odometry."""
+
+    maps: MapSource = "erased"
+    """``simulated`` explores every variant; ``erased`` explores each world once with all doors open and redraws the map
+    as it would be with some closed."""
+
+    workers: int = 2
+    """Local processes."""
+
+    scheduler: str | None = None
+    """A Dask scheduler, ``tcp://host:port``, that does the work instead; its workers must see the same folders."""
+
+    keep_scans: bool = False
+    """Write ``scans.npz`` into every sample: the scans that made its map, with odometry, estimated and true pose."""
+
+    record: bool = False
+    """Write the recording ``run.rrd`` into every sample."""
+
+    sim: SimConfig = field(default_factory=SimConfig)
+    """Robot, lidar and odometry; ``noise`` above is laid over it."""
+
+    mapper: MapperConfig = field(default_factory=MapperConfig)
+    """The mapper."""
+
+    navigation: NavigationConfig = field(default_factory=NavigationConfig)
+    """Exploration."""
+
+    def __post_init__(self) -> None:
+        if not self.worlds:
+            raise InvalidInputError("no world", expected="names of bundled worlds, files, or all")
+        check_least(self, repetitions=1, max_closed=1, workers=1, seed=0)
+        if self.scheduler is not None and not re.fullmatch(r"(tcp|tls|ws|ucx)://\S+:\d+", self.scheduler):
+            raise InvalidInputError(f"--scheduler {self.scheduler}", expected="tcp://host:port")

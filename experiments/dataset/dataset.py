@@ -1,0 +1,172 @@
+"""``closedrooms dataset``: maps of many buildings with closed doors, and what is really behind them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from closedrooms.core.errors import InvalidInputError, OutputError
+from closedrooms.core.files import MANIFEST, read_json, write_bytes, write_json
+from closedrooms.experiments.dataset.card import card
+from closedrooms.experiments.dataset.checksums import check
+from closedrooms.experiments.dataset.config import DatasetConfig
+from closedrooms.experiments.dataset.layout import (
+    CARD,
+    DATASET_MANIFEST,
+    alone,
+    claim,
+    description,
+    fingerprint,
+    row,
+    write_metadata,
+    write_sums,
+)
+from closedrooms.experiments.dataset.sample import Outcome, Task, make
+from closedrooms.experiments.dataset.variants import SPLITS, Variant, World, find_variants, find_worlds
+from closedrooms.experiments.workers import Crew, Lost
+from closedrooms.pipeline.config import named_noise
+from closedrooms.pipeline.progress import Progress, Silent
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DatasetResult:
+    """A finished dataset.
+
+    Attributes:
+        folder: Where it is.
+        title: Head of the table.
+        counts: Buildings, samples and bytes by split.
+        failures: Why a sample is missing, by id.
+        fingerprint: SHA-256 of ``SHA256SUMS``.
+    """
+
+    folder: Path
+    title: str
+    counts: dict[str, tuple[int, int, int]]
+    failures: dict[str, str] = field(default_factory=dict)
+    fingerprint: str = ""
+
+    def table(self) -> list[tuple[str, ...]]:
+        """Rows for people; the first is the head."""
+        rows: list[tuple[str, ...]] = [("split", "buildings", "samples", "MB")]
+        rows += [(split, str(b), str(s), f"{size / 1e6:.1f}") for split, (b, s, size) in self.counts.items()]
+        rows += [(f"missing: {name}", reason, "", "") for name, reason in sorted(self.failures.items())[:10]]
+        if len(self.failures) > 10:
+            rows.append((f"and {len(self.failures) - 10} more", "see manifest.json", "", ""))
+        return rows
+
+
+def dataset(config: DatasetConfig, *, progress: Progress | None = None) -> DatasetResult:
+    """Make a dataset, or what is missing of it.
+
+    Args:
+        config: Options.
+        progress: Told how far it is.
+
+    Raises:
+        InvalidInputError: A world that cannot be used, another dataset in the folder, a sample there that was changed,
+            no scheduler at the address.
+        OutputError: The folder cannot be written, or holds something that is not ours.
+    """
+    progress = progress or Silent()
+    config = replace(config, out=config.out.resolve(), sim=named_noise(config.sim, config.noise))
+    progress.stage("worlds")
+    worlds = find_worlds(config)
+    variants = [variant for world in worlds for variant in find_variants(world, config)]
+    claim(config, worlds)
+    crew: Crew[Task, Outcome] = Crew(config.workers, config.scheduler)
+    with alone(config.out):
+        failures = _surveys(config, worlds, crew, progress) if config.maps == "erased" else {}
+        tasks = [Task(config, v.world, v) for v in variants if v.world.name not in failures]
+        failed = {v.id: failures[v.world.name] for v in variants if v.world.name in failures}
+        failed |= {task.variant.id: reason for task, reason in _make(tasks, crew, progress, "samples") if task.variant}
+        progress.stage("tables")
+        return _finish(config, worlds, variants, failed)
+
+
+def _surveys(
+    config: DatasetConfig, worlds: Sequence[World], crew: Crew[Task, Outcome], progress: Progress
+) -> dict[str, str]:
+    """Explore each building once; why it failed, by world."""
+    tasks = [Task(config, world) for world in worlds]
+    return {task.world.name: reason for task, reason in _make(tasks, crew, progress, "surveys")}
+
+
+def _make(tasks: Sequence[Task], crew: Crew[Task, Outcome], progress: Progress, stage: str) -> list[tuple[Task, str]]:
+    """Make what is not there yet; the tasks that failed, with the reason.
+
+    Raises:
+        InvalidInputError: Something there was changed since it was written.
+        OutputError: Nothing can be written any more.
+    """
+    progress.stage(stage, len(tasks))
+    missing = [task for task in tasks if not _there(task.folder)]
+    number, failed = len(tasks) - len(missing), []
+    progress.advance(number, f"{number} of {len(tasks)}")
+    for task, outcome in crew.do(make, missing):
+        if isinstance(outcome, Lost):
+            failed.append((task, outcome.reason))
+        elif outcome.trouble:
+            raise OutputError(outcome.trouble)
+        elif outcome.failure:
+            failed.append((task, outcome.failure))
+        number += 1
+        progress.advance(number, f"{number} of {len(tasks)}")
+    return failed
+
+
+def _there(folder: Path) -> bool:
+    """Whether a survey or sample was finished before, and is as it was written.
+
+    Raises:
+        InvalidInputError: It is not.
+    """
+    if not folder.exists():
+        return False
+    check(folder)
+    return True
+
+
+def _finish(
+    config: DatasetConfig, worlds: Sequence[World], variants: Sequence[Variant], failed: dict[str, str]
+) -> DatasetResult:
+    """Write what stands at the root and in front of each split."""
+    out = config.out
+    made = sorted((v for v in variants if v.id not in failed), key=lambda v: v.id)
+    if not made:
+        raise InvalidInputError(
+            f"no sample could be made ({next(iter(failed.values()), 'none was wanted')})",
+            expected="at least one", where=out,
+        )  # fmt: skip
+    folders = [Task(config, world).folder for world in worlds if config.maps == "erased"]
+    folders += [out / variant.id for variant in made]
+    abouts: dict[str, Any] = {
+        folder.relative_to(out).as_posix(): read_json(folder / MANIFEST, what="run.json")
+        for folder in folders
+        if folder.exists()
+    }
+    sizes = {name: sum(p.stat().st_size for p in (out / name).iterdir()) for name in abouts}
+    counts: dict[str, tuple[int, int, int]] = {}
+    for split in SPLITS:
+        own = [variant for variant in made if variant.world.split == split]
+        if own:
+            write_metadata(out / split, [row(variant, abouts[variant.id]) for variant in own])
+        buildings = len({variant.world.name for variant in own})
+        counts[split] = (buildings, len(own), sum(sizes[variant.id] for variant in own))
+    write_bytes(out / CARD, card(config, worlds, made, failed, sum(sizes.values())).encode())
+    samples = [
+        {
+            "id": variant.id,
+            "split": variant.world.split,
+            "world": variant.world.name,
+            "repetition": variant.repetition,
+            "closed": list(variant.closed),
+            "status": "failed" if variant.id in failed else "ok",
+            "reason": failed.get(variant.id, ""),
+        }
+        for variant in sorted(variants, key=lambda v: v.id)
+    ]
+    write_json(out / DATASET_MANIFEST, {**description(config, worlds), "complete": True, "samples": samples})
+    write_sums(out, abouts)
+    title = f"{len(made)} of {len(variants)} samples, {len(worlds)} worlds, {config.maps}, noise {config.noise}"
+    return DatasetResult(out, title, counts, failed, fingerprint(out))

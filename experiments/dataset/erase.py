@@ -1,0 +1,289 @@
+"""Maps as they would be with some doors closed, redrawn from one exploration with all doors open.
+
+Nothing is painted over. Scans taken behind a closed door are dropped whole. Every other ray is cut at the plane of the
+closed leaf, on the true geometry, and ends there as a hit with the sensor's noise; the door is seen by the same rays.
+Rays that ended on the leaf where it stood open are cast anew in the plan. The map is then drawn from the scans at their
+estimated poses, as the mapper draws it.
+"""
+
+from collections import OrderedDict
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from hashlib import blake2b
+
+import numpy as np
+import shapely
+
+from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.door import ClosedDoor, DoorSighting
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.pose import Pose2
+from closedrooms.core.random import stream
+from closedrooms.core.scan import LaserScan
+from closedrooms.experiments.dataset.open_survey import OpenSurvey
+from closedrooms.experiments.dataset.rays import first_hits
+from closedrooms.mapping.beams import clean
+from closedrooms.mapping.door_fusion import fuse_doors
+from closedrooms.mapping.keyframe import Keyframe
+from closedrooms.mapping.log_odds_grid import EvidenceGrid, Imprint
+from closedrooms.sim.building import building_solids
+from closedrooms.sim.contacts import edges_of, leaf_edges
+from closedrooms.sim.door_leaves import Leaf, door_leaves
+from closedrooms.worlds.closing import check_closed, hidden_rooms
+from closedrooms.worlds.geometry import areal
+
+# A ray counts as ended on an open leaf when it went this far, less so many standard deviations of the range [m]. Rays
+# that ended just before it come along: they are cast anew, which gives what they measured but for the noise.
+NEAR_LEAF, SIGMAS = 0.02, 4.0
+# Drawn scans that are remembered, most of them with some doors closed: about 30 kB each.
+KEPT_KEYFRAMES = 8000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ErasedMap:
+    """What the robot would have brought home with some doors closed.
+
+    Attributes:
+        grid: The map.
+        doors: Closed doors as seen, map frame.
+        keyframes: Which keyframes of the survey are left, indices.
+        scans: They, as they are with the doors closed.
+    """
+
+    grid: OccupancyGrid
+    doors: list[ClosedDoor]
+    keyframes: IntArray
+    scans: tuple[LaserScan, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Crossings:
+    """Beams that meet something: keyframe and beam, shape (n,) each, and the distance [m]."""
+
+    scan: IntArray
+    beam: IntArray
+    distance: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Drawn:
+    """A keyframe as it stands in the drawing, with the closed doors that its scan measured."""
+
+    scan: LaserScan
+    keyframe: Keyframe
+    doors: tuple[str, ...]
+    imprint: Imprint | None
+
+
+class Eraser:
+    """Redraws maps of one survey; keeps what does not depend on which doors are closed.
+
+    Attributes:
+        survey: What the maps are drawn from.
+    """
+
+    def __init__(self, survey: OpenSurvey) -> None:
+        self.survey = survey
+        plan, config = survey.plan, survey.sim
+        furniture = areal(shapely.union_all([thing.polygon for thing in plan.furniture]))
+        solids = areal(shapely.union_all([building_solids(plan), furniture]))
+        self._edges = edges_of(solids)
+        self._leaves: dict[str, tuple[Leaf, ...]] = {
+            door.id: door_leaves(plan, door, solids, config.swing) for door in plan.doors if None not in door.rooms
+        }
+        sensor = Pose2(*config.lidar.mount)
+        world = [survey.world_T_map @ Pose2(*pose) @ sensor for pose in survey.true_poses]
+        self._places = np.array([(pose.x, pose.y) for pose in world])
+        angles = config.lidar.angle_min + config.lidar.angle_increment * np.arange(config.lidar.beams)
+        self._angles = np.array([pose.theta for pose in world])[:, None] + angles
+        self._ranges = np.array([scan.ranges for scan in survey.keyframes.scans])
+        draws = stream(survey.seed, "erased", "range").standard_normal(self._ranges.shape)
+        self._noise = config.noise.range_sd * draws
+        self._shut: dict[str, _Crossings] = {}
+        self._stood_open: dict[str, _Crossings] = {}
+        # How far the beams that ended on one open door go before they meet another one, open or closed: ``None``
+        # where none does, which is the rule.
+        self._behind: dict[tuple[str, str, bool], FloatArray | None] = {}
+        # The drawing as it is now: counts are sums, so that going from one set of closed doors to the next only takes
+        # out and puts in the scans that differ, and the way there leaves no trace. It begins with all doors open and
+        # so keeps the frame of the whole survey.
+        self._grid = EvidenceGrid(survey.mapper)
+        self._drawn: list[_Drawn | None] = [None] * len(survey.poses)
+        self._known: OrderedDict[tuple[int, tuple[str, ...], bytes], _Drawn] = OrderedDict()
+        self._draw(np.arange(len(survey.poses)), self._ranges, np.full(self._ranges.shape, -1), ())
+
+    def erase(self, closed: Collection[str]) -> ErasedMap:
+        """The map with ``closed`` doors closed.
+
+        Args:
+            closed: Ids of doors that hide whole rooms.
+
+        Raises:
+            InvalidInputError: Doors that do not exist or close no room.
+        """
+        closed = check_closed(self.survey.plan, closed)
+        kept = self._outside(closed, self.survey.true_poses)
+        ranges, owner = self._cut(closed)
+        self._draw(kept, ranges, owner, closed)
+        drawn = [entry for entry in self._drawn if entry is not None]
+        doors = fuse_doors([entry.keyframe for entry in drawn])
+        return ErasedMap(self._grid.grid(), doors, kept, tuple(entry.scan for entry in drawn))
+
+    def _draw(self, kept: IntArray, ranges: FloatArray, owner: IntArray, closed: tuple[str, ...]) -> None:
+        """Bring the drawing to these scans: keyframes ``kept``, ranges and owners of all keyframes."""
+        wanted = set(kept.tolist())
+        cut = owner.max(axis=1) >= 0
+        for number, before in enumerate(self._drawn):
+            after = None
+            if number in wanted:
+                doors: tuple[str, ...] = ()
+                if cut[number]:
+                    seen = np.unique(owner[number][np.isfinite(ranges[number])])
+                    doors = tuple(closed[int(index)] for index in seen[seen >= 0])
+                after = self._keyframe(number, ranges[number], doors)
+            if after is before:
+                continue
+            self._drawn[number] = after
+            if before is not None and before.imprint is not None:
+                self._grid.stamp(before.imprint, sign=-1)
+            if after is not None and after.imprint is not None:
+                self._grid.stamp(after.imprint)
+
+    def _keyframe(self, number: int, ranges: FloatArray, doors: tuple[str, ...]) -> _Drawn:
+        """A keyframe of the survey with other ranges, that sees ``doors``; remembered, as few doors show in one."""
+        key = (number, doors, blake2b(ranges.tobytes(), digest_size=16).digest())
+        drawn = self._known.pop(key, None) or self._new_keyframe(number, ranges, doors)
+        self._known[key] = drawn
+        if len(self._known) > KEPT_KEYFRAMES:
+            self._known.popitem(last=False)
+        return drawn
+
+    def _new_keyframe(self, number: int, ranges: FloatArray, doors: tuple[str, ...]) -> _Drawn:
+        survey = self.survey
+        scan = survey.keyframes.scans[number]
+        if not np.array_equal(ranges, self._ranges[number], equal_nan=True):
+            scan = replace(scan, ranges=ranges)
+        beams, pose = clean(scan, max_range=survey.mapper.max_range), Pose2(*survey.poses[number])
+        keyframe = Keyframe(number, scan.stamp, pose, beams, np.zeros((0, 2)), 0.0)
+        for name in doors:
+            keyframe.remember(self._sighting(name, number), Pose2())
+        return _Drawn(scan, keyframe, doors, self._grid.imprint(beams, pose))
+
+    def _outside(self, closed: Collection[str], poses_map: FloatArray) -> IntArray:
+        """Indices of the true poses, shape (n, 3), map frame, that are not behind a closed door."""
+        plan = self.survey.plan
+        rooms = {room.id: room.polygon for room in plan.rooms}
+        names = [name for part, _ in hidden_rooms(plan, closed) for name in part]
+        hidden = shapely.union_all([rooms[name] for name in names])
+        points = self.survey.world_T_map.transform(poses_map[:, :2])
+        return np.flatnonzero(~shapely.contains_xy(hidden, points[:, 0], points[:, 1]))
+
+    def _cut(self, closed: tuple[str, ...]) -> tuple[FloatArray, IntArray]:
+        """Ranges with the doors closed, shape (k, beams) [m], and by which door (its index) each was cut, else -1."""
+        ranges = self._ranges.copy()
+        config = self.survey.sim.lidar
+        self._cast_anew(closed, ranges)
+        limit = np.full(ranges.shape, np.inf)
+        owner = np.full(ranges.shape, -1)
+        for index, name in enumerate(closed):
+            met = self._crossings(name)
+            nearer = met.distance < limit[met.scan, met.beam]
+            limit[met.scan[nearer], met.beam[nearer]] = met.distance[nearer]
+            owner[met.scan[nearer], met.beam[nearer]] = index
+        measured = limit + self._noise
+        # A beam without any measurement stays so; one that ended before the leaf does not get there.
+        cut = (ranges > limit) & (limit < config.range_max)
+        ranges[cut] = measured[cut]
+        ranges[cut & (measured < config.range_min)] = np.nan
+        ranges[cut & (measured >= config.range_max)] = np.inf
+        owner[~cut] = -1
+        return ranges, owner
+
+    def _cast_anew(self, closed: tuple[str, ...], ranges: FloatArray) -> None:
+        """Replace, in place, what measured a closed door's leaf where it stood open."""
+        if not closed:
+            return
+        lidar = self.survey.sim.lidar
+        ended = [self._ended_on(name) for name in closed]
+        scan, beam = (np.concatenate([getattr(met, part) for met in ended]) for part in ("scan", "beam"))
+        true = np.concatenate([self._past(name, frozenset(closed)) for name in closed])
+        seen = true + self._noise[scan, beam]
+        seen = np.where(seen < lidar.range_min, np.nan, np.where(seen >= lidar.range_max, np.inf, seen))
+        ranges[scan, beam] = seen
+
+    def _ended_on(self, name: str) -> _Crossings:
+        """Beams that ended on the leaves of a door that stood open, and how far the walls let them go without."""
+        if name not in self._stood_open:
+            met = self._meeting(np.array([leaf.at(leaf.travel) for leaf in self._leaves[name]]))
+            measured = self._ranges[met.scan, met.beam]
+            near = measured >= met.distance - NEAR_LEAF - SIGMAS * self.survey.sim.noise.range_sd
+            scan, beam = met.scan[near], met.beam[near]
+            beams = _Crossings(scan, beam, np.full(len(scan), np.inf))
+            self._stood_open[name] = replace(beams, distance=self._first_hits(beams, self._edges))
+        return self._stood_open[name]
+
+    def _past(self, name: str, closed: frozenset[str]) -> FloatArray:
+        """How far beams that ended on the open leaves of ``name`` go with ``closed`` doors closed, shape (n,) [m]."""
+        met = self._ended_on(name)
+        distance = met.distance
+        for other, leaves in self._leaves.items():
+            key = (name, other, other in closed)
+            if key not in self._behind:
+                corners = [leaf.at(0.0 if other in closed else leaf.travel) for leaf in leaves]
+                found = self._first_hits(met, np.concatenate([np.array(leaf_edges(leaf)) for leaf in corners]))
+                self._behind[key] = found if np.isfinite(found).any() else None
+            behind = self._behind[key]
+            if behind is not None:
+                distance = np.minimum(distance, behind)
+        return distance
+
+    def _first_hits(self, beams: _Crossings, edges: FloatArray) -> FloatArray:
+        return first_hits(self._places[beams.scan], self._directions(beams.scan, beams.beam), edges)
+
+    def _directions(self, scan: IntArray, beam: IntArray) -> FloatArray:
+        angles = self._angles[scan, beam]
+        return np.column_stack((np.cos(angles), np.sin(angles)))
+
+    def _crossings(self, name: str) -> _Crossings:
+        """Beams that meet a door's leaves where they close it."""
+        if name not in self._shut:
+            self._shut[name] = self._meeting(np.array([leaf.at(0.0) for leaf in self._leaves[name]]))
+        return self._shut[name]
+
+    def _meeting(self, corners: FloatArray) -> _Crossings:
+        """Beams that meet leaves with ``corners``, shape (leaves, 4, 2), building frame [m]."""
+        points = corners.reshape(-1, 2)
+        middle = points.mean(axis=0)
+        radius = float(np.linalg.norm(points - middle, axis=1).max())
+        offset = middle - self._places
+        distance = np.hypot(offset[:, 0], offset[:, 1])
+        half = np.where(distance > radius, np.arcsin(np.minimum(radius / np.maximum(distance, 1e-9), 1.0)), np.pi)
+        bearing = np.arctan2(offset[:, 1], offset[:, 0])
+        turned = np.abs(np.mod(self._angles - bearing[:, None] + np.pi, 2.0 * np.pi) - np.pi)
+        within = distance - radius <= self.survey.sim.lidar.range_max
+        scan, beam = np.nonzero((turned <= half[:, None] + 1e-9) & within[:, None])
+        edges = np.concatenate([np.array(leaf_edges(leaf)) for leaf in corners])
+        found = first_hits(self._places[scan], self._directions(scan, beam), edges)
+        met = np.isfinite(found)
+        return _Crossings(scan[met], beam[met], found[met])
+
+    def _sighting(self, name: str, number: int) -> DoorSighting:
+        """A closed door as seen from the true pose of a keyframe, robot frame, as the simulation tells it."""
+        door = next(door for door in self.survey.plan.doors if door.id == name)
+        robot_T_world = (self.survey.world_T_map @ Pose2(*self.survey.true_poses[number])).inverse()
+        (ax, ay), (bx, by) = robot_T_world.transform(np.array(door.segment))
+        stamp = float(self.survey.keyframes.scans[number].stamp)
+        return DoorSighting(name, ((float(ax), float(ay)), (float(bx), float(by))), stamp)
+
+
+def erase(survey: OpenSurvey, closed: Collection[str]) -> ErasedMap:
+    """The map of a survey with ``closed`` doors closed; for many maps of one survey, keep one :class:`Eraser`.
+
+    Args:
+        survey: An exploration with all doors open.
+        closed: Ids of doors that hide whole rooms.
+
+    Raises:
+        InvalidInputError: Doors that do not exist or close no room.
+    """
+    return Eraser(survey).erase(closed)

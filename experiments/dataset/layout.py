@@ -1,0 +1,203 @@
+"""What stands at the root of a dataset, and the table in front of each split."""
+
+import contextlib
+import hashlib
+import io
+import json
+import re
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from closedrooms.core.errors import InvalidInputError, OutputError
+from closedrooms.core.files import MANIFEST, PROGRAM, read_json, write_bytes, write_json
+from closedrooms.experiments.dataset.checksums import digest
+from closedrooms.experiments.dataset.config import DatasetConfig
+from closedrooms.experiments.dataset.sample import FORMAT, NOT_CONTENT, SURVEYS
+from closedrooms.experiments.dataset.variants import SPLITS, Variant, World
+from closedrooms.pipeline.manifest import resolved, versions
+
+DATASET_MANIFEST = "manifest.json"
+CARD = "README.md"
+SUMS = "SHA256SUMS"
+METADATA = "metadata.parquet"
+LOCK = ".lock"
+OURS = {DATASET_MANIFEST, CARD, SUMS, SURVEYS, LOCK, *SPLITS}
+# Names of what is being written: folders by tempfile, files by process number.
+UNFINISHED = re.compile(r"\..+\.([A-Za-z0-9_]{8}\.(part|old)|\d+\.part)")
+
+
+def claim(config: DatasetConfig, worlds: Sequence[World]) -> None:
+    """Make the folder ours before the work, or make sure that it holds a part of this very dataset.
+
+    Raises:
+        OutputError: It holds something that is not ours, or cannot be written.
+        InvalidInputError: A dataset of another configuration, or of another version.
+    """
+    folder, wanted = config.out, description(config, worlds)
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"the output is a file; expected a folder: {folder}")
+    if folder.is_dir() and any(folder.iterdir()):
+        strange = sorted(path.name for path in folder.iterdir() if path.name not in OURS and not _unfinished(path))
+        if strange or not (folder / DATASET_MANIFEST).is_file():
+            what = strange[0] if strange else "no manifest.json"
+            raise OutputError(
+                f"the output folder holds something else ({what}); expected an empty one or a dataset: {folder}"
+            )
+        check_same(read_manifest(folder), wanted, folder)
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot write ({error.strerror}): {folder}") from error
+    write_json(folder / DATASET_MANIFEST, {**wanted, "complete": False, "samples": []})
+
+
+def _unfinished(path: Path) -> bool:
+    """Whether a killed process of ours left this behind while it wrote."""
+    return UNFINISHED.fullmatch(path.name) is not None
+
+
+@contextlib.contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Work on a dataset as the only process, and without what killed ones left behind half-written.
+
+    Raises:
+        OutputError: Another process works on it.
+    """
+    import fcntl
+
+    try:
+        with (folder / LOCK).open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise OutputError(f"another closedrooms works on this dataset: {folder}") from error
+            _clear_unfinished(folder)
+            yield
+            # A worker whose parent was killed may have lived on for a moment and have written since.
+            _clear_unfinished(folder)
+    except OSError as error:
+        raise OutputError(f"cannot write ({error.strerror}): {error.filename or folder}") from error
+
+
+def _clear_unfinished(folder: Path) -> None:
+    for depth in ("*", "*/*", "*/*/*", "*/*/*/*"):
+        for path in filter(_unfinished, folder.glob(depth)):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """The manifest of a dataset.
+
+    Raises:
+        InvalidInputError: No dataset, or one of another format.
+    """
+    path = folder / DATASET_MANIFEST
+    manifest = read_json(path, what="a dataset's manifest.json")
+    if not isinstance(manifest, dict) or manifest.get("program") != PROGRAM:
+        raise InvalidInputError("not written by closedrooms", expected="a dataset's manifest.json", where=path)
+    if manifest.get("format") != FORMAT:
+        raise InvalidInputError(
+            f"a dataset of format {manifest.get('format')!r}",
+            expected=f"format {FORMAT}, which this version reads",
+            where=path,
+        )
+    return manifest
+
+
+def description(config: DatasetConfig, worlds: Sequence[World]) -> dict[str, Any]:
+    """What tells one dataset from another; whoever resumes must want the same."""
+    return {
+        "program": PROGRAM,
+        "format": FORMAT,
+        "seed": config.seed,
+        "repetitions": config.repetitions,
+        "max_closed": config.max_closed,
+        "configuration": resolved(config, leave_out=NOT_CONTENT),
+        "versions": versions(),
+        "worlds": {
+            world.name: {"split": world.split, "closable": len(world.closable), "sha256": world.digest}
+            for world in worlds
+        },
+    }
+
+
+def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path) -> None:
+    """Refuse to mix two datasets.
+
+    Raises:
+        InvalidInputError: Names the first entry that differs.
+    """
+    wanted = json.loads(json.dumps(wanted))
+    for key in wanted:
+        if found.get(key) != wanted[key]:
+            raise InvalidInputError(
+                f"the dataset there has other {key}",
+                expected="the command that began it, the same worlds and versions, or an empty folder",
+                where=folder,
+            )
+
+
+def row(variant: Variant, about: Mapping[str, Any]) -> dict[str, Any]:
+    """A sample in its split's metadata: file names relative to the split, then figures."""
+    base = f"{variant.world.name}/{Path(variant.id).name}"
+    metrics = about["metrics"]
+    return {
+        "map_file_name": f"{base}/map.png",
+        "truth_file_name": f"{base}/truth.png",
+        "id": variant.id,
+        "world": variant.world.name,
+        "repetition": variant.repetition,
+        "closed": list(about["closed"]),
+        "closed_doors": len(about["closed"]),
+        "doors_seen": metrics["doors_seen"],
+        "rooms_seen": metrics["rooms_seen"],
+        "area_mapped": metrics["area_mapped"],
+        "ate_m": metrics["ate_m"],
+        "map_yaml": f"{base}/map.yaml",
+        "truth_yaml": f"{base}/truth.yaml",
+        "doors_geojson": f"{base}/doors.geojson",
+        "truth_rooms_geojson": f"{base}/truth_rooms.geojson",
+        "trajectory_tum": f"{base}/trajectory.tum",
+        "trajectory_truth_tum": f"{base}/trajectory_truth.tum",
+        "run_json": f"{base}/{MANIFEST}",
+    }
+
+
+def write_metadata(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """The table of one split, ``metadata.parquet``: a Hugging Face image folder reads it beside the pictures.
+
+    Raises:
+        OutputError: It cannot be written.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    buffer = io.BytesIO()
+    pq.write_table(pa.Table.from_pylist([dict(entry) for entry in rows]), buffer)
+    write_bytes(folder / METADATA, buffer.getvalue())
+
+
+def write_sums(folder: Path, abouts: Mapping[str, Mapping[str, Any]]) -> None:
+    """``SHA256SUMS`` as ``sha256sum -c`` reads it, over every repeatable file of the dataset but itself.
+
+    Args:
+        folder: The dataset.
+        abouts: ``run.json`` of each survey and sample, by folder relative to the dataset.
+
+    Raises:
+        OutputError: It cannot be written.
+    """
+    lines = [f"{value}  {name}/{file}" for name, about in abouts.items() for file, value in about["checksums"].items()]
+    lines += [f"{digest(folder / name / MANIFEST)}  {name}/{MANIFEST}" for name in abouts]
+    others = [folder / DATASET_MANIFEST, folder / CARD, *(folder / split / METADATA for split in SPLITS)]
+    lines += [f"{digest(path)}  {path.relative_to(folder).as_posix()}" for path in others if path.is_file()]
+    text = "".join(f"{line}\n" for line in sorted(lines, key=lambda line: line.split("  ", 1)[1]))
+    write_bytes(folder / SUMS, text.encode())
+
+
+def fingerprint(folder: Path) -> str:
+    """SHA-256 of ``SHA256SUMS``: one line that says whether two datasets are equal."""
+    return hashlib.sha256((folder / SUMS).read_bytes()).hexdigest()

@@ -1,0 +1,238 @@
+"""One sample of a dataset: made, written, and described in one row."""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.errors import OutputError, reason
+from closedrooms.core.files import output_folder
+from closedrooms.core.geojson import write_doors, write_rooms
+from closedrooms.core.grid import GridFrame, OccupancyGrid
+from closedrooms.core.pose import Pose2
+from closedrooms.core.rosmap import write_map
+from closedrooms.core.tum import write_trajectory
+from closedrooms.experiments.dataset.checksums import checksums
+from closedrooms.experiments.dataset.config import DatasetConfig
+from closedrooms.experiments.dataset.erase import Eraser
+from closedrooms.experiments.dataset.open_survey import survey_open
+from closedrooms.experiments.dataset.survey_store import read_survey, write_survey
+from closedrooms.experiments.dataset.variants import Variant, World, noise_seed
+from closedrooms.mapping.logs.npz import write_scans
+from closedrooms.mapping.logs.recorded_run import RecordedRun
+from closedrooms.mapping.mapper import Mapper
+from closedrooms.mapping.trajectory import ate
+from closedrooms.navigation.observer import Observer
+from closedrooms.pipeline.manifest import resolved, versions
+from closedrooms.pipeline.progress import Silent
+from closedrooms.pipeline.run_log import Witness
+from closedrooms.pipeline.scores import area_mapped, count_seen, room_points
+from closedrooms.pipeline.survey import Truth, survey_building
+from closedrooms.sim.simulation import Simulation
+from closedrooms.visualization.rerun.opening import open_recording
+from closedrooms.worlds.library import load_world
+from closedrooms.worlds.plan import FloorPlan
+from closedrooms.worlds.truth import rasterise, reachable, true_rooms, truth_bounds
+
+FORMAT = 1
+SURVEYS = "surveys"
+# What says nothing about a sample's content.
+NOT_CONTENT = ("out", "worlds", "workers", "scheduler", "repetitions", "max_closed")
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """Something to make: a world's survey (no variant), or one sample."""
+
+    config: DatasetConfig
+    world: World
+    variant: Variant | None = None
+
+    @property
+    def folder(self) -> Path:
+        """Where it goes."""
+        if self.variant is None:
+            return self.config.out / SURVEYS / self.world.name
+        return self.config.out / self.variant.id
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a task ended: nothing set is well.
+
+    Attributes:
+        failure: Why this one cannot be made; the others can.
+        trouble: Why nothing can be written, e.g. a full disk; all work ends.
+    """
+
+    failure: str = ""
+    trouble: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observed:
+    """What a sample's robot brought home, whichever way it was made.
+
+    Poses are those of all scans of an exploration, of an erased map those of the keyframes that make it.
+    """
+
+    grid: OccupancyGrid
+    doors: Sequence[ClosedDoor]
+    stamps: FloatArray
+    estimate: FloatArray
+    truth: FloatArray
+    scans: RecordedRun | None
+    about: dict[str, Any]
+
+
+def make(task: Task) -> Outcome:
+    """Make one survey or sample and write it; nothing that goes wrong is raised, it is told."""
+    try:
+        plan = _plan(task.world.source)
+        if task.variant is None:
+            config = task.config
+            seed = noise_seed(config, task.world)
+            survey = survey_open(plan, config.sim, config.mapper, config.navigation, seed)
+            write_survey(task.folder, survey, _about(task, seed))
+        else:
+            _make_sample(task, task.variant, plan)
+    except OutputError as error:
+        return Outcome(trouble=str(error))
+    except Exception as error:
+        return Outcome(failure=reason(error))
+    return Outcome()
+
+
+def _about(task: Task, seed: int) -> dict[str, Any]:
+    """What a survey's and a sample's ``run.json`` begin with."""
+    return {
+        "format": FORMAT,
+        "world": task.world.name,
+        "world_sha256": task.world.digest,
+        "seed": seed,
+        "configuration": resolved(task.config, leave_out=NOT_CONTENT),
+        "versions": versions(),
+    }
+
+
+def _make_sample(task: Task, variant: Variant, plan: FloorPlan) -> None:
+    config, world = task.config, task.world
+    closed = tuple(door.id for door in plan.doors if door.id in variant.closed)
+    erased = config.maps == "erased"
+    own = () if erased else (str(variant.repetition), str(len(closed)))
+    seed = noise_seed(config, world, *own)
+    start = Simulation(plan, closed, config.sim, seed).world_T_map
+    manifest: dict[str, Any] = {
+        **_about(task, seed),
+        "sample": variant.id,
+        "split": world.split,
+        "repetition": variant.repetition,
+        "order": list(variant.closed),
+        "closed": list(closed),
+    }
+    with (
+        output_folder(task.folder, manifest) as staging,
+        open_recording(staging / "run.rrd" if config.record else None, plan, name=variant.id) as observer,
+    ):
+        observer.configuration(manifest["configuration"])
+        observer.building(plan, start.inverse(), closed)
+        observed = _erased(config, world, closed) if erased else _simulated(config, plan, closed, seed, observer)
+        truth = Truth(_true_map(world.source, observed.grid.frame, start), true_rooms(plan, closed, start.inverse()))
+        if erased:
+            _show(observer, observed)
+        observer.truth(truth.grid, truth.rooms)
+        frame = truth.grid.frame
+        write_map(staging / "map", observed.grid.on(frame))
+        write_map(staging / "truth", truth.grid)
+        write_doors(staging / "doors.geojson", observed.doors)
+        write_rooms(staging / "truth_rooms.geojson", truth.rooms)
+        write_trajectory(staging / "trajectory.tum", observed.stamps, observed.estimate)
+        write_trajectory(staging / "trajectory_truth.tum", observed.stamps, observed.truth)
+        if config.keep_scans and observed.scans is not None:
+            write_scans(staging / "scans.npz", observed.scans, estimate=observed.estimate)
+        manifest["exploration"] = observed.about
+        manifest["metrics"] = _metrics(world.source, closed, observed, truth.grid, start)
+        seen = {door.id for door in observed.doors}
+        manifest["doors"] = {"seen": sorted(seen), "not_seen": sorted(set(closed) - seen)}
+        manifest["checksums"] = checksums(staging)
+
+
+def _metrics(
+    source: str, closed: Sequence[str], observed: Observed, truth: OccupancyGrid, start: Pose2
+) -> dict[str, Any]:
+    """What a run's ``run.json`` says of the map, under the same names."""
+    plan, map_T_world = _plan(source), start.inverse()
+    position, heading = ate(observed.estimate, observed.truth)
+    cells = reachable(plan, closed, truth.frame, map_T_world, (start.x, start.y))
+    return {
+        "area_mapped": round(area_mapped(observed.grid.on(truth.frame), cells), 5),
+        "ate_m": round(position, 5),
+        "ate_rad": round(heading, 6),
+        "doors_closed": len(closed),
+        "doors_seen": len(observed.doors),
+        "rooms_seen": count_seen(_room_points(source), observed.grid, map_T_world),
+        "units": {"area_mapped": "share 0..1", "ate_m": "m", "ate_rad": "rad"},
+    }
+
+
+def _erased(config: DatasetConfig, world: World, closed: Sequence[str]) -> Observed:
+    eraser = _eraser(config, world)
+    survey, result = eraser.survey, eraser.erase(closed)
+    kept = result.keyframes
+    scans = RecordedRun(result.scans, survey.keyframes.odometry[kept], survey.true_poses[kept])
+    stamps = np.array([scan.stamp for scan in result.scans])
+    about = {"status": survey.status, "simulated_s": round(survey.seconds, 3), "scans": len(kept)}
+    return Observed(result.grid, result.doors, stamps, survey.poses[kept], survey.true_poses[kept], scans, about)
+
+
+@functools.lru_cache(maxsize=1)
+def _eraser(config: DatasetConfig, world: World) -> Eraser:
+    """A worker takes the samples of one world after the other: it reads the survey once."""
+    folder = Task(config, world).folder
+    return Eraser(read_survey(folder, _plan(world.source), config, noise_seed(config, world)))
+
+
+@functools.lru_cache(maxsize=2)
+def _plan(source: str) -> FloorPlan:
+    return load_world(source)
+
+
+@functools.lru_cache(maxsize=2)
+def _room_points(source: str) -> list[FloatArray]:
+    return room_points(_plan(source))
+
+
+@functools.lru_cache(maxsize=2)
+def _true_map(source: str, frame: GridFrame, start: Pose2) -> OccupancyGrid:
+    """The truth on ``frame``, grown so that it holds the building; erased maps of one survey share it."""
+    plan, map_T_world = _plan(source), start.inverse()
+    return rasterise(plan, frame.covering(*truth_bounds(plan, map_T_world)), map_T_world)
+
+
+def _simulated(
+    config: DatasetConfig, plan: FloorPlan, closed: Sequence[str], seed: int, observer: Observer
+) -> Observed:
+    with Simulation(plan, closed, config.sim, seed) as sim:
+        witness, mapper = Witness(sim, Silent(), keep_scans=config.keep_scans), Mapper(config.mapper)
+        period = 1.0 / config.sim.lidar.rate
+        survey = survey_building(witness, mapper, config.navigation, period=period, observer=observer)
+        scans = witness.recorded() if config.keep_scans else None
+    about = {
+        "status": survey.exploration.status,
+        "simulated_s": round(survey.exploration.seconds, 3),
+        "scans": survey.exploration.scans,
+    }
+    return Observed(survey.grid, survey.doors, survey.stamps, survey.estimate, survey.truth, scans, about)
+
+
+def _show(observer: Observer, observed: Observed) -> None:
+    """An erased map was never explored: its recording holds what there is, at the end of the survey."""
+    end = float(observed.stamps[-1])
+    observer.trajectory(observed.stamps, observed.estimate)
+    observer.map(observed.grid, end, final=True)
+    observer.doors(observed.doors, end)

@@ -1,0 +1,71 @@
+"""Surveys on disk: every worker draws its maps from the same file, also after a restart."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files import MANIFEST, output_folder, read_json
+from closedrooms.core.tum import read_trajectory, write_trajectory
+from closedrooms.experiments.dataset.checksums import checksums
+from closedrooms.experiments.dataset.config import DatasetConfig
+from closedrooms.experiments.dataset.open_survey import OpenSurvey
+from closedrooms.mapping.logs.npz import read_scans, write_scans
+from closedrooms.mapping.logs.recorded_run import RecordedRun
+from closedrooms.sim.simulation import Simulation
+from closedrooms.worlds.plan import FloorPlan
+
+
+def write_survey(folder: Path, survey: OpenSurvey, about: dict[str, Any]) -> None:
+    """Write a survey: ``scans.npz`` holds the keyframes' scans, the trajectories all poses.
+
+    Args:
+        folder: Takes its place whole or not at all.
+        survey: What to keep.
+        about: More entries of its ``run.json``.
+
+    Raises:
+        OutputError: The folder cannot be written, or holds something that is not ours.
+    """
+    manifest: dict[str, Any] = {
+        **about,
+        "exploration": {"status": survey.status, "simulated_s": round(survey.seconds, 3)},
+    }
+    with output_folder(folder, manifest) as staging:
+        write_scans(staging / "scans.npz", survey.keyframes, estimate=survey.poses)
+        write_trajectory(staging / "trajectory.tum", survey.stamps, survey.estimate)
+        write_trajectory(staging / "trajectory_truth.tum", survey.stamps, survey.truth)
+        manifest["checksums"] = checksums(staging)
+
+
+def read_survey(folder: Path, plan: FloorPlan, config: DatasetConfig, seed: int) -> OpenSurvey:
+    """A survey as it was written.
+
+    Args:
+        folder: Of the survey.
+        plan: The building that was surveyed.
+        config: How it was simulated and mapped.
+        seed: Of its noise.
+
+    Raises:
+        InvalidInputError: A file is missing or broken.
+    """
+    recorded = read_scans(folder / "scans.npz")
+    with np.load(folder / "scans.npz", allow_pickle=False) as archive:
+        poses = np.array(archive["estimate"])
+    lidar = config.sim.lidar
+    scans = tuple(replace(scan, range_min=lidar.range_min) for scan in recorded.scans)
+    keyframes = RecordedRun(scans, recorded.odometry, recorded.reference)
+    stamps, estimate = read_trajectory(folder / "trajectory.tum")
+    _, truth = read_trajectory(folder / "trajectory_truth.tum")
+    about = read_json(folder / MANIFEST, what="a survey's run.json")
+    try:
+        status, seconds = about["exploration"]["status"], float(about["exploration"]["simulated_s"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise InvalidInputError("no exploration", expected="a survey's run.json", where=folder / MANIFEST) from error
+    start = Simulation(plan, (), config.sim, seed).world_T_map
+    return OpenSurvey(
+        plan, config.sim, config.mapper, seed, start, status, seconds, keyframes, poses, stamps, estimate, truth
+    )

@@ -1,0 +1,123 @@
+"""Which samples a dataset holds: worlds, orders of closing, numbers of closed doors, splits."""
+
+import hashlib
+import re
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.random import stream
+from closedrooms.experiments.dataset.config import DatasetConfig
+from closedrooms.worlds.closing import closable_rooms
+from closedrooms.worlds.formats.native import plan_text
+from closedrooms.worlds.library import bundled_names, load_world
+from closedrooms.worlds.plan import FloorPlan
+
+Split = Literal["train", "validation", "test"]
+SPLITS: tuple[Split, ...] = ("train", "validation", "test")
+# Share of the buildings in ``validation`` and in ``test`` each; at least one building where there are three.
+HELD_OUT = 0.15
+ALL = "all"
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """One building of a dataset.
+
+    Attributes:
+        name: Its name in the dataset, fit for a folder.
+        source: Bundled name or absolute path.
+        split: Where all its samples go.
+        closable: Doors that close one room each, in plan order.
+        digest: SHA-256 of the plan as our JSON: tells whether a file changed.
+    """
+
+    name: str
+    source: str
+    split: Split
+    closable: tuple[str, ...]
+    digest: str
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One sample to be: a building with some doors closed.
+
+    Attributes:
+        world: The building.
+        repetition: Which order of closing, from 0.
+        closed: The doors that are closed, in the order of closing.
+    """
+
+    world: World
+    repetition: int
+    closed: tuple[str, ...]
+
+    @property
+    def id(self) -> str:
+        """Its folder relative to the dataset; depends on configuration and seed only."""
+        return f"{self.world.split}/{self.world.name}/r{self.repetition:02d}-c{len(self.closed):02d}"
+
+
+def find_worlds(config: DatasetConfig) -> list[World]:
+    """The buildings, in the order of their names.
+
+    Raises:
+        InvalidInputError: An unreadable world, two of one name, or one without a room that a door closes.
+    """
+    wanted = [name for given in config.worlds for name in (bundled_names() if given == ALL else [given])]
+    found: dict[str, tuple[str, FloorPlan]] = {}
+    for given in dict.fromkeys(wanted):
+        plan = load_world(given)
+        source = given if given in bundled_names() else str(Path(given).resolve())
+        name = re.sub(r"[^A-Za-z0-9._-]+", "-", plan.name).strip(".-") or "world"
+        if name in found:
+            raise InvalidInputError(f"two worlds named {name!r}", expected="one world a name", where=given)
+        found[name] = (source, plan)
+    names = sorted(found)
+    splits = split_buildings(names, config.seed)
+    worlds = []
+    for name in names:
+        source, plan = found[name]
+        closable = tuple(doors[0] for doors in closable_rooms(plan).values())
+        if not closable:
+            raise InvalidInputError("no room that one door closes", expected="a world with such rooms", where=source)
+        digest = hashlib.sha256(plan_text(plan).encode()).hexdigest()
+        worlds.append(World(name, source, splits[name], closable, digest))
+    return worlds
+
+
+def split_buildings(names: Sequence[str], seed: int) -> dict[str, Split]:
+    """Which split each building belongs to, drawn by the seed; whole buildings, so that none is in two splits."""
+    order = stream(seed, "splits").permutation(len(names))
+    held = max(round(HELD_OUT * len(names)), 1) if len(names) >= len(SPLITS) else 0
+    splits: dict[str, Split] = {}
+    for place, index in enumerate(order):
+        splits[names[index]] = "test" if place < held else "validation" if place < 2 * held else "train"
+    return splits
+
+
+def find_variants(world: World, config: DatasetConfig) -> list[Variant]:
+    """Every sample of a building: doors closed one after the other, in as many orders as there are repetitions.
+
+    A door closed among i stays closed among i + 1, and the first door differs between repetitions for as long as there
+    are doors (paper, section 5).
+    """
+    count = min(config.max_closed, len(world.closable))
+    firsts = stream(config.seed, "first door", world.name).permutation(len(world.closable))
+    variants = []
+    for repetition in range(config.repetitions):
+        first = int(firsts[repetition % len(firsts)])
+        rng = stream(config.seed, "closed doors", world.name, str(repetition))
+        others = [int(i) for i in rng.permutation(len(world.closable)) if i != first]
+        order = [world.closable[i] for i in (first, *others)]
+        variants += [Variant(world, repetition, tuple(order[:n])) for n in range(1, count + 1)]
+    return variants
+
+
+def noise_seed(config: DatasetConfig, world: World, *variant: str) -> int:
+    """Seed of the simulated noise of a world's survey, or of one variant's; 32 bits."""
+    return zlib.crc32("/".join((str(config.seed), world.name, *variant)).encode())

@@ -1,0 +1,56 @@
+"""Options of ``closedrooms evaluate``."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.options import check_least
+
+Method = Literal["paper", "best", "rose", "line-of-sight", "geometric"]
+METHODS: tuple[Method, ...] = ("paper", "best", "rose", "line-of-sight", "geometric")
+# The baselines predict each room for itself, so their maps may contradict themselves and hold no tour (paper, section
+# 5.2).
+TOURED: tuple[Method, ...] = ("paper", "best", "rose")
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluateConfig:
+    """What is compared with what."""
+
+    datasets: tyro.conf.Positional[tuple[Path, ...]]
+    """Folders written by ``closedrooms dataset`` (with manifest.json); in any other, a sample is any folder below that
+    holds map.yaml, doors.geojson and truth.yaml."""
+
+    out: Path
+    """Folder to write; the same command again goes on where it stopped."""
+
+    methods: tuple[Method, ...] = METHODS
+    """What to compare."""
+
+    workers: int = 2
+    """Processes."""
+
+    tours: bool = True
+    """Plan coverage tours too (paper, section 5), on every sample whose run.json says how many rooms the robot saw."""
+
+    worst: int = 12
+    """Samples on the contact sheet of the worst cases."""
+
+    resamples: int = 2000
+    """Resamples of the bootstrap intervals."""
+
+    subset_worlds: int = 15
+    """Environments in the subset of section 5.3, spread evenly over all in the order of their names."""
+
+    subset_repetitions: int = 10
+    """Repetitions of each environment in that subset: the first ones."""
+
+    def __post_init__(self) -> None:
+        if not self.datasets:
+            raise InvalidInputError("no dataset", expected="at least one folder")
+        if not self.methods or len(set(self.methods)) != len(self.methods):
+            raise InvalidInputError(f"methods {self.methods}", expected=f"each once, of {', '.join(METHODS)}")
+        check_least(self, workers=1, resamples=1, subset_worlds=1, subset_repetitions=1)

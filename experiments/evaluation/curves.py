@@ -1,0 +1,113 @@
+"""Figures 5, 9, 12 and 14 of the paper: a figure against the number of closed doors, with standard deviations."""
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from closedrooms.core.files import write_bytes
+from closedrooms.visualization.colours import ROOM_COLOURS, Colour
+
+Row = dict[str, Any]
+# One colour a method or estimate in every figure.
+COLOURS: dict[str, Colour] = {
+    name: ROOM_COLOURS[number]
+    for number, name in enumerate(
+        ("paper", "rose", "best", "line-of-sight", "geometric", "authors", "closed", "baseline")
+    )
+}
+LABELS = {
+    "paper": "paper (structure of 3.1)",
+    "rose": "paper with ROSE (4.2)",
+    "closed": "closed: map as it is",
+    "baseline": "baseline: so much a door",
+}
+TITLES = {"matched": "hidden rooms, matched one-to-one", "by_door": "rooms with the same door"}
+
+
+def draw_iou(path: Path, rows: Sequence[Row], methods: Sequence[str], measures: Sequence[str]) -> bool:
+    """IoU against the number of closed doors (paper, figures 5 and 9); a panel a measure.
+
+    Args:
+        path: The PNG.
+        rows: Of :func:`closedrooms.experiments.evaluation.summary.iou_rows`.
+        methods: Which to draw.
+        measures: ``matched``, ``by_door``.
+
+    Returns:
+        Whether there was anything to draw.
+    """
+    panels = [(TITLES[m], [(name, _series(rows, "method", name, m)) for name in methods]) for m in measures]
+    return _draw(path, panels, "IoU (mean, standard deviation)", top=1.05)
+
+
+def draw_errors(path: Path, rows: Sequence[Row], names: Sequence[str]) -> bool:
+    """Error of estimates of the coverage cost against the number of closed doors (paper, figures 12 and 14).
+
+    Args:
+        path: The PNG.
+        rows: Of :func:`closedrooms.experiments.evaluation.summary.coverage_rows`; a panel a part.
+        names: Estimates to draw.
+
+    Returns:
+        Whether there was anything to draw.
+    """
+    titles = {"subset": "subset of section 5.3", "all": "all"}
+    panels = []
+    for part in dict.fromkeys(row["part"] for row in rows):
+        own = [row for row in rows if row["part"] == part]
+        panels.append((titles[part], [(name, _series(own, "estimate", name, "error")) for name in names]))
+    return _draw(path, panels, "error of the coverage cost [%] (mean, standard deviation)", top=None)
+
+
+Series = tuple[list[int], list[float], list[float]]
+
+
+def _series(rows: Sequence[Row], key: str, name: str, measure: str) -> Series:
+    """Numbers of closed doors, means and standard deviations of one method."""
+    own = [row for row in rows if row[key] == name and row["closed_doors"] != "all"]
+    own = [row for row in own if row[f"{measure}_mean"] is not None]
+    own.sort(key=lambda row: row["closed_doors"])
+    doors = [row["closed_doors"] for row in own]
+    return doors, [row[f"{measure}_mean"] for row in own], [row[f"{measure}_sd"] for row in own]
+
+
+def _draw(path: Path, panels: Sequence[tuple[str, list[tuple[str, Series]]]], label: str, *, top: float | None) -> bool:
+    panels = [panel for panel in panels if any(series[0] for _, series in panel[1])]
+    if not panels:
+        return False
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
+
+    figure = Figure(figsize=(6.5 * len(panels), 4.3), layout="constrained")
+    FigureCanvasAgg(figure)
+    all_axes = np.atleast_1d(figure.subplots(1, len(panels), sharey=True))
+    for axes, (title, curves) in zip(all_axes, panels, strict=True):
+        drawn = [(name, series) for name, series in curves if series[0]]
+        for number, (name, (doors, means, spread)) in enumerate(drawn):
+            axes.errorbar(
+                np.array(doors) + (number - (len(drawn) - 1) / 2) * 0.09, means, spread,
+                label=LABELS.get(name, name), color=[v / 255 for v in COLOURS[name]],
+                marker="o", markersize=3.5, elinewidth=0.8, capsize=2,
+            )  # fmt: skip
+        axes.set(title=title, xlabel="closed doors")
+        axes.set_ylim(0.0, top)
+        numbers = [door for _, (doors, _, _) in drawn for door in doors]
+        if numbers:
+            axes.set_xlim(min(numbers) - 0.6, max(numbers) + 0.6)
+            axes.legend(fontsize=8)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.grid(alpha=0.3)
+    all_axes[0].set_ylabel(label)
+    save_figure(figure, path)
+    return True
+
+
+def save_figure(figure: Any, path: Path) -> None:
+    """Write a matplotlib figure as PNG, without the version of the library in it."""
+    data = io.BytesIO()
+    figure.savefig(data, format="png", dpi=110, metadata={"Software": None})
+    write_bytes(path, data.getvalue())

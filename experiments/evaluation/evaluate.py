@@ -1,0 +1,109 @@
+"""``closedrooms evaluate``: methods against the truth, over datasets (paper, section 4.1)."""
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from closedrooms.core.files import MANIFEST, PROGRAM, write_json
+from closedrooms.experiments.evaluation.claimed_folder import claim
+from closedrooms.experiments.evaluation.config import EvaluateConfig
+from closedrooms.experiments.evaluation.listing import SamplePath, find_samples
+from closedrooms.experiments.evaluation.sample import Outcome, Scores, evaluate_sample
+from closedrooms.experiments.workers import Crew, Lost
+from closedrooms.pipeline.manifest import resolved, versions
+from closedrooms.pipeline.progress import Progress, Silent
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EvaluationResult:
+    """A finished evaluation.
+
+    Attributes:
+        folder: What was written.
+        title: Head of the table.
+        summary: One row a method over all samples.
+        failures: Why a sample failed, by ``sample``, or ``method sample`` where one method did.
+        seconds: Median time of a prediction by method [s].
+    """
+
+    folder: Path
+    title: str
+    summary: list[dict[str, Any]]
+    failures: dict[str, str] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def table(self) -> list[tuple[str, ...]]:
+        """Rows for people; the first is the head."""
+        head = ("method", "rooms", "IoU matched", "median", "IoU by door", "IoU whole area", "agreement", "s a map")
+        names = ("matched_mean", "matched_median", "by_door_mean", "area_mean", "agreement_mean")
+        rows: list[tuple[str, ...]] = [head]
+        for row in self.summary:
+            figures = ["" if row[name] is None else f"{row[name]:.3f}" for name in names]
+            seconds = self.seconds.get(row["method"])
+            rows.append((row["method"], str(row["rooms"]), *figures, "" if seconds is None else f"{seconds:.3f}"))
+        return rows
+
+
+def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> EvaluationResult:
+    """Predict every sample with every method, score it, write tables and pictures.
+
+    What was finished before with the same input, method and code is not done again.
+
+    Args:
+        config: Options.
+        progress: Told how far it is.
+
+    Raises:
+        InvalidInputError: No samples, or two with one name.
+        OutputError: The folder cannot be written, or holds something that is not ours.
+    """
+    progress = progress or Silent()
+    samples = find_samples(config.datasets)
+    claim(config.out, "evaluate")
+    progress.stage("evaluate", len(samples))
+    scores: list[Scores] = []
+    failures: dict[str, str] = {}
+    for number, outcome in enumerate(_work(samples, config), start=1):
+        scores += outcome.scores
+        failures |= outcome.problems
+        progress.advance(number, f"{number} of {len(samples)}")
+    scores.sort(key=lambda score: (score["method"], score["sample"]))
+    failures = dict(sorted(failures.items()))
+    from closedrooms.experiments.evaluation.report import write_report
+
+    progress.stage("report")
+    summary = write_report(config.out, scores, samples, config, failures)
+    seconds = _seconds(scores)
+    manifest = {
+        "program": PROGRAM,
+        "command": "evaluate",
+        "configuration": resolved(config, leave_out=("datasets", "out", "workers")),
+        "versions": versions(),
+        "samples": len(samples),
+        "summary": summary,
+        "failures": failures,
+        "durations": {"prediction_median_s": seconds},
+        "files": sorted(path.name for path in config.out.iterdir() if path.name != MANIFEST),
+    }
+    write_json(config.out / MANIFEST, manifest)
+    return EvaluationResult(config.out, f"{len(samples)} samples", summary, failures, seconds)
+
+
+def _seconds(scores: Sequence[Scores]) -> dict[str, float]:
+    times: defaultdict[str, list[float]] = defaultdict(list)
+    for score in scores:
+        if "seconds" in score:
+            times[score["method"]].append(score["seconds"])
+    return {method: round(median(values), 3) for method, values in sorted(times.items())}
+
+
+def _work(samples: Sequence[SamplePath], config: EvaluateConfig) -> Iterator[Outcome]:
+    """What comes of the samples, as they are finished."""
+    job = partial(evaluate_sample, methods=config.methods, out=config.out, tours=config.tours)
+    crew: Crew[SamplePath, Outcome] = Crew(min(config.workers, len(samples)))
+    for sample, outcome in crew.do(job, samples):
+        yield Outcome([], {sample.name: outcome.reason}) if isinstance(outcome, Lost) else outcome

@@ -1,0 +1,122 @@
+"""Which samples a dataset holds: as its manifest lists them, or every folder with the files of one."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files import MANIFEST, read_text
+
+FILES = ("map.yaml", "doors.geojson", "truth.yaml")
+DATASET_MANIFEST = "manifest.json"
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class SamplePath:
+    """Where a sample is.
+
+    Attributes:
+        name: Its path relative to the dataset.
+        folder: The folder with its files.
+        problem: Why there is nothing to read, from the manifest; empty where there should be.
+        listed: Whether a manifest lists it, so that its run.json and checksums have to be there.
+        digest: SHA-256 of its run.json, empty where the dataset does not say.
+        world: Building, empty where no manifest names it.
+        repetition: Repetition, -1 where no manifest names it.
+    """
+
+    name: str
+    folder: Path
+    problem: str = ""
+    listed: bool = False
+    digest: str = ""
+    world: str = ""
+    repetition: int = -1
+
+
+def find_samples(datasets: Sequence[Path]) -> list[SamplePath]:
+    """Every sample of the datasets, by name.
+
+    Raises:
+        InvalidInputError: A dataset that is no folder, holds no sample or is of another version; two samples of one
+            name.
+    """
+    found: dict[str, SamplePath] = {}
+    for dataset in datasets:
+        if not dataset.is_dir():
+            raise InvalidInputError("no such folder", expected="a dataset", where=dataset)
+        listed = (dataset / DATASET_MANIFEST).is_file()
+        samples = list(_listed(dataset) if listed else _folders(dataset))
+        if not samples:
+            raise InvalidInputError("no sample", expected=f"folders with {', '.join(FILES)}", where=dataset)
+        for sample in samples:
+            if sample.name in found:
+                raise InvalidInputError(
+                    f"two samples named {sample.name!r}", expected="one folder a name", where=sample.folder
+                )
+            found[sample.name] = sample
+    return [sample for _, sample in sorted(found.items())]
+
+
+def _folders(dataset: Path) -> Iterator[SamplePath]:
+    """Every folder with the files of a sample, at any depth."""
+    for folder in sorted(path.parent for path in dataset.rglob(FILES[0])):
+        if all((folder / name).is_file() for name in FILES):
+            name = folder.relative_to(dataset).as_posix()
+            yield SamplePath(dataset.resolve().name if name == "." else name, folder)
+
+
+def _listed(dataset: Path) -> Iterator[SamplePath]:
+    """The samples of a manifest, those that failed included."""
+    from closedrooms.experiments.dataset.layout import read_manifest
+
+    path = dataset / DATASET_MANIFEST
+    manifest = read_manifest(dataset)
+    entries = manifest.get("samples")
+    if not isinstance(entries, list):
+        raise InvalidInputError("no list of samples", expected="the manifest of a dataset", where=path)
+    if not entries and not manifest.get("complete", True):
+        raise InvalidInputError("a dataset that is not finished", expected="closedrooms dataset to end", where=dataset)
+    digests = _digests(dataset)
+    for number, entry in enumerate(entries):
+        yield _entry(dataset, entry, number, digests)
+
+
+def _digests(dataset: Path) -> dict[str, str]:
+    """SHA-256 by path, as far as ``SHA256SUMS`` tells."""
+    from closedrooms.experiments.dataset.layout import SUMS
+
+    path = dataset / SUMS
+    if not path.is_file():
+        return {}
+    lines = [line.split("  ", 1) for line in read_text(path, what="checksums").splitlines()]
+    return {line[1]: line[0] for line in lines if len(line) == 2}
+
+
+def _entry(dataset: Path, entry: Any, number: int, digests: dict[str, str]) -> SamplePath:
+    name = entry.get("id") if isinstance(entry, dict) else None
+    if not isinstance(name, str) or not _stays_inside(name):
+        where = dataset / DATASET_MANIFEST
+        raise InvalidInputError(f"sample {number} with the id {name!r}", expected="a folder below it", where=where)
+    folder = dataset / name
+    problem = ""
+    if entry.get("status", "ok") != "ok":
+        problem = f"failed when the dataset was made: {entry.get('reason') or 'no reason given'}"
+    elif not folder.is_dir():
+        problem = f"listed in {DATASET_MANIFEST} but missing"
+    repetition = entry.get("repetition")
+    return SamplePath(
+        name,
+        folder,
+        problem,
+        listed=True,
+        digest=digests.get(f"{name}/{MANIFEST}", ""),
+        world=str(entry.get("world") or ""),
+        repetition=repetition if isinstance(repetition, int) else -1,
+    )
+
+
+def _stays_inside(name: str) -> bool:
+    path = PurePosixPath(name)
+    return bool(name) and path.as_posix() == name and not path.is_absolute() and not {"..", "."} & set(path.parts)

@@ -1,0 +1,171 @@
+"""Tables, pictures and the page of an evaluation."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from closedrooms.experiments.evaluation.cases import draw_extremes, draw_worst, extreme_cases
+from closedrooms.experiments.evaluation.config import METHODS, EvaluateConfig
+from closedrooms.experiments.evaluation.curves import draw_errors, draw_iou
+from closedrooms.experiments.evaluation.listing import SamplePath
+from closedrooms.experiments.evaluation.numbers import number_rows
+from closedrooms.experiments.evaluation.page import Section, write_page
+from closedrooms.experiments.evaluation.summary import (
+    WITHOUT_PREDICTION,
+    coverage_rows,
+    headline,
+    iou_rows,
+    paired_rows,
+    room_rows,
+    sample_rows,
+    subset,
+    world_rows,
+)
+from closedrooms.experiments.evaluation.tables import write_table
+
+Scores = dict[str, Any]
+Row = dict[str, Any]
+INTERVALS = (
+    "Intervals hold 95 %: low to high draws samples (other doors in the same buildings), world low to world high draws "
+    "buildings with all their samples (other buildings)."
+)
+
+
+def write_report(
+    folder: Path,
+    scores: Sequence[Scores],
+    samples: Sequence[SamplePath],
+    config: EvaluateConfig,
+    failures: Mapping[str, str],
+) -> list[Row]:
+    """Write every table (CSV, Parquet), picture (PNG) and ``report.html``.
+
+    Args:
+        folder: Where to write; the results of the samples are in it.
+        scores: One entry a sample and method, sorted.
+        samples: All samples, for the pictures.
+        config: Options.
+        failures: Why a sample, or a method on one, failed.
+
+    Returns:
+        A row a method, over all samples.
+    """
+    if not scores:
+        write_page(folder / "report.html", "closedrooms evaluate", [_failure_section(failures)])
+        return []
+    chosen = subset(scores, config)
+    iou, tests = iou_rows(scores, config), paired_rows(scores, config)
+    coverage = [*coverage_rows(chosen, config, "subset"), *coverage_rows(scores, config, "all")]
+    numbers, worlds = number_rows(scores, chosen, tests), world_rows(scores)
+    write_table(folder / "rooms", room_rows(scores), ("method", "sample", "world", "repetition", "closed_doors",
+                                                      "measure", "room", "iou"))  # fmt: skip
+    write_table(folder / "samples", sample_rows(scores))
+    write_table(folder / "summary", iou)
+    write_table(folder / "worlds", worlds)
+    for name, rows in (("coverage", coverage), ("tests", tests), ("numbers", numbers)):
+        if rows:
+            write_table(folder / name, rows)
+    sections = _sections(folder, scores, {sample.name: sample for sample in samples}, config, iou, coverage)
+    overall = [row for row in iou if row["closed_doors"] == "all"]
+    first = Section(
+        "Numbers of the text",
+        f"{len(samples)} samples of {len({s['world'] for s in scores})} buildings. {INTERVALS}",
+        tables=[_table(numbers), _iou_table(overall)],
+    )
+    tested = Section(
+        "Paired tests",
+        "Second minus first on the same samples; Wilcoxon's signed-rank test over the means of buildings, and over "
+        "samples, which takes samples of one building as independent. The interval draws buildings. "
+        "Measure error: coverage error of the prediction in percent.",
+        tables=[_table(tests)] if tests else [],
+    )
+    by_world = Section("Buildings (table 1: most closed doors)", tables=[_table(worlds)])
+    tail = [_failure_section(failures)] if failures else []
+    title = f"closedrooms evaluate: {len(samples)} samples"
+    write_page(folder / "report.html", title, [first, *sections, tested, by_world, *tail])
+    return overall
+
+
+def _sections(
+    folder: Path,
+    scores: Sequence[Scores],
+    samples: Mapping[str, SamplePath],
+    config: EvaluateConfig,
+    iou: Sequence[Row],
+    coverage: Sequence[Row],
+) -> list[Section]:
+    """The figures of the paper, as far as methods and samples allow."""
+    present = {score["method"] for score in scores}
+    measure = headline(scores)
+    sections: list[Section] = []
+
+    def add(heading: str, text: str, name: str, *tables: Sequence[Sequence[Any]], drawn: bool) -> None:
+        if drawn:
+            sections.append(Section(heading, text, folder / name, list(tables)))
+
+    every = [name for name in (*METHODS, "authors") if name in present]
+    drawn = draw_iou(folder / "iou.png", iou, every, ("matched", "by_door"))
+    add("All methods: IoU by number of closed doors", "Both ways to compare a room with the truth.", "iou.png",
+        _doors_table(iou, "method", every, measure), drawn=drawn)  # fmt: skip
+    names = [name for name in ("paper", "line-of-sight", "geometric") if name in present]
+    drawn = draw_iou(folder / "figure-05.png", iou, names, (measure,))
+    add("Figure 5: IoU of the method and both baselines", "", "figure-05.png", drawn=drawn)
+    names = [name for name in ("paper", "rose") if name in present]
+    drawn = draw_iou(folder / "figure-09.png", iou, names, (measure,))
+    add("Figure 9: IoU with two ways to find structure", "", "figure-09.png", drawn=drawn)
+    names = [name for name in METHODS if any(row["estimate"] == name for row in coverage)]
+    shown = [*WITHOUT_PREDICTION, *names[:1]]
+    drawn = draw_errors(folder / "figure-12.png", coverage, shown)
+    table = [row for row in coverage if row["part"] == "all"]
+    add("Figure 12: errors of the coverage cost", "", "figure-12.png",
+        _doors_table(table, "estimate", [*WITHOUT_PREDICTION, *names], "error"), drawn=drawn)  # fmt: skip
+    drawn = draw_errors(folder / "figure-14.png", coverage, names)
+    add("Figure 14: errors of the coverage cost by prediction", "", "figure-14.png", drawn=drawn)
+    method = next((name for name in METHODS if name in present), None)
+    if method is not None:
+        cases = extreme_cases(scores, method)
+        count = draw_extremes(folder / "figure-07.png", folder / "figure-13.png", cases, samples)
+        add("Figure 7: much predicted from little", "Of the tenth of the maps that show least: the one whose coverage "
+            "cost is estimated best, and the one of another building where it is estimated worst.", "figure-07.png",
+            drawn=count > 0)  # fmt: skip
+        add("Figure 13: graphs of the same maps", "", "figure-13.png", drawn=count > 1)
+        worst = "best" if "best" in present else method
+        drawn = draw_worst(folder / "worst.png", scores, samples, worst, config.worst)
+        add("Worst cases", "By mean IoU of matched rooms.", "worst.png", drawn=drawn)
+    return sections
+
+
+def _table(rows: Sequence[Row]) -> list[list[Any]]:
+    if not rows:
+        return [[]]
+    head = list(rows[0])
+    return [[name.replace("_", " ") for name in head], *([row.get(name) for name in head] for row in rows)]
+
+
+def _iou_table(rows: Sequence[Row]) -> list[list[Any]]:
+    head: list[Any] = ["method", "samples", "rooms", "not seen"]
+    measures = {"by_door": "IoU by door", "matched": "IoU matched", "area": "IoU whole area", "with_unseen": "by door, "
+                "unseen 0"}  # fmt: skip
+    head += [f"{name}: mean (sd; low to high; world low to world high)" for name in measures.values()]
+    table = [head]
+    for row in rows:
+        line: list[Any] = [row["method"], row["samples"], row["rooms"], row["not_seen"]]
+        for name in measures:
+            keys = ("mean", "sd", "low", "high", "world_low", "world_high")
+            figures = [row[f"{name}_{key}"] for key in keys]
+            text = "{:.3f} ({:.3f}; {:.3f} to {:.3f}; {:.3f} to {:.3f})"
+            line.append(None if None in figures else text.format(*figures))
+        table.append(line)
+    return table
+
+
+def _doors_table(rows: Sequence[Row], key: str, names: Sequence[str], measure: str) -> list[list[Any]]:
+    """Means by number of closed doors: a line a number, a column a method."""
+    numbers = sorted({row["closed_doors"] for row in rows if row["closed_doors"] != "all"})
+    means = {(row[key], row["closed_doors"]): row[f"{measure}_mean"] for row in rows}
+    return [["closed doors", *names], *([n, *(means.get((name, n)) for name in names)] for n in numbers)]
+
+
+def _failure_section(failures: Mapping[str, str]) -> Section:
+    table = [["sample", "why"], *([name, why] for name, why in sorted(failures.items()))]
+    return Section("What failed", tables=[table])

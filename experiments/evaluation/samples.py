@@ -1,0 +1,117 @@
+"""Samples on disk: a map, its closed doors and the truth, in one folder each."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files import MANIFEST, read_json
+from closedrooms.core.geojson import read_doors, read_rooms
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.room import Room
+from closedrooms.core.rosmap import read_map
+from closedrooms.experiments.dataset.checksums import check, digest
+from closedrooms.experiments.evaluation.listing import SamplePath
+from closedrooms.predictor.structure.known_window import MAX_CELLS
+
+# Unknown cells kept around what is known when a sample is cropped [m].
+MARGIN = 3.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sample:
+    """One sample; all grids on one frame, cropped to what any of them knows.
+
+    Attributes:
+        observed: The map with closed doors.
+        doors: Closed doors of the map.
+        truth: The true map.
+        rooms: True rooms behind closed doors, empty where the sample has no such file.
+        authors: Somebody's completed map (``authors.yaml``), or ``None``.
+        world: Building.
+        repetition: Repetition, 0 where nothing names it.
+        closed: Closed doors, those that the robot did not see included; the doors of the map where nothing tells.
+        rooms_seen: |R| of section 5.2, ``None`` where no run.json tells.
+    """
+
+    observed: OccupancyGrid
+    doors: list[ClosedDoor]
+    truth: OccupancyGrid
+    rooms: list[Room]
+    authors: OccupancyGrid | None
+    world: str = ""
+    repetition: int = 0
+    closed: int = 0
+    rooms_seen: int | None = None
+
+
+def read_sample(sample: SamplePath) -> Sample:
+    """Read a sample, check it against its checksums, and bring its grids to one frame.
+
+    Raises:
+        InvalidInputError: A missing, broken or changed file, grids that do not lie on one lattice, or so far apart
+            that a frame that holds them has more than :data:`MAX_CELLS` cells.
+    """
+    if sample.problem:
+        raise InvalidInputError(sample.problem)
+    folder = sample.folder
+    about = _read_about(sample)
+    observed, truth = read_map(folder / "map.yaml"), read_map(folder / "truth.yaml")
+    authors = read_map(folder / "authors.yaml") if (folder / "authors.yaml").is_file() else None
+    grids = [grid for grid in (observed, truth, authors) if grid is not None]
+    windows = [grid.known_bounds() for grid in grids]
+    bounds = [grid.frame.cropped(*w).bounds for grid, w in zip(grids, windows, strict=True) if w is not None]
+    if len(bounds) < len(grids):
+        raise InvalidInputError("a map without a known cell", expected="map and truth", where=folder)
+    frame = observed.frame
+    low, high = [min(b[i] for b in bounds) for i in (0, 1)], [max(b[i] for b in bounds) for i in (2, 3)]
+    start = frame.to_cells(np.array(low) - MARGIN)
+    end = frame.to_cells(np.array(high) + MARGIN)
+    rows, cols = (int(size) for size in end - start)
+    if rows * cols > MAX_CELLS:
+        extent = f"{cols * frame.resolution:.6g} x {rows * frame.resolution:.6g} m in cells of {frame.resolution:g} m"
+        raise InvalidInputError(f"map and truth together cover {extent}", expected=f"at most {MAX_CELLS}", where=folder)
+    window_frame = frame.cropped(int(start[0]), int(start[1]), rows, cols)
+    try:
+        cropped = [grid.on(window_frame) for grid in grids]
+    except InvalidInputError as error:
+        raise InvalidInputError("map and truth on different lattices", expected="one lattice", where=folder) from error
+    rooms = read_rooms(folder / "truth_rooms.geojson") if (folder / "truth_rooms.geojson").is_file() else []
+    doors = read_doors(folder / "doors.geojson")
+    closed, seen, repetition = about.get("closed"), about.get("rooms_seen"), about.get("repetition")
+    return Sample(
+        cropped[0],
+        doors,
+        cropped[1],
+        rooms,
+        cropped[2] if authors is not None else None,
+        sample.world or about.get("world") or sample.name.rpartition("/")[0] or sample.name,
+        sample.repetition if sample.repetition >= 0 else repetition if isinstance(repetition, int) else 0,
+        len(closed) if isinstance(closed, list) else len(doors),
+        seen if isinstance(seen, int) else None,
+    )
+
+
+def _read_about(sample: SamplePath) -> dict[str, Any]:
+    """``world``, ``closed``, ``repetition`` and ``rooms_seen`` of the sample's run.json, its checksums compared."""
+    path = sample.folder / MANIFEST
+    if not path.is_file() and not sample.listed:
+        return {}
+    data = read_json(path, what="the manifest of a run")
+    if not isinstance(data, dict):
+        raise InvalidInputError("no JSON object", expected="the manifest of a run", where=path)
+    if sample.digest and digest(path) != sample.digest:
+        raise InvalidInputError("changed since it was written", expected="its SHA-256 in SHA256SUMS", where=path)
+    if sample.listed or "checksums" in data:
+        check(sample.folder)
+    metrics = data.get("metrics")
+    seen = metrics.get("rooms_seen") if isinstance(metrics, dict) else None
+    world = data.get("world")
+    return {
+        "world": world if isinstance(world, str) else None,
+        "closed": data.get("closed"),
+        "repetition": data.get("repetition"),
+        "rooms_seen": seen,
+    }

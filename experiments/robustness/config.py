@@ -1,0 +1,104 @@
+"""Options of ``closedrooms robustness``."""
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.options import check_least
+from closedrooms.mapping.config import MapperConfig
+from closedrooms.navigation.config import NavigationConfig
+from closedrooms.sim.config import SimConfig
+
+Preset = Literal["paper", "best"]
+Factor = Literal["lidar", "dropouts", "odometry", "missed", "shift", "turn", "resolution", "furniture", "together"]
+FACTORS: tuple[Factor, ...] = (
+    "lidar", "dropouts", "odometry", "missed", "shift", "turn", "resolution", "furniture", "together",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobustnessConfig:
+    """What is disturbed, and how much. The first level of every factor is the one that the others are held against."""
+
+    worlds: tyro.conf.Positional[tuple[str, ...]]
+    """Names of bundled worlds or files that the importers read; ``all`` names the 20 bundled worlds."""
+
+    out: Path
+    """Folder to write; the same command again goes on where it stopped."""
+
+    factors: tuple[Factor, ...] = FACTORS
+    """What to disturb, one at a time; ``together`` disturbs everything but the resolution at once."""
+
+    repetitions: int = 3
+    """Sets of closed doors drawn for each world."""
+
+    closed: int = 6
+    """Closed rooms in each set, or as many as the world has."""
+
+    preset: Preset = "best"
+    """Predictor: ``paper`` is what the authors describe and ran, ``best`` as good as we can."""
+
+    lidar: tuple[float, ...] = (0.0, 0.01, 0.03, 0.06, 0.12)
+    """Standard deviations of a measured distance [m]."""
+
+    dropouts: tuple[float, ...] = (0.0, 0.05, 0.2, 0.5, 0.8)
+    """Shares of the beams that give no measurement [0..1]."""
+
+    odometry: tuple[float, ...] = (0.0, 1.0, 2.0, 4.0, 8.0)
+    """Odometry errors in multiples of the noise level ``medium`` (0.03 m and 1.5 degrees after 1 m)."""
+
+    missed: tuple[float, ...] = (0.0, 0.1, 0.2, 0.4)
+    """Shares of the closed doors that are not detected [0..1]."""
+
+    shift: tuple[float, ...] = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5)
+    """How far detected doors are from where they are, in any direction [m]."""
+
+    turn: tuple[float, ...] = (0.0, 2.0, 5.0, 10.0)
+    """How far detected doors are turned about their middle, to either side [degrees]."""
+
+    resolution: tuple[float, ...] = (0.05, 0.025, 0.1, 0.15, 0.2)
+    """Cells of the map [m]."""
+
+    furniture: tuple[float, ...] = (0.0, 0.5, 1.0)
+    """Shares of the pieces of furniture that fill the rooms [0..1]."""
+
+    tours: bool = True
+    """Plan coverage tours too."""
+
+    seed: int = 0
+    """The one seed: closed doors, furniture and every source of noise."""
+
+    workers: int = 2
+    """Processes; each takes one world after the other."""
+
+    resamples: int = 2000
+    """Resamples of the bootstrap intervals."""
+
+    sim: SimConfig = field(default_factory=SimConfig)
+    """Robot and lidar; their noise is what the levels say."""
+
+    mapper: MapperConfig = field(default_factory=MapperConfig)
+    """The mapper."""
+
+    navigation: NavigationConfig = field(default_factory=NavigationConfig)
+    """Exploration."""
+
+    def __post_init__(self) -> None:
+        if not self.worlds:
+            raise InvalidInputError("no world", expected="names of bundled worlds, files, or all")
+        if not self.factors or len(set(self.factors)) != len(self.factors):
+            raise InvalidInputError(f"factors {self.factors}", expected=f"each once, of {', '.join(FACTORS)}")
+        check_least(self, repetitions=1, closed=1, workers=1, resamples=1, seed=0)
+        for factor in FACTORS[:-1]:
+            levels: tuple[float, ...] = getattr(self, factor)
+            share = factor in {"dropouts", "missed", "furniture"}
+            fit = all(math.isfinite(v) and 0.0 <= v <= (1.0 if share else math.inf) for v in levels)
+            if not levels or not fit or (factor == "resolution" and min(levels) <= 0.0):
+                expected = "shares from 0 to 1" if share else "finite numbers, none below 0"
+                raise InvalidInputError(f"--{factor} {' '.join(map(str, levels))}", expected=expected)
+            if len(set(levels)) != len(levels):
+                raise InvalidInputError(f"--{factor} {' '.join(map(str, levels))}", expected="each level once")

@@ -1,0 +1,75 @@
+"""The levels of every factor as settings."""
+
+from dataclasses import dataclass, replace
+
+from closedrooms.experiments.robustness.config import FACTORS, Factor, RobustnessConfig
+
+UNITS: dict[Factor, str] = {
+    "lidar": "standard deviation of a distance [m]",
+    "dropouts": "share of beams without a measurement",
+    "odometry": "odometry error [times medium]",
+    "missed": "share of closed doors missed",
+    "shift": "doors shifted by [m]",
+    "turn": "doors turned by [degrees]",
+    "resolution": "cell of the map [m]",
+    "furniture": "share of the furniture",
+    "together": "all factors at their n-th level",
+}
+FIRST = "first"
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """How much everything is disturbed; units as in the configuration."""
+
+    lidar: float
+    dropouts: float
+    odometry: float
+    missed: float
+    shift: float
+    turn: float
+    resolution: float
+    furniture: float
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One level of one factor, all others at their first.
+
+    Attributes:
+        factor: What is disturbed.
+        number: Place of the level in the configuration; 0 is what the others are held against.
+        level: Its value; of ``together`` the number.
+        setting: What that means.
+    """
+
+    factor: Factor
+    number: int
+    level: float
+    setting: Setting
+
+    @property
+    def name(self) -> str:
+        """A name for files; the first levels of all factors are one."""
+        return f"{self.factor}-{self.number}" if self.number else FIRST
+
+
+def first_setting(config: RobustnessConfig) -> Setting:
+    """Every factor at its first level."""
+    return Setting(**{factor: getattr(config, factor)[0] for factor in FACTORS[:-1]})
+
+
+def cases(config: RobustnessConfig) -> list[Case]:
+    """Every level of every factor asked for; the first levels of all factors are one and the same setting."""
+    first = first_setting(config)
+    found: list[Case] = []
+    for factor in config.factors:
+        if factor == "together":
+            disturbed = [name for name in FACTORS[:-1] if name != "resolution"]
+            for number in range(max(len(getattr(config, name)) for name in disturbed)):
+                values = {name: getattr(config, name)[: number + 1][-1] for name in disturbed}
+                found.append(Case(factor, number, float(number), replace(first, **values)))
+            continue
+        for number, level in enumerate(getattr(config, factor)):
+            found.append(Case(factor, number, level, replace(first, **{factor: level})))
+    return found

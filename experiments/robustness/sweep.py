@@ -1,0 +1,256 @@
+"""``closedrooms robustness``: what noise does to map, prediction and coverage, one source at a time and together."""
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import asdict, dataclass, field
+from functools import lru_cache
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError, reason
+from closedrooms.core.files import MANIFEST, PROGRAM, write_json
+from closedrooms.experiments.evaluation.claimed_folder import claim
+from closedrooms.experiments.evaluation.tours import code_digest
+from closedrooms.experiments.robustness.config import RobustnessConfig
+from closedrooms.experiments.robustness.levels import Case, Setting, cases
+from closedrooms.experiments.robustness.onset import Onset
+from closedrooms.experiments.workers import one_thread
+from closedrooms.pipeline.manifest import resolved, versions
+from closedrooms.pipeline.progress import Progress, Silent
+from closedrooms.worlds.library import bundled_names, load_world
+
+Row = dict[str, Any]
+ALL = "all"
+CELLS, RESULT = "cells", "rows.json"
+# How often it is looked how far the workers are [s].
+LOOK = 1.0
+# What says nothing about the result of one level in one world.
+NOT_CONTENT = ("out", "worlds", "workers", "resamples", "factors")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobustnessResult:
+    """A finished sweep.
+
+    Attributes:
+        folder: What was written.
+        title: Head of the table.
+        onsets: Where every factor starts to hurt.
+        failures: Why a world failed, by its name.
+    """
+
+    folder: Path
+    title: str
+    onsets: list[Onset]
+    failures: dict[str, str] = field(default_factory=dict)
+
+    def table(self) -> list[tuple[str, ...]]:
+        """Rows for people; the first is the head."""
+        rows: list[tuple[str, ...]] = [
+            ("factor", "suffers from", "IoU there", "first to give way", "its share", "coverage from")
+        ]
+        for onset in self.onsets:
+            if onset.level is None or onset.difference is None or onset.stage is None or onset.share is None:
+                own = ("none", "", "", "")
+            else:
+                own = (f"{onset.level:g}", f"{onset.difference.mean:+.3f}", onset.stage, f"{onset.share.mean:.3f}")
+            coverage = "none" if onset.coverage_level is None else f"{onset.coverage_level:g}"
+            rows.append((onset.factor, *own, coverage))
+        return rows
+
+
+def robustness(config: RobustnessConfig, *, progress: Progress | None = None) -> RobustnessResult:
+    """Disturb, measure, and tell where the prediction starts to suffer.
+
+    What was finished before with the same configuration and code is not done again.
+
+    Args:
+        config: Options.
+        progress: Told how far it is.
+
+    Raises:
+        InvalidInputError: A world that cannot be read, or two of one name.
+        OutputError: The folder cannot be written, or holds something that is not ours.
+    """
+    progress = progress or Silent()
+    worlds = _worlds(config.worlds)
+    claim(config.out, "robustness")
+    wanted = cases(config)
+    total = len(worlds) * len({case.name for case in wanted})
+    progress.stage("sweep", total)
+    failures: dict[str, str] = {}
+    for done, problems in _work(worlds, config):
+        failures |= problems
+        progress.advance(done, f"{done} of {total}")
+    rows = [row for name in worlds.values() if name not in failures for row in _finished(config, name, wanted)]
+    if not rows:
+        why = next(iter(failures.values()), "nothing was asked for")
+        raise InvalidInputError(f"no world could be used ({why})", expected="at least one")
+    from closedrooms.experiments.robustness.report import write_report
+
+    progress.stage("report")
+    found = write_report(config, rows, failures)
+    manifest = {
+        "program": PROGRAM,
+        "command": "robustness",
+        "configuration": resolved(config, leave_out=("out", "workers")),
+        "versions": versions(),
+        "onsets": [asdict(onset) for onset in found],
+        "failures": failures,
+        "files": sorted(path.name for path in config.out.iterdir() if path.name != MANIFEST),
+    }
+    write_json(config.out / MANIFEST, manifest)
+    title = f"{len(worlds) - len(failures)} worlds, {config.repetitions} sets of {config.closed} doors each"
+    return RobustnessResult(config.out, title, found, failures)
+
+
+def _worlds(given: Sequence[str]) -> dict[str, str]:
+    """Names of the worlds by what was given."""
+    wanted = [name for text in given for name in (bundled_names() if text == ALL else [text])]
+    found: dict[str, str] = {}
+    for text in dict.fromkeys(wanted):
+        name = load_world(text).name
+        if name in found.values():
+            raise InvalidInputError(f"two worlds named {name!r}", expected="one world a name", where=text)
+        if not name or Path(name).name != name or name.startswith("."):
+            raise InvalidInputError(f"a world named {name!r}", expected="a name fit for a folder", where=text)
+        found[text] = name
+    return found
+
+
+def _work(worlds: dict[str, str], config: RobustnessConfig) -> Iterator[tuple[int, dict[str, str]]]:
+    """How many levels are finished, and which worlds failed."""
+    names = {case.name for case in cases(config)}
+
+    def done() -> int:
+        return sum((_folder(config, world, name) / RESULT).is_file() for world in worlds.values() for name in names)
+
+    if config.workers == 1 or len(worlds) == 1:
+        for text, world in worlds.items():
+            try:
+                for _ in _levels(text, world, config):
+                    yield done(), {}
+            except OutputError:
+                raise
+            except Exception as error:
+                yield done(), {world: reason(error)}
+        return
+    with ProcessPoolExecutor(config.workers, mp_context=get_context("spawn"), initializer=one_thread) as pool:
+        waiting: dict[Future[str], str] = {
+            pool.submit(sweep_world, text, world, config): world for text, world in worlds.items()
+        }
+        try:
+            while waiting:
+                finished, _ = wait(waiting, timeout=LOOK)
+                problems = {waiting.pop(future): future.result() for future in finished}
+                yield done(), {world: why for world, why in problems.items() if why}
+        except BrokenProcessPool as error:
+            raise ClosedroomsError("a worker process was killed; the same command goes on where it stopped") from error
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def sweep_world(text: str, world: str, config: RobustnessConfig) -> str:
+    """Every level in one world; the reason when it failed, else nothing.
+
+    Args:
+        text: The world as it was given.
+        world: Its name.
+        config: Options.
+
+    Raises:
+        OutputError: A result cannot be written.
+    """
+    try:
+        for _ in _levels(text, world, config):
+            pass
+    except OutputError:
+        raise
+    except Exception as error:
+        return reason(error)
+    return ""
+
+
+def _levels(text: str, world: str, config: RobustnessConfig) -> Iterator[None]:
+    """Do one level after the other of what is not there yet."""
+    from closedrooms.experiments.robustness.trial import Building
+
+    key = _fingerprint(text, config)
+    distinct = {case.name: case.setting for case in cases(config)}
+    missing = {name: s for name, s in distinct.items() if not _kept(_folder(config, world, name), key, s)}
+    if not missing:
+        return
+    building = Building(text, config)
+    for name, setting in missing.items():
+        folder = _folder(config, world, name)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"cannot write ({error.strerror}): {folder}") from error
+        rows = building.rows(setting, folder)
+        write_json(folder / RESULT, {"key": key, "setting": asdict(setting), "rows": rows})
+        building.forget(setting)
+        yield
+
+
+def _folder(config: RobustnessConfig, world: str, name: str) -> Path:
+    return config.out / CELLS / world / name
+
+
+def _finished(config: RobustnessConfig, world: str, wanted: Sequence[Case]) -> list[Row]:
+    """What is there of one world, levels in order."""
+    rows: list[Row] = []
+    for case in wanted:
+        kept = json.loads((_folder(config, world, case.name) / RESULT).read_text())["rows"]
+        head = {"factor": case.factor, "number": case.number, "level": case.level}
+        rows += [head | row for row in kept]
+    return rows
+
+
+def _kept(folder: Path, key: str, setting: Setting) -> bool:
+    """Whether a level is finished; what another configuration or other code left is not, and goes."""
+    path = folder / RESULT
+    try:
+        kept = json.loads(path.read_text())
+        if kept["key"] == key and kept["setting"] == asdict(setting):
+            return True
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    path.unlink(missing_ok=True)
+    return False
+
+
+def _fingerprint(world: str, config: RobustnessConfig) -> str:
+    """Changes with the world, the configuration, the versions of libraries and the code."""
+    from closedrooms.worlds.formats.native import plan_text
+
+    content = resolved(config, leave_out=(*NOT_CONTENT, *_LEVELS))
+    parts = [plan_text(load_world(world)), json.dumps(content), json.dumps(versions()), _code()]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+# Levels stand in the setting of each case.
+_LEVELS = ("lidar", "dropouts", "odometry", "missed", "shift", "turn", "resolution", "furniture")
+
+
+@lru_cache(maxsize=1)
+def _code() -> str:
+    root = Path(__file__).parents[2]
+    folders = (
+        "core",
+        "worlds",
+        "sim",
+        "mapping",
+        "predictor",
+        "coverage",
+        "navigation",
+        "experiments/dataset",
+        "experiments/robustness",
+    )
+    files = [path for folder in folders for path in (root / folder).rglob("*.py")]
+    return code_digest([path for path in files if path.name not in {"report.py", "figures.py", "onset.py", "sweep.py"}])

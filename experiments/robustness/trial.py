@@ -1,0 +1,266 @@
+"""One building under every setting: drive, map, close doors, predict, plan, measure, repair."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.geojson import write_doors, write_rooms
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.random import stream
+from closedrooms.core.room import Room
+from closedrooms.core.rosmap import write_map
+from closedrooms.experiments.dataset.erase import Eraser
+from closedrooms.experiments.dataset.open_survey import OpenSurvey
+from closedrooms.experiments.evaluation.scores import iou, room_masks
+from closedrooms.experiments.evaluation.tours import cropped, kept_tour, plan_tour
+from closedrooms.experiments.robustness.clean_walls import sampled, with_clean_walls
+from closedrooms.experiments.robustness.config import RobustnessConfig
+from closedrooms.experiments.robustness.door_noise import disturbed_doors, true_doors
+from closedrooms.experiments.robustness.drives import Drive, furnished, map_drive, odometry_noise, record_drive
+from closedrooms.experiments.robustness.levels import Setting, first_setting
+from closedrooms.mapping.trajectory import ate
+from closedrooms.pipeline.scores import room_iou, rooms_seen
+from closedrooms.pipeline.survey import Truth, true_building
+from closedrooms.predictor.config import preset
+from closedrooms.predictor.predict import predict
+from closedrooms.predictor.prediction import Prediction
+from closedrooms.worlds.closing import closable_rooms, draw_closed
+from closedrooms.worlds.geometry import door_leaf
+from closedrooms.worlds.library import load_world
+from closedrooms.worlds.truth import reachable
+
+Row = dict[str, Any]
+# A cell farther than this from every true wall is simply wrong: how far says nothing [m].
+FARTHEST = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Closing:
+    """One set of closed doors in the undisturbed map.
+
+    Attributes:
+        closed: Door ids.
+        seen: Those that the undisturbed robot saw.
+        clean: The undisturbed map.
+        truth: M_GT and the hidden rooms, on a frame of 0.05 m.
+        open_cells: True free cells that a robot can reach, on that frame.
+        wall_distance: Distance of its cells to the next true wall, closed leaf or furniture [m].
+    """
+
+    closed: tuple[str, ...]
+    seen: tuple[str, ...]
+    clean: OccupancyGrid
+    truth: Truth
+    open_cells: BoolArray
+    wall_distance: FloatArray
+
+
+class Building:
+    """Everything about one building that several settings share."""
+
+    def __init__(self, world: str, config: RobustnessConfig) -> None:
+        self._config = config
+        self._plan = load_world(world)
+        self.name = self._plan.name
+        count = min(config.closed, len(closable_rooms(self._plan)))
+        if count == 0:
+            raise InvalidInputError("no room that one door closes", expected="a world with such rooms", where=world)
+        self._sets = [
+            draw_closed(self._plan, count, stream(config.seed, "closed doors", self.name, str(repetition)))
+            for repetition in range(config.repetitions)
+        ]
+        self._drives: dict[float, Drive] = {}
+        self._surveys: dict[Setting, OpenSurvey] = {}
+        self._erasers: dict[tuple[Setting, bool], Eraser] = {}
+        self._closings: dict[tuple[int, float], Closing] = {}
+
+    def rows(self, setting: Setting, keep: Path | None = None) -> list[Row]:
+        """A row of measures for each set of closed doors.
+
+        Args:
+            setting: How much everything is disturbed.
+            keep: Folder for map, doors and rooms of the first set, for pictures.
+        """
+        return [
+            self._row(setting, repetition, keep if repetition == 0 else None)
+            for repetition in range(self._config.repetitions)
+        ]
+
+    def _row(self, setting: Setting, repetition: int, keep: Path | None) -> Row:
+        config = self._config
+        drive, survey = self._drive(setting.furniture), self._survey(setting)
+        closing = self._closing(repetition, setting.furniture)
+        map_T_world = drive.world_T_map.inverse()
+        mapped = self._eraser(setting, true_poses=False).erase(closing.closed)
+        doors = self._seen_doors(mapped.doors, setting, repetition)
+        prediction = self._predict(mapped.grid, doors)
+        position, heading = ate(survey.estimate, survey.truth)
+        figures = room_iou(prediction.rooms, closing.truth.rooms)
+        seen = [door.id for door in doors]
+        right = {door.id: np.array(door.midpoint) for door in true_doors(self._plan, closing.closed, map_T_world)}
+        offsets = [float(np.linalg.norm(np.array(door.midpoint) - right[door.id])) for door in doors]
+        row: Row = {
+            "world": self.name,
+            "repetition": repetition,
+            "closed_doors": len(closing.closed),
+            "doors_seen": len(doors),
+            "ate_m": _rounded(position),
+            "ate_rad": _rounded(heading),
+            "walls_m": _rounded(self._walls(mapped.grid, closing)),
+            "free_iou": _rounded(self._free(mapped.grid, closing)),
+            "doors_m": _rounded(np.mean(offsets)) if offsets else None,
+            "iou": _mean([figures.get(door, 0.0) for door in closing.closed]),
+            "iou_seen": _mean([figures[door] for door in seen if door in figures]),
+        }
+        row |= self._repaired(setting, closing, repetition)
+        if config.tours:
+            row |= self._tours(mapped.grid, doors, prediction, closing)
+        if keep is not None:
+            keep.mkdir(parents=True, exist_ok=True)
+            write_map(keep / "map", cropped(mapped.grid))
+            write_doors(keep / "doors.geojson", doors)
+            write_rooms(keep / "rooms.geojson", prediction.rooms)
+            write_rooms(keep / "truth_rooms.geojson", closing.truth.rooms)
+        return row
+
+    def _repaired(self, setting: Setting, closing: Closing, repetition: int) -> Row:
+        """Mean IoU when stage after stage gets what an undisturbed one would have given it.
+
+        First the scans are put at their true poses; then the doors, too, are where they are; then the walls, too, are
+        those of the undisturbed map. What is still lost then is lost in the prediction, for want of known space.
+        """
+        placed = self._eraser(setting, true_poses=True).erase(closing.closed)
+        doors = self._seen_doors(placed.doors, setting, repetition)
+        right = true_doors(self._plan, closing.seen, self._drive(setting.furniture).world_T_map.inverse())
+        steps = {
+            "iou_true_poses": (placed.grid, doors),
+            "iou_true_doors": (placed.grid, right),
+            "iou_true_walls": (with_clean_walls(placed.grid, closing.clean), right),
+        }
+        row: Row = {}
+        for name, (repaired, at) in steps.items():
+            figures = room_iou(self._predict(repaired, at).rooms, closing.truth.rooms)
+            row[name] = _mean([figures.get(door, 0.0) for door in closing.closed])
+        return row
+
+    def _tours(self, grid: OccupancyGrid, doors: Sequence[ClosedDoor], prediction: Prediction, closing: Closing) -> Row:
+        from closedrooms.coverage.estimates import errors_of_lengths
+
+        try:
+            truth = kept_tour(self._config.out, closing.truth.grid)["length_m"]
+            lengths = [plan_tour(grid, doors).length, plan_tour(prediction.grid).length]
+        except InvalidInputError:
+            return {"error_closed": None, "error_baseline": None, "error_predicted": None}
+        world_T_map = self._drive(0.0).world_T_map
+        seen = rooms_seen(self._plan, grid, world_T_map.inverse())
+        errors = errors_of_lengths(lengths[0], lengths[1], truth, n_rooms=seen, n_doors=len(doors))
+        return {
+            "error_closed": _rounded(errors.error_closed),
+            "error_baseline": _rounded(errors.error_baseline),
+            "error_predicted": _rounded(errors.error_pred),
+        }
+
+    def _predict(self, grid: OccupancyGrid, doors: Sequence[ClosedDoor]) -> Prediction:
+        return predict(grid, doors, preset(self._config.preset))
+
+    def _seen_doors(self, doors: Sequence[ClosedDoor], setting: Setting, repetition: int) -> list[ClosedDoor]:
+        return disturbed_doors(
+            doors, missed=setting.missed, shift=setting.shift, turn=setting.turn, seed=self._config.seed,
+            name=f"{self.name} {repetition}",
+        )  # fmt: skip
+
+    def _drive(self, share: float) -> Drive:
+        if share not in self._drives:
+            config = self._config
+            plan = furnished(self._plan, share, config.seed)
+            self._drives[share] = record_drive(plan, config.sim, config.mapper, config.navigation, config.seed)
+        return self._drives[share]
+
+    def _survey(self, setting: Setting) -> OpenSurvey:
+        """The map's survey; doors are disturbed later."""
+        key = replace(setting, missed=0.0, shift=0.0, turn=0.0)
+        if key not in self._surveys:
+            noise = replace(odometry_noise(key.odometry), range_sd=key.lidar, dropouts=key.dropouts)
+            mapper = replace(self._config.mapper, resolution=key.resolution)
+            self._surveys[key] = map_drive(self._drive(key.furniture), noise, mapper, self._config.seed)
+        return self._surveys[key]
+
+    def _eraser(self, setting: Setting, *, true_poses: bool) -> Eraser:
+        key = (replace(setting, missed=0.0, shift=0.0, turn=0.0), true_poses)
+        if key not in self._erasers:
+            survey = self._survey(setting)
+            self._erasers[key] = Eraser(replace(survey, poses=survey.true_poses) if true_poses else survey)
+        return self._erasers[key]
+
+    def forget(self, setting: Setting) -> None:
+        """Give back the memory of a setting's survey; that of the first setting stays."""
+        first = replace(first_setting(self._config), missed=0.0, shift=0.0, turn=0.0)
+        key = replace(setting, missed=0.0, shift=0.0, turn=0.0)
+        if key != first:
+            self._surveys.pop(key, None)
+            for true_poses in (False, True):
+                self._erasers.pop((key, true_poses), None)
+
+    def _closing(self, repetition: int, share: float) -> Closing:
+        key = (repetition, share)
+        if key not in self._closings:
+            closed = self._sets[repetition]
+            first = first_setting(self._config)
+            undisturbed = self._eraser(first, true_poses=True).erase(closed)
+            drive = self._drive(share)
+            map_T_world = drive.world_T_map.inverse()
+            truth = true_building(self._plan, closed, undisturbed.grid.frame, map_T_world)
+            frame, start = truth.grid.frame, drive.world_T_map
+            cells = reachable(self._plan, closed, frame, map_T_world, (start.x, start.y))
+            leaves = [door_leaf(self._plan, door) for door in self._plan.doors if door.id in closed]
+            pieces = [thing.polygon for thing in drive.plan.furniture]
+            things = [_in_map(area, drive) for area in (*leaves, *pieces)]
+            masks = room_masks([Room(area, ()) for area in things], frame)
+            solid = truth.grid.occupied.copy()
+            for mask in masks:
+                solid |= mask
+            self._closings[key] = Closing(
+                closed, tuple(door.id for door in undisturbed.doors), undisturbed.grid, truth, cells & ~solid,
+                _distance(solid) * frame.resolution,
+            )  # fmt: skip
+        return self._closings[key]
+
+    @staticmethod
+    def _walls(grid: OccupancyGrid, closing: Closing) -> float:
+        """Mean distance of the map's occupied cells to what really stands there [m], each at most 0.5 m."""
+        frame = closing.truth.grid.frame
+        cells = frame.to_cells(grid.frame.to_points(np.argwhere(grid.occupied)))
+        cells = cells[frame.contains(cells)]
+        if not len(cells):
+            return FARTHEST
+        return float(np.minimum(closing.wall_distance[cells[:, 0], cells[:, 1]], FARTHEST).mean())
+
+    @staticmethod
+    def _free(grid: OccupancyGrid, closing: Closing) -> float:
+        """IoU of the map's free cells with the true ones that a robot can reach."""
+        return iou(sampled(grid, closing.truth.grid.frame).free, closing.open_cells)
+
+
+def _in_map(area: Any, drive: Drive) -> Any:
+    return shapely.transform(area, drive.world_T_map.inverse().transform)
+
+
+def _distance(solid: BoolArray) -> FloatArray:
+    import cv2
+
+    return np.asarray(cv2.distanceTransform((~solid).astype(np.uint8), cv2.DIST_L2, 5), dtype=np.float64)
+
+
+def _mean(values: Sequence[float]) -> float | None:
+    return _rounded(np.mean(values)) if len(values) else None
+
+
+def _rounded(value: Any) -> float:
+    return round(float(value), 6) + 0.0

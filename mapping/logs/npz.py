@@ -1,0 +1,147 @@
+"""Scans in NumPy archives: our own ``scans.npz``, and the MRPT export of the Malaga data set."""
+
+import math
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files import write_bytes
+from closedrooms.core.pose import Pose2
+from closedrooms.core.scan import LaserScan
+from closedrooms.mapping.logs.recorded_run import RecordedRun, forward
+
+MAX_BYTES = 4_000_000_000
+"""Unpacked size beyond which an archive is refused before memory is taken."""
+EXPECTED = "scans.npz with stamps, ranges, odometry, angle_min, angle_increment, range_max"
+TICKS = 1e-7
+"""Windows file-time ticks of MRPT's stamps [s]."""
+MRPT_RANGE = 80.0
+"""Longest range of the SICK LMS that recorded them [m]."""
+
+
+def write_scans(path: Path, run: RecordedRun, *, estimate: FloatArray | None = None, compressed: bool = True) -> None:
+    """Write a run as ``scans.npz`` (all scans of one geometry).
+
+    Raises:
+        InvalidInputError: Scans of different geometry.
+        OutputError: The folder cannot be written.
+    """
+    import io
+
+    first = run.scans[0]
+    geometries = {(s.ranges.size, s.angle_min, s.angle_increment, s.range_max) for s in run.scans}
+    if len(geometries) != 1:
+        raise InvalidInputError("scans of different geometry", expected="one lidar", where=path)
+    arrays: dict[str, Any] = {
+        "stamps": np.array([s.stamp for s in run.scans]),
+        "ranges": np.array([s.ranges for s in run.scans], dtype=np.float32),
+        "odometry": run.odometry,
+        "angle_min": np.float64(first.angle_min),
+        "angle_increment": np.float64(first.angle_increment),
+        "range_max": np.float64(first.range_max),
+        "robot_T_sensor": np.array(first.robot_T_sensor),
+    }
+    if estimate is not None:
+        arrays["estimate"] = estimate
+    if run.reference is not None:
+        arrays["truth"] = run.reference
+    buffer = io.BytesIO()
+    (np.savez_compressed if compressed else np.savez)(buffer, **arrays)
+    write_bytes(path, buffer.getvalue())
+
+
+def read_scans(path: Path) -> RecordedRun:
+    """Read ``scans.npz`` of a run, or an MRPT export (``ranges``, ``odom`` increments, ``ts``, ``sensor_xy``).
+
+    Raises:
+        InvalidInputError: Broken, too large, with pickles, or with arrays missing or of other shapes.
+    """
+    arrays = _arrays(path)
+    try:
+        if "odometry" in arrays:
+            return _ours(arrays, path)
+        if {"ranges", "odom", "ts"} <= arrays.keys():
+            return _mrpt(arrays, path)
+    except (ValueError, TypeError, IndexError, OverflowError) as error:
+        raise InvalidInputError(f"arrays that do not fit ({error})", expected=EXPECTED, where=path) from error
+    raise InvalidInputError(f"arrays {', '.join(sorted(arrays))}", expected=EXPECTED, where=path)
+
+
+def _arrays(path: Path) -> dict[str, Any]:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+        if size > MAX_BYTES:
+            raise InvalidInputError(f"an archive of {size} bytes", expected=f"at most {MAX_BYTES}", where=path)
+        with np.load(path, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except (OSError, ValueError, zipfile.BadZipFile, EOFError, KeyError, NotImplementedError) as error:
+        raise InvalidInputError(f"a broken archive ({error})", expected=EXPECTED, where=path) from error
+
+
+def _ours(arrays: dict[str, Any], path: Path) -> RecordedRun:
+    missing = {"stamps", "ranges", "angle_min", "angle_increment", "range_max"} - arrays.keys()
+    if missing:
+        raise InvalidInputError(f"arrays {', '.join(sorted(missing))} missing", expected=EXPECTED, where=path)
+    mount = arrays.get("robot_T_sensor", np.zeros(3))
+    return _run(
+        np.asarray(arrays["stamps"], dtype=np.float64),
+        np.asarray(arrays["ranges"], dtype=np.float64),
+        np.asarray(arrays["odometry"], dtype=np.float64),
+        arrays.get("truth"),
+        (float(arrays["angle_min"]), float(arrays["angle_increment"]), float(arrays["range_max"])),
+        (float(mount[0]), float(mount[1]), float(mount[2])),
+        path,
+    )
+
+
+def _mrpt(arrays: dict[str, Any], path: Path) -> RecordedRun:
+    ranges = np.array(arrays["ranges"], dtype=np.float64)
+    poses = [Pose2()]
+    for x, y, theta in np.asarray(arrays["odom"], dtype=np.float64):
+        poses.append(poses[-1] @ Pose2(x, y, theta))
+    ticks = np.asarray(arrays["ts"], dtype=np.uint64)
+    stamps = (ticks - ticks[:1]).astype(np.float64) * TICKS
+    x, y = (float(v) for v in arrays.get("sensor_xy", np.zeros(2)))
+    with np.errstate(invalid="ignore"):
+        ranges[~((ranges > 0.0) & (ranges < MRPT_RANGE))] = np.nan
+    geometry = (-math.pi / 2, math.pi / max(ranges.shape[1] - 1, 1), MRPT_RANGE)
+    return _run(stamps, ranges, np.array([p.as_tuple() for p in poses]), None, geometry, (x, y, 0.0), path)
+
+
+def _run(
+    stamps: FloatArray,
+    ranges: FloatArray,
+    odometry: FloatArray,
+    reference: Any,
+    geometry: tuple[float, float, float],
+    mount: tuple[float, float, float],
+    path: Path,
+) -> RecordedRun:
+    n = len(stamps)
+    if stamps.ndim != 1 or ranges.ndim != 2 or ranges.shape[0] != n or odometry.shape != (n, 3):
+        raise InvalidInputError(
+            f"stamps {stamps.shape}, ranges {ranges.shape}, odometry {odometry.shape}",
+            expected="shapes (n,), (n, beams), (n, 3)",
+            where=path,
+        )
+    if reference is not None and np.shape(reference) != (n, 3):
+        raise InvalidInputError(f"truth of shape {np.shape(reference)}", expected="shape (n, 3)", where=path)
+    if not all(math.isfinite(v) for v in (*geometry, *mount)) or geometry[1] == 0.0:
+        raise InvalidInputError("a scan geometry that is not finite", expected=EXPECTED, where=path)
+    usable = np.isfinite(stamps) & np.isfinite(odometry).all(axis=1)
+    if not usable.all():
+        stamps, ranges, odometry = stamps[usable], ranges[usable], odometry[usable]
+        reference = None if reference is None else np.asarray(reference)[usable]
+    stamps, backwards = forward(stamps)
+    scans = tuple(
+        LaserScan(row, geometry[0], geometry[1], geometry[2], stamp=float(stamp), robot_T_sensor=mount)
+        for row, stamp in zip(ranges, stamps, strict=True)
+    )
+    skipped = {"scans without odometry": int((~usable).sum()), "stamps running backwards": backwards}
+    reference = None if reference is None else np.asarray(reference, dtype=np.float64)
+    return RecordedRun(scans, odometry, reference, {what: count for what, count in skipped.items() if count})

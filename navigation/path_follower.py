@@ -1,0 +1,183 @@
+"""Velocity commands that keep a differential-drive robot on a path and off what its scan shows."""
+
+import bisect
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.pose import Pose2, wrap_angle
+from closedrooms.core.scan import LaserScan
+from closedrooms.navigation.config import NavigationConfig
+
+# Gain from heading error to turn rate [1/s]: a turn in place settles in about a second.
+TURN_GAIN = 3.0
+# Smallest turn rate while turning in place [rad/s], so that the last degrees do not take for ever.
+MIN_TURN_RATE = 0.3
+# Scan points beyond this cannot matter before the next command [m].
+HORIZON = 1.0
+# Stands for everything farther, and for no measurement, while ranges are smoothed [m].
+FAR = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Steering:
+    """A velocity command.
+
+    Attributes:
+        v: Forward speed [m/s].
+        w: Turn rate, positive counter-clockwise [rad/s].
+        progress: Distance along the path of the point nearest to the robot [m].
+        remaining: Distance along the path to its end [m].
+    """
+
+    v: float
+    w: float
+    progress: float
+    remaining: float
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """A path prepared for following.
+
+    Attributes:
+        xs: Corners, map frame [m].
+        ys: Corners, map frame [m].
+        along: Distance of each corner from the start of the path [m].
+    """
+
+    xs: tuple[float, ...]
+    ys: tuple[float, ...]
+    along: tuple[float, ...]
+
+    @classmethod
+    def of(cls, points: FloatArray) -> "Track":
+        """The track over path corners, shape (n, 2) [m]."""
+        along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+        return cls(tuple(points[:, 0].tolist()), tuple(points[:, 1].tolist()), tuple(along.tolist()))
+
+    @property
+    def length(self) -> float:
+        """Length of the path [m]."""
+        return self.along[-1]
+
+    def at(self, distance: float) -> tuple[float, float]:
+        """The point at a distance along the path [m]."""
+        i = min(max(bisect.bisect_right(self.along, distance) - 1, 0), len(self.along) - 1)
+        if i == len(self.along) - 1 or self.along[i + 1] <= self.along[i]:
+            return (self.xs[i], self.ys[i])
+        t = (distance - self.along[i]) / (self.along[i + 1] - self.along[i])
+        return (self.xs[i] + t * (self.xs[i + 1] - self.xs[i]), self.ys[i] + t * (self.ys[i + 1] - self.ys[i]))
+
+    def project(self, place: tuple[float, float], progress: float, window: float) -> float:
+        """Distance along the path of the place's nearest point, from ``progress`` to ``progress + window`` [m]."""
+        x, y = place
+        best, best_distance = progress, math.inf
+        for i in range(max(bisect.bisect_right(self.along, progress) - 1, 0), len(self.along) - 1):
+            if self.along[i] > progress + window:
+                break
+            length = self.along[i + 1] - self.along[i]
+            if length < 1e-9:
+                continue
+            dx, dy = (self.xs[i + 1] - self.xs[i]) / length, (self.ys[i + 1] - self.ys[i]) / length
+            t = min(max((x - self.xs[i]) * dx + (y - self.ys[i]) * dy, 0.0), length)
+            s = min(max(self.along[i] + t, progress), progress + window)
+            t = s - self.along[i]
+            distance = math.hypot(self.xs[i] + t * dx - x, self.ys[i] + t * dy - y)
+            if distance < best_distance - 1e-9:
+                best, best_distance = s, distance
+        return best
+
+
+def steer(track: Track, pose: Pose2, progress: float, config: NavigationConfig) -> Steering:
+    """Pure pursuit (Coulter, CMU-RI-TR-92-01) with turns in place where the path leaves the heading.
+
+    Args:
+        track: The path.
+        pose: ``map_T_robot``.
+        progress: Distance along the path at the last call [m]; the robot never loses what it has done.
+        config: Speeds, look-ahead.
+
+    Returns:
+        The command and the new progress.
+    """
+    progress = track.project((pose.x, pose.y), progress, 2.0 * config.lookahead)
+    remaining = track.length - progress
+    target = track.at(progress + config.lookahead)
+    dx, dy = target[0] - pose.x, target[1] - pose.y
+    distance = math.hypot(dx, dy)
+    error = wrap_angle(math.atan2(dy, dx) - pose.theta) if distance > 1e-6 else 0.0
+    if abs(error) > config.turn_in_place:
+        return Steering(0.0, turn_rate(error, config), progress, remaining)
+    curvature = 2.0 * math.sin(error) / max(distance, 0.5 * config.lookahead)
+    v = min(
+        config.max_speed * max(0.25, math.cos(error) ** 2),
+        config.max_turn_rate / max(abs(curvature), 1e-6),
+        math.sqrt(2.0 * config.acceleration * max(remaining, 0.02)),
+    )
+    return Steering(v, v * curvature, progress, remaining)
+
+
+def turn_rate(error: float, config: NavigationConfig) -> float:
+    """Turn rate [rad/s] that brings a heading error [rad] to zero without overshoot."""
+    rate = min(max(TURN_GAIN * abs(error), MIN_TURN_RATE), config.max_turn_rate)
+    return math.copysign(rate, error)
+
+
+def near_points(scan: LaserScan) -> FloatArray:
+    """What the scan shows close to the robot, robot frame, shape (n, 2) [m].
+
+    A median over five beams leaves out lone outliers and halves the noise: the nearest of a hundred noisy points would
+    otherwise always lie too close.
+    """
+    ranges = np.where(scan.ranges < FAR, scan.ranges, FAR).astype(np.float32)
+    if float(ranges.min()) >= HORIZON:
+        return np.empty((0, 2))
+    smooth = cv2.medianBlur(np.concatenate((ranges[-2:], ranges, ranges[:2]))[None, :], 5)[0, 2:-2]
+    near = np.flatnonzero(smooth < HORIZON)
+    angles = scan.angle_min + scan.angle_increment * near
+    points = np.column_stack((smooth[near] * np.cos(angles), smooth[near] * np.sin(angles)))
+    return Pose2(*scan.robot_T_sensor).transform(points)
+
+
+def free_distance(points_robot: FloatArray, v: float, w: float, config: NavigationConfig) -> float:
+    """How far the robot can drive along the arc of a command before it touches a scan point [m].
+
+    Args:
+        points_robot: Obstacles in the robot frame, shape (n, 2) [m].
+        v: Forward speed, negative backwards [m/s].
+        w: Turn rate [rad/s].
+        config: Footprint.
+
+    Returns:
+        Distance along the arc, at most ``HORIZON`` less the footprint: more than it takes to stop.
+    """
+    reach = HORIZON - config.required_clearance
+    if len(points_robot) == 0:
+        return reach
+    steps = np.arange(0.05, reach, 0.05)
+    signed = math.copysign(1.0, v) * steps
+    curvature = w / v if abs(v) > 1e-6 else 0.0
+    if abs(curvature) < 1e-6:
+        path = np.column_stack((signed, np.zeros_like(signed)))
+    else:
+        path = np.column_stack((np.sin(curvature * signed), 1.0 - np.cos(curvature * signed))) / curvature
+    now = math.sqrt(float(np.einsum("ij,ij->i", points_robot, points_robot).min()))
+    offset = path[:, None, :] - points_robot[None, :, :]
+    gaps = np.sqrt(np.einsum("ijk,ijk->ij", offset, offset).min(axis=1))
+    # Where the robot already is inside the margin it may still drive as long as it does not get closer.
+    limit = min(config.robot_radius + 0.3 * config.clearance_margin, now - 0.005)
+    hit = np.flatnonzero(gaps < limit)
+    return float(steps[hit[0]] - 0.05) if len(hit) else reach
+
+
+def limit_speed(command: Steering, points_robot: FloatArray, config: NavigationConfig) -> Steering:
+    """The same arc, slow enough to stop before what the scan shows; turning in place is always possible."""
+    if command.v <= 0.0:
+        return command
+    distance = free_distance(points_robot, command.v, command.w, config)
+    v = min(command.v, math.sqrt(2.0 * config.acceleration * distance) if distance > 0.0 else 0.0)
+    return Steering(v, command.w * v / command.v, command.progress, command.remaining)

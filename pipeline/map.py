@@ -1,0 +1,144 @@
+"""``closedrooms map``: the map of a recorded run."""
+
+import contextlib
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from closedrooms.core.files import check_output_folder, output_folder
+from closedrooms.core.geojson import write_doors
+from closedrooms.core.pose import Pose2
+from closedrooms.core.rosmap import write_map
+from closedrooms.core.tum import write_trajectory
+from closedrooms.mapping.logs.recorded_run import RecordedRun, read_run
+from closedrooms.mapping.map_builder import BuiltMap, build_map
+from closedrooms.mapping.mapper import Mapper
+from closedrooms.mapping.trajectory import align
+from closedrooms.navigation.observer import NoObserver, Observer
+from closedrooms.pipeline.config import MapConfig
+from closedrooms.pipeline.log_observer import LogWatch
+from closedrooms.pipeline.manifest import resolved, versions
+from closedrooms.pipeline.progress import Progress, Silent
+from closedrooms.pipeline.stopwatch import Stopwatch
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapResult:
+    """The map of one log.
+
+    Attributes:
+        folder: What was written.
+        title: Head of the table.
+        built: Map, trajectory, loops and errors.
+        skipped: Lines and scans that were left out or mended, counted by reason.
+        failures: Always empty: a log is mapped or refused.
+    """
+
+    folder: Path
+    title: str
+    built: BuiltMap
+    skipped: dict[str, int]
+    failures: dict[str, str] = field(default_factory=dict)
+
+    def table(self) -> list[tuple[str, str]]:
+        """Rows for people; the first is the head."""
+        built = self.built
+        names = {"odometry": "raw odometry", "online": "as estimated on the way", "final": "final"}
+        return [
+            ("figure", "value"),
+            ("scans", f"{len(built.stamps)}"),
+            ("keyframes", f"{built.keyframes}"),
+            ("loops closed", f"{len(built.loops)}"),
+            ("scans a second", f"{len(built.stamps) / max(built.seconds, 1e-9):.0f}"),
+            *[
+                (
+                    f"error to the reference, {text}",
+                    f"{built.errors[name][0]:.3f} m, {math.degrees(built.errors[name][1]):.2f} deg",
+                )
+                for name, text in names.items()
+                if name in built.errors
+            ],
+            *[(f"left out: {reason}", f"{count}") for reason, count in self.skipped.items()],
+        ]
+
+
+def map_log(config: MapConfig, *, progress: Progress | None = None) -> MapResult:
+    """Read a recorded run, map it scan after scan, write the folder.
+
+    Args:
+        config: Options.
+        progress: Told how far it is.
+
+    Raises:
+        InvalidInputError: The log cannot be read or holds no scan with odometry.
+        OutputError: The folder cannot be written, or holds something that is not ours.
+    """
+    progress, watch = progress or Silent(), Stopwatch()
+    check_output_folder(config.out)
+    with watch.stage("read"):
+        progress.stage("read")
+        run = read_run(config.log, scan_topic=config.scan_topic, odometry_topic=config.odometry_topic)
+    manifest: dict[str, Any] = {
+        "configuration": resolved(config, leave_out=("log", "out")),
+        "paths": {"log": str(config.log)},
+        "versions": versions(),
+    }
+    with (
+        output_folder(config.out, manifest) as folder,
+        _recording(config, run, folder / "run.rrd") as observer,
+    ):
+        observer.configuration(manifest["configuration"])
+        log_watch = LogWatch(observer, run)
+        progress.stage("map", len(run.scans))
+
+        def step(number: int, map_T_robot: Pose2, mapper: Mapper) -> None:
+            progress.advance(number + 1, f"{number + 1} of {len(run.scans)} scans")
+            log_watch(number, map_T_robot, mapper)
+
+        with watch.stage("map"):
+            built = build_map(run, config.mapper, watch=step)
+        log_watch.finish(built)
+        with watch.stage("write"):
+            progress.stage("write")
+            _write(folder, run, built)
+        manifest["metrics"] = _metrics(run, built)
+        manifest["durations"] = watch.seconds() | {"mapping alone": round(built.seconds, 3)}
+    return MapResult(config.out, f"{config.log.name}: {len(built.stamps)} scans", built, run.skipped)
+
+
+def _metrics(run: RecordedRun, built: BuiltMap) -> dict[str, Any]:
+    errors = {name: {"ate_m": round(m, 5), "ate_rad": round(rad, 6)} for name, (m, rad) in built.errors.items()}
+    return {
+        "scans": len(built.stamps),
+        "keyframes": built.keyframes,
+        "loops": len(built.loops),
+        "errors": errors,
+        "skipped": run.skipped,
+    }
+
+
+def _write(folder: Path, run: RecordedRun, built: BuiltMap) -> None:
+    from closedrooms.visualization.summary import draw_map
+
+    write_map(folder / "map", built.grid)
+    write_trajectory(folder / "trajectory.tum", built.stamps, built.trajectory)
+    if run.reference is not None:
+        write_trajectory(folder / "trajectory_truth.tum", built.stamps, align(run.reference, built.trajectory))
+    if built.doors:
+        write_doors(folder / "doors.geojson", built.doors)
+    draw_map(folder / "summary.png", built.grid, built.doors, built.trajectory)
+
+
+@contextlib.contextmanager
+def _recording(config: MapConfig, run: RecordedRun, path: Path) -> Iterator[Observer]:
+    if not config.record:
+        yield NoObserver()
+        return
+    from closedrooms.visualization.rerun.blueprint import Layout
+    from closedrooms.visualization.rerun.recorder import Recorder
+
+    layout = Layout(building=False, prediction=False, coverage=False, reference=run.reference is not None)
+    with Recorder(path, name=config.log.name.split(".")[0], layout=layout) as recorder:
+        yield recorder

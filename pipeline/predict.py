@@ -1,0 +1,119 @@
+"""``closedrooms predict``: the predictor on anybody's map."""
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files import check_output_folder, output_folder
+from closedrooms.core.geojson import read_doors, write_doors, write_rooms
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.room import Room
+from closedrooms.core.rosmap import read_map, write_map
+from closedrooms.navigation.observer import NoObserver, Observer
+from closedrooms.pipeline.config import PredictConfig, predictor_config
+from closedrooms.pipeline.manifest import resolved, versions
+from closedrooms.pipeline.progress import Progress, Silent
+from closedrooms.pipeline.stopwatch import Stopwatch
+from closedrooms.predictor.predict import predict
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PredictResult:
+    """One finished prediction.
+
+    Attributes:
+        folder: What was written.
+        title: Head of the table.
+        rooms: Predicted rooms.
+        failures: Why a door could not be predicted, by door id.
+        durations: Seconds by stage.
+    """
+
+    folder: Path
+    title: str
+    rooms: tuple[Room, ...]
+    failures: dict[str, str] = field(default_factory=dict)
+    durations: dict[str, float] = field(default_factory=dict)
+
+    def table(self) -> list[tuple[str, ...]]:
+        """Rows for people; the first is the head."""
+        rows: list[tuple[str, ...]] = [("doors", "room", "area")]
+        rows += [
+            (
+                ", ".join(room.doors),
+                f"{room.kind}{', search was cut' if room.bounded else ''}",
+                f"{room.polygon.area:.1f} m2",
+            )
+            for room in self.rooms
+        ]
+        rows += [(door, f"not predicted: {reason}", "") for door, reason in self.failures.items()]
+        rows.append(("time", "prediction", f"{self.durations['predict']:.2f} s"))
+        return rows
+
+
+def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> PredictResult:
+    """Read a map and its closed doors, predict the rooms behind them, write the folder.
+
+    Args:
+        config: Options.
+        progress: Told what is done.
+
+    Returns:
+        The rooms and what failed; all of it is written to ``config.out``.
+
+    Raises:
+        InvalidInputError: The map or the doors cannot be read.
+        OutputError: The folder cannot be written, or holds something that is not ours.
+    """
+    progress, watch = progress or Silent(), Stopwatch()
+    check_output_folder(config.out)
+    with watch.stage("read"):
+        progress.stage("read")
+        grid, doors = read_map(config.map), read_doors(config.doors)
+    manifest: dict[str, Any] = {
+        "configuration": resolved(config, leave_out=("map", "doors", "out")),
+        "paths": {"map": str(config.map), "doors": str(config.doors)},
+        "versions": versions(),
+    }
+    with output_folder(config.out, manifest) as folder:
+        with watch.stage("predict"):
+            progress.stage("predict")
+            try:
+                prediction = predict(grid, doors, predictor_config(config), trace=config.record)
+            except InvalidInputError as error:
+                raise InvalidInputError(str(error), where=config.map) from error
+        with watch.stage("record"), _recording(config, grid, folder / "run.rrd") as observer:
+            observer.configuration(manifest["configuration"])
+            observer.prediction(grid, doors, prediction)
+        with watch.stage("write"):
+            progress.stage("write")
+            observed = grid.on(prediction.grid.frame)
+            write_map(folder / "map", observed)
+            write_map(folder / "predicted", prediction.grid)
+            write_doors(folder / "doors.geojson", doors)
+            write_rooms(folder / "rooms.geojson", prediction.rooms)
+            from closedrooms.visualization.summary import draw_summary
+
+            draw_summary(folder / "summary.png", observed, prediction, doors)
+        manifest["doors"] = {"given": [door.id for door in doors], "failures": prediction.failures}
+        manifest["durations"] = watch.seconds()
+    title = f"{config.map.name}: {len(prediction.rooms)} of {len(doors)} doors predicted"
+    return PredictResult(config.out, title, prediction.rooms, prediction.failures, manifest["durations"])
+
+
+@contextlib.contextmanager
+def _recording(config: PredictConfig, grid: OccupancyGrid, path: Path) -> Iterator[Observer]:
+    if not config.record:
+        yield NoObserver()
+        return
+    from closedrooms.visualization.rerun.blueprint import Layout
+    from closedrooms.visualization.rerun.recorder import Recorder
+
+    row, col, rows, cols = grid.known_bounds() or (0, 0, *grid.frame.shape)
+    bounds = grid.frame.cropped(row, col, rows, cols).bounds
+    layout = Layout(bounds, building=False, mapping=False, coverage=False)
+    with Recorder(path, name=config.map.stem, layout=layout) as recorder:
+        yield recorder

@@ -1,0 +1,26 @@
+"""Options of ``closedrooms doors``."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import tyro
+
+from closedrooms.predictor.structure.door_proposal_config import ProposalConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class DoorsConfig:
+    """Options of ``closedrooms doors``."""
+
+    map: tyro.conf.Positional[Path]
+    """The map: a ROS map_server YAML."""
+
+    out: Path
+    """File to write: GeoJSON that ``predict --doors`` reads. A file that is there is only replaced when all it holds
+    are proposals of an earlier call."""
+
+    picture: Path | None = None
+    """Also write a picture of the map with the proposals (PNG)."""
+
+    proposals: ProposalConfig = field(default_factory=ProposalConfig)
+    """What a closed door looks like, and from which score it is proposed."""

@@ -1,0 +1,147 @@
+"""Doors on edges, the face behind each door, and splits between doors (paper, section 3.2)."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.door import ClosedDoor
+from closedrooms.predictor.paper.arrangement import Arrangement
+from closedrooms.predictor.paper.lines import Line
+
+
+@dataclass(frozen=True, slots=True)
+class Entrance:
+    """Where a door leads.
+
+    Attributes:
+        door: The door.
+        edge: Its edge ``e_d``, an index into the arrangement.
+        face: The initial face behind it, an index into the arrangement.
+    """
+
+    door: ClosedDoor
+    edge: int
+    face: int
+
+
+def along_edge(arrangement: Arrangement, entrance: Entrance) -> FloatArray:
+    """Unit vector of the door's edge with the initial face on its left, shape (2,)."""
+    start, end = arrangement.edges[entrance.edge]
+    along = (end - start) / np.hypot(*(end - start))
+    inside = np.array(arrangement.faces[entrance.face].centroid.coords[0]) - start
+    left: FloatArray = along if along[0] * inside[1] - along[1] * inside[0] > 0 else -along
+    return left
+
+
+def distances_to_edges(arrangement: Arrangement, point: FloatArray) -> FloatArray:
+    """Distance of a point to every edge [m], shape (m,)."""
+    start, span = arrangement.edges[:, 0], arrangement.edges[:, 1] - arrangement.edges[:, 0]
+    along = ((point - start) * span).sum(axis=1) / np.maximum((span**2).sum(axis=1), 1e-18)
+    foot = start + np.clip(along, 0.0, 1.0)[:, None] * span
+    return np.asarray(np.hypot(*(point - foot).T))
+
+
+def find_entrance(
+    arrangement: Arrangement, unknown: BoolArray, door: ClosedDoor, *, reach: float, slack: float = 0.25
+) -> Entrance | str:
+    """The closest edge between a known and an unknown face, and the unknown one of the two.
+
+    An edge with an unknown face on both sides is taken only where none of the former is within ``slack`` of the
+    closest edge: a door in a thick wall lies between the lines of its two sides.
+
+    Args:
+        arrangement: The faces.
+        unknown: Which of them were not observed, shape (n,).
+        door: Its mid-point.
+        reach: A door further from every edge lies on no wall [m].
+        slack: How much further than the closest edge a proper one may lie [m]; a thick interior wall.
+
+    Returns:
+        The entrance, or the reason why there is none.
+    """
+    distances = np.where(
+        arrangement.edge_faces[:, 1] >= 0, distances_to_edges(arrangement, np.array(door.midpoint)), np.inf
+    )
+    closest = float(distances.min(initial=np.inf))
+    if not closest <= reach:
+        return f"no wall line within {reach:g} m of the door"
+    near = np.flatnonzero(distances <= closest + slack)
+    sides = unknown[arrangement.edge_faces[near]]  # (k, 2)
+    for wanted in (sides[:, 0] != sides[:, 1], sides[:, 0] & sides[:, 1]):
+        if wanted.any():
+            edge = _closest(arrangement, near[wanted], distances)
+            return Entrance(door, edge, _behind(arrangement, unknown, edge, np.array(door.midpoint)))
+    return "everything around the door is observed: nothing is hidden behind it"
+
+
+def _closest(arrangement: Arrangement, edges: IntArray, distances: FloatArray) -> int:
+    """The closest edge; of several the longer, of those the one first in position."""
+    keys = [
+        (
+            round(float(distances[e]), 6),
+            -round(float(arrangement.edge_lengths[e]), 6),
+            *arrangement.edges[e].mean(axis=0),
+        )
+        for e in edges
+    ]
+    return int(edges[keys.index(min(keys))])
+
+
+def _behind(arrangement: Arrangement, unknown: BoolArray, edge: int, point: FloatArray) -> int:
+    """The unknown one of an edge's faces; of two unknown ones that on whose side the door does not lie."""
+    a, b = (int(f) for f in arrangement.edge_faces[edge])
+    if unknown[a] != unknown[b]:
+        return a if unknown[a] else b
+    start, end = arrangement.edges[edge]
+    middle = (start + end) / 2.0
+    normal = np.array([-(end - start)[1], (end - start)[0]])
+    side_of_door = float((point - middle) @ normal)
+    side_of_a = float((np.array(arrangement.faces[a].centroid.coords[0]) - middle) @ normal)
+    return b if side_of_a * side_of_door > 0 else a
+
+
+def splits_between(arrangement: Arrangement, entrances: Sequence[Entrance]) -> list[Line]:
+    """Lines that part doors with the same initial face.
+
+    Doors on one edge: the perpendicular through the middle of two neighbouring doors. Doors on two edges of one
+    face, of which the text says nothing: the perpendicular of the line from door to door, through its middle, turned
+    to the nearest of the two directions of the first door's edge.
+
+    Args:
+        arrangement: The faces.
+        entrances: All doors, each with its edge and face.
+
+    Returns:
+        The lines by place, none where no two doors share a face.
+    """
+    by_face: dict[int, list[Entrance]] = {}
+    for entrance in entrances:
+        by_face.setdefault(entrance.face, []).append(entrance)
+    lines: dict[tuple[float, float], Line] = {}
+    for unordered in by_face.values():
+        if len(unordered) < 2:
+            continue
+        sharing = sorted(unordered, key=lambda e: (round(float(arrangement.edge_lengths[e.edge]), 6), e.door.midpoint))
+        start, end = arrangement.edges[sharing[0].edge]
+        along = (end - start) / np.hypot(*(end - start))
+        across = np.array([-along[1], along[0]])
+        points = np.array([e.door.midpoint for e in sharing])
+        spread = (np.ptp(points @ along), np.ptp(points @ across))
+        axis = along if spread[0] >= spread[1] else across
+        places = np.sort(points @ axis)
+        for low, high in itertools.pairwise(places):
+            if high - low > 1e-3:
+                line = _across(axis, (low + high) / 2.0)
+                lines[round(line.angle, 6), round(line.offset, 4)] = line
+    return [lines[key] for key in sorted(lines)]
+
+
+def _across(axis: FloatArray, place: float) -> Line:
+    """The line perpendicular to ``axis`` at ``place`` along it."""
+    angle = float(np.arctan2(axis[0], -axis[1]))  # its normal (-sin, cos) is +-axis
+    line = Line(angle % np.pi, 0.0, "split")
+    sign = 1.0 if float(line.normal @ axis) > 0 else -1.0
+    return Line(line.angle, sign * place, "split")

@@ -1,0 +1,48 @@
+"""What a recording shows of a prediction."""
+
+import numpy as np
+import shapely
+
+from closedrooms.predictor.paper.expansion import Growth
+from closedrooms.predictor.paper.finished_rooms import union
+from closedrooms.predictor.paper.initial_layouts import Start
+from closedrooms.predictor.prediction import Level, PredictionTrace
+
+
+def level_of(k: int, growth: Growth) -> Level:
+    """The layouts as they are after step ``k``."""
+    names = [entrance.door.id for entrance in growth.entrances]
+    shapes = {name: union(growth, room) for room, name in enumerate(names)}
+    return Level(k, shapes, dict(zip(names, growth.scores, strict=True)))
+
+
+def trace_of(start: Start, levels: list[Level]) -> PredictionTrace:
+    """Every stage of a prediction, for recordings and pictures.
+
+    Args:
+        start: Structure, faces and entrances.
+        levels: Layouts after each step, as they were reported.
+
+    Returns:
+        The stages in the map frame; the lines clipped to the box of the faces.
+    """
+    arrangement = start.arrangement
+    box = shapely.union_all(list(arrangement.faces)).envelope
+    reach = float(np.hypot(box.bounds[2] - box.bounds[0], box.bounds[3] - box.bounds[1]))
+    centre = np.array(box.centroid.coords[0])
+    clipped = []
+    for line in arrangement.lines:
+        foot = centre - line.distance(centre) * line.normal
+        string = shapely.LineString((foot - reach * line.along, foot + reach * line.along))
+        clipped.append(shapely.get_coordinates(string.intersection(box.buffer(1e-6)))[[0, -1]].ravel())
+    return PredictionTrace(
+        segments=start.structure.segments,
+        clusters=start.structure.clusters,
+        lines=np.array(clipped).reshape(-1, 4),
+        line_kinds=tuple(line.kind for line in arrangement.lines),
+        faces=arrangement.faces,
+        unknown=start.unknown,
+        border=arrangement.border,
+        initial={entrance.door.id: entrance.face for entrance in start.entrances},
+        levels=tuple(levels),
+    )

@@ -1,0 +1,1 @@
+"""What a grid shows: clutter, wall faces, directions, thickness, edges, doorways, door proposals, ROSE."""

@@ -1,0 +1,73 @@
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.mapping.logs.npz import write_scans
+from closedrooms.mapping.logs.recorded_run import RecordedRun, read_run
+from closedrooms.mapping.map_builder import build_map
+
+
+def arrays(n: int = 3) -> dict[str, Any]:
+    return {
+        "stamps": np.arange(float(n)),
+        "ranges": np.full((n, 90), 2.0),
+        "odometry": np.zeros((n, 3)),
+        "angle_min": -np.pi,
+        "angle_increment": 2 * np.pi / 90,
+        "range_max": 20.0,
+    }
+
+
+def saved(folder: Path, **changes: Any) -> Path:
+    path = folder / "scans.npz"
+    np.savez(path, **{k: v for k, v in {**arrays(), **changes}.items() if v is not None})
+    return path
+
+
+def test_a_drive_written_and_read_again_is_the_same(tmp_path: Path, office: Any) -> None:
+    drive = office.drive([(1.0, 1.0), (2.4, 1.0)], noise=0.02, beams=180)
+    run = RecordedRun(tuple(drive.scans), drive.odometry, drive.truth)
+    write_scans(tmp_path / "scans.npz", run)
+    again = read_run(tmp_path / "scans.npz")
+    assert np.array_equal(again.odometry, run.odometry)
+    assert again.reference is not None
+    assert again.scans[3].ranges == pytest.approx(run.scans[3].ranges, rel=1e-6)
+    result = build_map(again)
+    assert result.errors["final"][0] < 0.03
+    assert result.online.shape == result.trajectory.shape == run.odometry.shape
+
+
+def test_scans_without_odometry_are_skipped_and_counted(tmp_path: Path) -> None:
+    odometry = np.zeros((3, 3))
+    odometry[1, 0] = np.nan
+    run = read_run(saved(tmp_path, odometry=odometry))
+    assert len(run.scans) == 2
+    assert run.skipped == {"scans without odometry": 1}
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"ranges": np.zeros((2, 90))},
+        {"odometry": np.zeros((3, 2))},
+        {"stamps": None},
+        {"odometry": None},
+        {"angle_increment": 0.0},
+        {"range_max": np.nan},
+        {"ranges": np.array([object()] * 3)},
+    ],
+)
+def test_arrays_that_do_not_fit_are_one_clear_line(tmp_path: Path, changes: dict[str, Any]) -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        read_run(saved(tmp_path, **changes))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_truncated_archive_is_clear(tmp_path: Path) -> None:
+    path = saved(tmp_path)
+    path.write_bytes(path.read_bytes()[:400])
+    with pytest.raises(InvalidInputError, match="broken"):
+        read_run(path)

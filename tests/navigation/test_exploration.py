@@ -1,0 +1,198 @@
+"""Exploration in a world of cells: a ray caster as simulation and a mapper that knows its pose."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.grid import GridFrame, OccupancyGrid
+from closedrooms.core.pose import Pose2
+from closedrooms.core.scan import LaserScan
+from closedrooms.navigation.config import NavigationConfig
+from closedrooms.navigation.exploration import explore
+from closedrooms.navigation.observer import NoObserver
+
+RESOLUTION, BEAMS, RANGE, RADIUS = 0.05, 180, 6.0, 0.2
+
+
+@dataclass(frozen=True)
+class Sensed:
+    scan: LaserScan
+    odometry: Pose2
+    sightings: tuple[()] = ()
+
+
+class CellWorld:
+    """Walls are cells; the robot is a disc that stops at them."""
+
+    def __init__(self, walls: np.ndarray, start: tuple[float, float]) -> None:
+        self.walls = walls
+        self.pose = Pose2(*start)
+        self.time = 0.0
+        self.jammed = False
+        self._gap: Any = cv2.distanceTransform((1 - walls).astype(np.uint8), cv2.DIST_L2, 5) * RESOLUTION
+
+    def observe(self) -> Any:
+        angles = -math.pi + 2.0 * math.pi / BEAMS * np.arange(BEAMS) + self.pose.theta
+        s = np.arange(0.0, RANGE, RESOLUTION / 2)
+        rows = ((self.pose.y + np.sin(angles)[:, None] * s) / RESOLUTION).astype(int).clip(0, self.walls.shape[0] - 1)
+        cols = ((self.pose.x + np.cos(angles)[:, None] * s) / RESOLUTION).astype(int).clip(0, self.walls.shape[1] - 1)
+        hit = self.walls[rows, cols] > 0
+        ranges = np.where(hit.any(axis=1), s[hit.argmax(axis=1)], np.inf)
+        scan = LaserScan(ranges, -math.pi, 2.0 * math.pi / BEAMS, RANGE, stamp=self.time)
+        return Sensed(scan, self.pose)
+
+    def step(self, v: float, w: float, duration: float) -> None:
+        self.time += duration
+        if self.jammed:
+            return
+        for _ in range(5):
+            pose = self.pose @ Pose2(v * duration / 5, 0.0, w * duration / 5)
+            if self._gap[int(pose.y / RESOLUTION), int(pose.x / RESOLUTION)] < RADIUS:
+                pose = Pose2(self.pose.x, self.pose.y, pose.theta)
+            self.pose = pose
+
+
+class CellMapper:
+    """Draws every fourth scan at the true pose."""
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self._cells = np.full(shape, -1, dtype=np.int8)
+        self._count = 0
+
+    def process(self, scan: LaserScan, odometry: Pose2, sightings: Any = ()) -> Pose2:  # noqa: ARG002
+        if self._count % 4 == 0:
+            reach = np.minimum(scan.ranges, scan.range_max)
+            s = np.arange(0.0, RANGE, RESOLUTION / 2)
+            before = s[None, :] < reach[:, None] - RESOLUTION / 2
+            angles = np.broadcast_to((scan.angles + odometry.theta)[:, None], before.shape)[before]
+            self._set(odometry, angles, np.broadcast_to(s, before.shape)[before], 0)
+            hits = scan.hits
+            self._set(odometry, scan.angles[hits] + odometry.theta, scan.ranges[hits], 100)
+        self._count += 1
+        return odometry
+
+    def _set(self, pose: Pose2, angles: FloatArray, ranges: FloatArray, value: int) -> None:
+        rows = ((pose.y + np.sin(angles) * ranges) / RESOLUTION).astype(int)
+        cols = ((pose.x + np.cos(angles) * ranges) / RESOLUTION).astype(int)
+        inside = (rows >= 0) & (cols >= 0) & (rows < self._cells.shape[0]) & (cols < self._cells.shape[1])
+        rows, cols = rows[inside], cols[inside]
+        if value == 0:
+            walls = self._cells[rows, cols] == 100
+            rows, cols = rows[~walls], cols[~walls]
+        self._cells[rows, cols] = value
+
+    def grid(self) -> OccupancyGrid:
+        return OccupancyGrid(GridFrame(RESOLUTION, 0.0, 0.0, *self._cells.shape), self._cells.copy())
+
+    def doors(self) -> list[ClosedDoor]:
+        return []
+
+
+class Notes(NoObserver):
+    """Keeps what an exploration tells."""
+
+    def __init__(self) -> None:
+        self.goals: list[tuple[float, float]] = []
+        self.scans = 0
+
+    def observation(self, observation: Any, map_T_robot: Pose2) -> None:  # noqa: ARG002
+        self.scans += 1
+
+    def frontiers(self, points: FloatArray, goal: Any, path: Any, stamp: float) -> None:  # noqa: ARG002
+        if goal is not None:
+            self.goals.append(goal)
+
+
+def building(*, closed: bool = False) -> np.ndarray:
+    """A corridor of 2 m with three rooms of 4 m on either side, doors of 0.8 m; ``closed`` shuts one of them."""
+    walls = np.ones((260, 280), dtype=np.uint8)
+    walls[110:150, 10:270] = 0
+    for row, doors in ((20, 107), (153, 150)):
+        for number, col in enumerate((10, 98, 186)):
+            walls[row : row + 87, col : col + 84] = 0
+            walls[doors : doors + 3, col + 20 + 15 * number : col + 36 + 15 * number] = 0
+    if closed:
+        walls[107:110, 10:94] = 1
+    return walls
+
+
+def free_share(world: CellWorld, mapper: CellMapper, start: tuple[float, float]) -> float:
+    """How much of the free space connected to the start the map knows."""
+    _, labels = cv2.connectedComponents((1 - world.walls).astype(np.uint8), connectivity=4)
+    labels = np.asarray(labels)
+    reachable = labels == labels[int(start[1] / RESOLUTION), int(start[0] / RESOLUTION)]
+    return float((mapper.grid().known & reachable).sum() / reachable.sum())
+
+
+START = (1.5, 6.5)
+
+
+def test_every_room_is_explored_and_the_run_ends_by_itself() -> None:
+    world = CellWorld(building(), START)
+    mapper, notes = CellMapper(world.walls.shape), Notes()
+    result = explore(world, mapper, NavigationConfig(time_limit=400.0), notes)
+    assert result.status == "complete"
+    assert free_share(world, mapper, START) >= 0.98
+    assert notes.scans == result.scans
+    assert result.distance > 15.0
+    assert set(result.wall_seconds) == {"sense", "map", "navigate", "observe", "move"}
+
+
+@pytest.mark.slow
+def test_a_closed_room_is_left_out_and_the_rest_is_explored() -> None:
+    world = CellWorld(building(closed=True), START)
+    mapper = CellMapper(world.walls.shape)
+    result = explore(world, mapper, NavigationConfig(time_limit=400.0))
+    assert result.status == "complete"
+    assert free_share(world, mapper, START) >= 0.98
+    assert (mapper.grid().cells[25:100, 15:90] == -1).all()
+
+
+def test_the_same_world_is_explored_the_same_way_twice() -> None:
+    runs = []
+    for _ in range(2):
+        world, notes = CellWorld(building(closed=True), START), Notes()
+        result = explore(world, CellMapper(world.walls.shape), NavigationConfig(time_limit=15.0), notes)
+        runs.append((result.status, result.seconds, result.distance, notes.goals))
+    assert runs[0] == runs[1]
+
+
+def test_the_limit_ends_the_run_with_a_status() -> None:
+    world = CellWorld(building(), START)
+    result = explore(world, CellMapper(world.walls.shape), NavigationConfig(time_limit=5.0))
+    assert result.status == "limit"
+    assert result.seconds == pytest.approx(5.0)
+
+
+def test_a_robot_that_cannot_move_ends_as_stuck() -> None:
+    world = CellWorld(building(), START)
+    world.jammed = True
+    result = explore(world, CellMapper(world.walls.shape), NavigationConfig(max_recoveries=1, stuck_time=1.0))
+    assert result.status == "stuck"
+    assert result.seconds < 60.0
+
+
+def test_a_closed_cell_is_complete_at_once() -> None:
+    walls = np.ones((120, 120), dtype=np.uint8)
+    walls[20:100, 20:100] = 0
+    result = explore(CellWorld(walls, (3.0, 3.0)), CellMapper((120, 120)), NavigationConfig(time_limit=60.0))
+    assert result.status == "complete"
+    assert result.seconds < 10.0
+
+
+@pytest.mark.slow
+def test_a_table_in_the_room_does_not_keep_the_robot_busy() -> None:
+    walls = building(closed=True)
+    walls[40:48, 120:140] = 1
+    walls[60:63, 110:113] = 1
+    world = CellWorld(walls, START)
+    mapper = CellMapper(walls.shape)
+    result = explore(world, mapper, NavigationConfig(time_limit=400.0))
+    assert result.status == "complete"
+    assert free_share(world, mapper, START) >= 0.98

@@ -1,0 +1,65 @@
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from closedrooms.core.errors import InvalidInputError, OutputError
+from closedrooms.core.rosmap import read_map
+from closedrooms.pipeline.world_files import convert_world, exporters, generate_world, list_worlds, show_world
+from closedrooms.worlds.formats.native import read_plan
+from closedrooms.worlds.library import bundled_names, load_world
+
+FIXTURES = Path(__file__).parents[1] / "fixtures"
+
+
+def test_the_list_has_a_line_a_world_with_its_name_first() -> None:
+    lines = list_worlds()
+    assert [line.split()[0] for line in lines] == bundled_names()
+    assert all("\x1b" not in line for line in lines)
+
+
+def test_show_writes_a_picture(tmp_path: Path) -> None:
+    show_world("school-04", tmp_path / "a.png")
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.size[0] > 600
+        assert len(image.convert("RGB").getcolors(1_000_000) or []) > 20
+
+
+def test_a_picture_into_a_missing_folder_is_a_clear_error(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="cannot write"):
+        show_world("office-01", tmp_path / "none" / "a.png")
+
+
+def test_generate_writes_a_plan(tmp_path: Path) -> None:
+    plan = generate_world("office", 7, tmp_path / "a.json")
+    assert read_plan(tmp_path / "a.json").rooms == plan.rooms
+
+
+def test_convert_to_a_ros_map_gives_the_true_map_of_the_building(tmp_path: Path) -> None:
+    convert_world("office-01", tmp_path / "m.yaml", "rosmap")
+    grid = read_map(tmp_path / "m.yaml")
+    interior = sum(room.polygon.area for room in load_world("office-01").rooms)
+    known = grid.free.sum() * grid.frame.resolution**2
+    assert 0.8 * interior < known < interior
+    assert grid.occupied.any()
+
+
+def test_an_unknown_format_lists_the_valid_ones(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="unknown format 'dwg'; expected one of json, rosmap, sdf, stage"):
+        convert_world("office-01", tmp_path / "m", "dwg")
+    assert {"json", "rosmap"} <= set(exporters())
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("form", ["json", "rosmap", "sdf", "stage"])
+def test_a_folder_is_no_file_to_convert_to(tmp_path: Path, form: str) -> None:
+    with pytest.raises(OutputError, match="the output is a folder"):
+        convert_world("office-01", tmp_path, form)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_level_of_a_world_with_one_floor_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="--level L1 of a world with one floor"):
+        load_world("office-01", level="L1")
+    with pytest.raises(InvalidInputError, match="--level L1 of a world with one floor"):
+        load_world(str(FIXTURES / "kth_small.xml"), level="L1")

@@ -1,0 +1,216 @@
+"""The preset best on buildings drawn by hand: gaps, corridors at an angle, bad doors, invariance."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from shapely.geometry import Polygon, box
+
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
+from closedrooms.core.pose import Pose2
+from closedrooms.predictor.best.method import predict_best
+from closedrooms.predictor.config import preset
+from closedrooms.predictor.prediction import Prediction
+
+CONFIG = preset("best")
+WALL = 0.2
+# Five rooms of 4 x 5 m above a corridor of 2 m and as many below; walls of 0.2 m.
+WIDTH, DEPTH, CORRIDOR = 4.0, 5.0, 2.0
+
+
+def _room(column: int, *, above: bool) -> Polygon:
+    x0 = column * (WIDTH + WALL)
+    y0 = CORRIDOR + WALL if above else -WALL - DEPTH
+    return box(x0, y0, x0 + WIDTH, y0 + DEPTH)
+
+
+def _door(column: int, *, above: bool) -> ClosedDoor:
+    y = CORRIDOR + WALL / 2 if above else -WALL / 2
+    return ClosedDoor(f"d{column}{'a' if above else 'b'}", (column * (WIDTH + WALL) + WIDTH / 2, y))
+
+
+def _building(closed: set[str], angle: float = 0.0, resolution: float = 0.05) -> tuple[OccupancyGrid, list[ClosedDoor]]:
+    """The map of a robot that saw the corridor and every room that is not closed."""
+    pose = Pose2(3.0, -2.0, angle)
+    rooms = {_door(c, above=a).id: _room(c, above=a) for c in range(5) for a in (True, False)}
+    doors = [_door(c, above=a) for c in range(5) for a in (True, False)]
+    corridor = box(0.0, 0.0, 5 * WIDTH + 4 * WALL, CORRIDOR)
+    seen = [corridor]
+    for door in doors:
+        if door.id not in closed:
+            x, y = door.midpoint
+            seen += [rooms[door.id], box(x - 0.45, y - WALL / 2 - 0.01, x + 0.45, y + WALL / 2 + 0.01)]
+    free = shapely.union_all(seen)
+    matrix = [math.cos(angle), -math.sin(angle), math.sin(angle), math.cos(angle), pose.x, pose.y]
+    turned = shapely.affinity.affine_transform(free, matrix)
+    x0, y0, x1, y1 = turned.bounds
+    frame = GridFrame(
+        resolution, x0 - 8.0, y0 - 8.0, round((y1 - y0 + 16) / resolution), round((x1 - x0 + 16) / resolution)
+    )
+    rows, cols = np.meshgrid(np.arange(frame.rows), np.arange(frame.cols), indexing="ij")
+    points = frame.to_points(np.stack((rows, cols), axis=-1))
+    inside = shapely.contains_xy(turned, points[..., 0], points[..., 1])
+    near = shapely.contains_xy(turned.buffer(1.5 * resolution), points[..., 0], points[..., 1])
+    cells = np.full(frame.shape, UNKNOWN, dtype=np.int8)
+    cells[near] = OCCUPIED
+    cells[inside] = FREE
+    return OccupancyGrid(frame, cells), [door.moved(pose) for door in doors if door.id in closed]
+
+
+def _truth(door: str, angle: float = 0.0) -> Polygon:
+    column, above = int(door[1]), door[2] == "a"
+    matrix = [math.cos(angle), -math.sin(angle), math.sin(angle), math.cos(angle), 3.0, -2.0]
+    return shapely.affinity.affine_transform(_room(column, above=above), matrix)
+
+
+def _iou(a: Polygon, b: Polygon) -> float:
+    return float(a.intersection(b).area / a.union(b).area)
+
+
+@pytest.mark.parametrize("angle", [0.0, math.pi / 2, math.radians(30), math.radians(-17)])
+def test_fills_the_gap_between_two_known_rooms_at_any_angle(angle: float) -> None:
+    grid, doors = _building({"d2a"}, angle)
+    prediction = predict_best(grid, doors, CONFIG)
+    assert not prediction.failures
+    assert _iou(prediction.rooms[0].polygon, _truth("d2a", angle)) > 0.85
+
+
+def test_parts_three_closed_rooms_in_a_row_at_the_middle_between_their_doors() -> None:
+    closed = {"d1a", "d2a", "d3a"}
+    grid, doors = _building(closed)
+    prediction = predict_best(grid, doors, CONFIG)
+    assert [room.doors[0] for room in prediction.rooms] == [door.id for door in doors]
+    for room in prediction.rooms:
+        assert _iou(room.polygon, _truth(room.doors[0])) > 0.8, room.doors
+
+
+@pytest.mark.parametrize("apart", [1.2, 1.8, 3.0])
+def test_two_doors_into_a_gap_too_narrow_for_two_rooms_share_a_room(apart: float) -> None:
+    grid, doors = _building({"d2a"})
+    x, y = doors[0].midpoint
+    two = [ClosedDoor("left", (x - apart / 2, y)), ClosedDoor("right", (x + apart / 2, y))]
+    for order in (two, two[::-1]):
+        prediction = predict_best(grid, order, CONFIG)
+        assert not prediction.failures
+        (room,) = prediction.rooms
+        assert set(room.doors) == {"left", "right"}
+        assert _iou(room.polygon, _truth("d2a")) > 0.85
+        for door in two:
+            assert prediction.grid.free[tuple(grid.frame.to_cells(np.array(door.midpoint)) - _shift(prediction, grid))]
+
+
+def _shift(prediction: Prediction, grid: OccupancyGrid) -> np.ndarray:
+    """Cells between the lower left corners of the completed map and of the map."""
+    a, b = prediction.grid.frame, grid.frame
+    return np.round(np.array([a.origin_y - b.origin_y, a.origin_x - b.origin_x]) / b.resolution).astype(int)
+
+
+def test_two_doors_into_a_gap_as_wide_as_two_rooms_have_a_room_each() -> None:
+    grid, doors = _building({"d1a", "d2a"})
+    rooms = predict_best(grid, doors, CONFIG).rooms
+    assert [room.doors for room in rooms] == [(door.id,) for door in doors]
+
+
+def test_a_door_to_a_nook_too_small_for_a_room_gets_what_is_left() -> None:
+    grid, doors = _building({"d2a"})
+    cells = grid.cells.copy()
+    truth = _truth("d2a")
+    x0, y0, x1, y1 = truth.bounds
+    rows, cols = np.meshgrid(np.arange(grid.frame.rows), np.arange(grid.frame.cols), indexing="ij")
+    points = grid.frame.to_points(np.stack((rows, cols), axis=-1))
+    filled = box(x0, y0 + 1.0, x1, y1)
+    inside = shapely.contains_xy(filled, points[..., 0], points[..., 1])
+    near = shapely.contains_xy(filled.buffer(0.075), points[..., 0], points[..., 1])
+    cells[near] = OCCUPIED
+    cells[inside] = FREE
+    prediction = predict_best(OccupancyGrid(grid.frame, cells), doors, CONFIG)
+    assert not prediction.failures
+    assert _iou(prediction.rooms[0].polygon, truth.difference(filled.buffer(0.1))) > 0.4
+
+
+def test_predicted_rooms_hardly_overlap_and_stay_off_known_space() -> None:
+    grid, doors = _building({"d0a", "d1a", "d2a", "d4b", "d3b"})
+    rooms = predict_best(grid, doors, CONFIG).rooms
+    assert len(rooms) == 5
+    for i, room in enumerate(rooms):
+        for other in rooms[:i]:
+            assert room.polygon.intersection(other.polygon).area < 0.05 * room.polygon.area
+        cells = grid.frame.to_points(np.argwhere(grid.free))
+        inside = shapely.contains_xy(room.polygon, cells[:, 0], cells[:, 1]).sum() * grid.frame.resolution**2
+        assert inside < 0.03 * room.polygon.area
+
+
+def test_the_order_of_doors_changes_nothing() -> None:
+    grid, doors = _building({"d0a", "d1a", "d2a", "d4b"})
+    forward = {room.doors: room for room in predict_best(grid, doors, CONFIG).rooms}
+    backward = {room.doors: room for room in predict_best(grid, doors[::-1], CONFIG).rooms}
+    assert forward == backward
+
+
+def test_a_quarter_turn_turns_the_answer() -> None:
+    closed = {"d0a", "d1a", "d3b"}
+    grid, doors = _building(closed)
+    turned, moved = _building(closed, math.pi / 2)
+    there = {room.doors: room.polygon for room in predict_best(turned, moved, CONFIG).rooms}
+    for room in predict_best(grid, doors, CONFIG).rooms:
+        back = shapely.affinity.rotate(there[room.doors], -90, origin=(3.0, -2.0))
+        assert _iou(back, room.polygon) > 0.9
+
+
+def test_a_coarser_map_gives_about_the_same_rooms() -> None:
+    grid, doors = _building({"d1a", "d3b"}, resolution=0.1)
+    for room in predict_best(grid, doors, CONFIG).rooms:
+        assert _iou(room.polygon, _truth(room.doors[0])) > 0.75
+
+
+def test_the_completed_map_opens_the_doors_and_draws_the_rooms() -> None:
+    grid, doors = _building({"d2a"})
+    prediction = predict_best(grid, doors, CONFIG)
+    completed = prediction.grid
+    cell = completed.frame.to_cells(np.array(doors[0].midpoint))
+    assert completed.free[cell[0], cell[1]]
+    centre = completed.frame.to_cells(np.array(_truth("d2a").centroid.coords[0]))
+    assert completed.free[centre[0], centre[1]]
+    assert (completed.on(grid.frame).free >= grid.free).all()
+
+
+def test_bad_doors_fail_with_a_reason_and_leave_the_others() -> None:
+    grid, doors = _building({"d2a"})
+    x, y = doors[0].midpoint
+    bad = [
+        ClosedDoor("far", (900.0, 900.0)),
+        ClosedDoor("same", (x + 0.01, y)),
+        ClosedDoor("between", (3.0 + WIDTH + WALL / 2, -2.0 + CORRIDOR + 2.0)),
+    ]
+    prediction = predict_best(grid, [*doors, *bad], CONFIG)
+    assert [room.doors for room in prediction.rooms] == [("d2a",)]
+    assert set(prediction.failures) == {"far", "same", "between"}
+    assert all(prediction.failures.values())
+
+
+def test_maps_without_any_wall_fail_every_door() -> None:
+    frame = GridFrame(0.05, 0.0, 0.0, 60, 80)
+    door = ClosedDoor("d0", (1.0, 1.0))
+    for value in (UNKNOWN, FREE, OCCUPIED):
+        grid = OccupancyGrid(frame, np.full(frame.shape, value, dtype=np.int8))
+        prediction = predict_best(grid, [door], CONFIG)
+        assert not prediction.rooms
+        assert "d0" in prediction.failures
+        assert (prediction.grid.cells == grid.cells).all()
+
+
+def test_no_doors_is_no_rooms() -> None:
+    grid, _ = _building(set())
+    prediction = predict_best(grid, [], CONFIG)
+    assert prediction.rooms == ()
+    assert prediction.failures == {}
+
+
+def test_a_trace_holds_each_room_by_itself_and_together() -> None:
+    grid, doors = _building({"d1a", "d2a"})
+    prediction = predict_best(grid, doors, CONFIG, trace=True)
+    assert prediction.trace is not None
+    assert [level.k for level in prediction.trace.levels] == [0, 1]
+    assert set(prediction.trace.levels[1].layouts) == {"d1a", "d2a"}

@@ -1,0 +1,134 @@
+"""Closed doors proposed from a map alone."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
+from closedrooms.predictor.structure.door_proposal_config import ProposalConfig
+from closedrooms.predictor.structure.door_proposals import propose_doors
+from closedrooms.predictor.structure.wall_faces import face_directions, find_faces
+
+RESOLUTION = 0.05
+SIZE = 200
+# Depth of the wall that a lidar shows [m].
+SHOWN = 0.10
+
+
+def corridor(
+    *, middle: float = 0.0, width: float = 0.9, recess: float = 0.05, angle: float = 0.0, behind: int = UNKNOWN
+) -> OccupancyGrid:
+    """A wall along x through the origin, turned by ``angle``: free below, a leaf set back in it, ``behind`` above."""
+    frame = GridFrame(RESOLUTION, -5.0, -5.0, SIZE, SIZE)
+    rows, cols = np.meshgrid(np.arange(SIZE), np.arange(SIZE), indexing="ij")
+    points = frame.to_points(np.stack((rows, cols), axis=-1))
+    along = points[..., 0] * math.cos(angle) + points[..., 1] * math.sin(angle)
+    across = points[..., 1] * math.cos(angle) - points[..., 0] * math.sin(angle)
+    face = np.where(np.abs(along - middle) < width / 2, recess, 0.0)
+    cells = np.where(across < face, FREE, np.where(across < face + SHOWN, OCCUPIED, behind))
+    cells[np.hypot(along, across) > 4.5] = UNKNOWN
+    return OccupancyGrid(frame, cells.astype(np.int8))
+
+
+@given(
+    middle=st.integers(-40, 40).map(lambda cells: cells * RESOLUTION + 0.025),
+    width=st.sampled_from([0.75, 0.85, 0.95, 1.05, 1.15]),
+    recess=st.sampled_from([0.05, 0.10]),
+    quarter=st.integers(0, 3),
+)
+@settings(max_examples=25, deadline=None)
+def test_a_leaf_set_back_is_proposed_where_it_is(middle: float, width: float, recess: float, quarter: int) -> None:
+    (door,) = propose_doors(corridor(middle=middle, width=width, recess=recess, angle=quarter * math.pi / 2))
+    angle = quarter * math.pi / 2
+    x, y = door.midpoint
+    assert math.cos(angle) * x + math.sin(angle) * y == pytest.approx(middle, abs=0.06)
+    assert math.cos(angle) * y - math.sin(angle) * x == pytest.approx(recess, abs=0.03)
+    assert door.width == pytest.approx(width, abs=0.11)
+    assert math.dist(*door.segment) == pytest.approx(door.width)
+    assert door.recess == pytest.approx(recess, abs=0.02)
+    assert 0.5 <= door.score <= 1.0
+
+
+@pytest.mark.parametrize("degrees", [10.0, 30.0, 45.0, 160.0])
+def test_a_door_in_a_slanted_wall_is_found(degrees: float) -> None:
+    grid = corridor(middle=0.5, recess=0.10, angle=math.radians(degrees))
+    best = propose_doors(grid, ProposalConfig(min_score=0.2))[0]
+    assert (
+        math.dist(best.midpoint, (0.5 * math.cos(math.radians(degrees)), 0.5 * math.sin(math.radians(degrees)))) < 0.2
+    )
+
+
+def test_a_plain_wall_holds_no_door() -> None:
+    assert propose_doors(corridor(recess=0.0)) == ()
+
+
+def test_a_wall_known_from_behind_holds_no_closed_room() -> None:
+    assert propose_doors(corridor(behind=FREE)) == ()
+
+
+@pytest.mark.parametrize("width", [0.3, 2.0])
+def test_recesses_of_other_widths_are_no_doors(width: float) -> None:
+    assert propose_doors(corridor(width=width)) == ()
+
+
+def test_width_and_recess_can_be_set() -> None:
+    assert propose_doors(corridor(width=2.0), ProposalConfig(max_width=2.5))
+    assert not propose_doors(corridor(recess=0.05), ProposalConfig(min_recess=0.08))
+
+
+def test_a_clearer_recess_scores_higher() -> None:
+    shallow, deep = (propose_doors(corridor(recess=recess))[0].score for recess in (0.05, 0.15))
+    assert deep > shallow
+
+
+def test_proposals_come_best_first_and_the_same_each_time() -> None:
+    grid = corridor(recess=0.10)
+    cells = np.array(grid.cells)
+    low = grid.frame.to_cells(np.array([2.0, 0.0]))
+    cells[low[0], low[1] : low[1] + 16] = FREE
+    cells[low[0] + 1 : low[0] + 3, low[1] : low[1] + 16] = OCCUPIED
+    two = propose_doors(OccupancyGrid(grid.frame, cells))
+    assert len(two) == 2
+    assert two[0].score >= two[1].score
+    assert two == propose_doors(OccupancyGrid(grid.frame, cells))
+
+
+@pytest.mark.parametrize("value", [UNKNOWN, FREE, OCCUPIED])
+def test_a_map_of_one_kind_holds_no_door(value: int) -> None:
+    frame = GridFrame(RESOLUTION, 0.0, 0.0, 20, 30)
+    assert propose_doors(OccupancyGrid(frame, np.full(frame.shape, value, dtype=np.int8))) == ()
+
+
+def test_coarse_cells_find_what_they_can_show() -> None:
+    frame = GridFrame(0.5, 0.0, 0.0, 20, 20)
+    cells = np.full(frame.shape, FREE, dtype=np.int8)
+    cells[10] = OCCUPIED
+    assert propose_doors(OccupancyGrid(frame, cells)) == ()
+
+
+def test_wall_directions_are_found_to_half_a_degree() -> None:
+    for degrees in (0.0, 20.0, 45.0, 110.0):
+        angles = face_directions(find_faces(corridor(recess=0.0, angle=math.radians(degrees))), RESOLUTION)
+        off = (np.degrees(angles[0]) - 90.0 - degrees + 90.0) % 180.0 - 90.0
+        assert abs(off) <= 0.5
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"min_width": 0.0},
+        {"min_width": 1.5},
+        {"max_width": 1000.0},
+        {"min_recess": 0.5},
+        {"min_score": 1.5},
+        {"jamb": 0.0},
+        {"depth": float("nan")},
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(InvalidInputError, match="expected"):
+        ProposalConfig(**wrong)

@@ -1,0 +1,47 @@
+import numpy as np
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from closedrooms.core.grid import GridFrame
+from closedrooms.predictor.inpainting import fill_shape
+
+# Quarters of a cell, so that sides and corners often lie on centres of cells.
+PLACES = st.integers(-20, 60).map(lambda quarter: quarter / 4)
+POINTS = st.tuples(PLACES, PLACES)
+HULLS = st.lists(POINTS, min_size=3, max_size=6).map(lambda points: shapely.MultiPoint(points).convex_hull.buffer(0))
+
+
+@st.composite
+def boxes(draw):
+    """Boxes joined, some with holes and apart."""
+    four = [shapely.MultiPoint(draw(st.tuples(POINTS, POINTS))).envelope.buffer(0) for _ in range(4)]
+    return shapely.union_all(four[:3]).difference(four[3])
+
+
+def _filled(shape, resolution):
+    frame = GridFrame(resolution, -2.0, 1.0, 9, 12)
+    mask = np.zeros(frame.shape, dtype=np.bool_)
+    fill_shape(shape, frame, mask)
+    return mask, shapely.points(frame.to_points(np.stack(np.indices(frame.shape), axis=-1)))
+
+
+@given(boxes(), st.sampled_from([1.0, 0.5]))
+@settings(max_examples=100, deadline=None)
+def test_upright_sides_fill_the_cells_whose_centre_lies_inside_of_them(shape, resolution):
+    mask, points = _filled(shape, resolution)
+    assert (mask == shapely.contains(shape, points)).all()
+
+
+@given(HULLS, st.sampled_from([1.0, 0.5]))
+@settings(max_examples=100, deadline=None)
+def test_slanted_sides_fill_the_cells_whose_centre_lies_inside_but_for_rounding(shape, resolution):
+    mask, points = _filled(shape, resolution)
+    on_side = shapely.distance(points, shape.boundary) < 1e-9
+    assert ((mask == shapely.contains(shape, points)) | on_side).all()
+
+
+def test_what_is_marked_stays_marked():
+    mask = np.ones((4, 4), dtype=np.bool_)
+    fill_shape(shapely.box(0.5, 0.5, 2.5, 2.5), GridFrame(1.0, 0.0, 0.0, 4, 4), mask)
+    assert mask.all()

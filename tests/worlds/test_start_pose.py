@@ -1,0 +1,61 @@
+from dataclasses import replace
+
+import pytest
+import shapely
+from shapely.geometry import box
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.worlds.geometry import wall_area
+from closedrooms.worlds.library import bundled_names, load_world
+from closedrooms.worlds.plan import FloorPlan, Furniture, PlanRoom, Wall
+from closedrooms.worlds.start_pose import start_pose, start_room
+
+
+def test_the_given_start_wins(small: FloorPlan) -> None:
+    assert start_pose(small).as_tuple() == (3.0, 1.0, 0.0)
+    assert start_room(small) == "r0"
+
+
+def test_without_one_the_robot_starts_in_the_middle_of_the_corridor_along_it(small: FloorPlan) -> None:
+    plan = replace(small, start=None)
+    pose = start_pose(plan)
+    assert start_room(plan) == "r0"
+    assert pose.theta == pytest.approx(0.0)
+    assert wall_area(plan).distance(shapely.Point(pose.x, pose.y)) > 0.8
+
+
+def test_furniture_is_avoided(small: FloorPlan) -> None:
+    plan = replace(small, start=None, furniture=(Furniture("f0", box(0.2, 0.2, 11, 1.8)),))
+    pose = start_pose(plan)
+    assert not plan.furniture[0].polygon.covers(shapely.Point(pose.x, pose.y))
+
+
+def test_without_a_corridor_the_room_with_most_passages_is_taken(small: FloorPlan) -> None:
+    rooms = tuple(replace(room, label="room") for room in small.rooms)
+    assert start_room(replace(small, start=None, rooms=rooms)) == "r0"
+
+
+def test_a_start_outside_is_a_clear_error(small: FloorPlan) -> None:
+    with pytest.raises(InvalidInputError, match="lies in no room"):
+        start_room(replace(small, start=(50.0, 1.0, 0.0)))
+
+
+@pytest.mark.parametrize("name", bundled_names())
+def test_bundled_worlds_start_well_clear_of_walls(name: str) -> None:
+    plan = load_world(name)
+    pose = start_pose(plan)
+    assert wall_area(plan).distance(shapely.Point(pose.x, pose.y)) > 0.6
+
+
+def test_a_part_behind_a_gap_too_narrow_for_a_robot_is_not_started_in(small: FloorPlan) -> None:
+    hall = PlanRoom("r0", "hall", box(0, 0, 12, 5))
+    wall = Wall("w9", ((7.0, 0.0), (7.0, 4.6)), 0.2)
+    plan = replace(small, rooms=(hall,), walls=(*small.walls[:4], wall), doors=(), openings=(), start=None)
+    pose = start_pose(plan)
+    assert pose.x < 7.0
+    wide = replace(
+        plan,
+        rooms=(replace(hall, polygon=box(0, 0, 12, 5)),),
+        walls=(*small.walls[:4], Wall("w9", ((7.0, 0.0), (7.0, 3.0)), 0.2)),
+    )
+    assert start_room(wide) == "r0"

@@ -1,0 +1,1 @@
+"""Pictures and plots; the recording for the rerun viewer is in rerun/."""

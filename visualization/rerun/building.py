@@ -1,0 +1,107 @@
+"""The simulated building in a recording: walls, floors, and doors that move."""
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+import rerun as rr
+import shapely
+from shapely.geometry import MultiPolygon, Polygon
+
+from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.pose import Pose2
+from closedrooms.sim.building import DOOR_HEIGHT, FURNITURE_HEIGHT
+from closedrooms.sim.config import SimConfig
+from closedrooms.sim.door_leaves import Leaf, door_leaves
+from closedrooms.visualization import colours
+from closedrooms.visualization.rerun import drawables
+from closedrooms.visualization.rerun.stream import RecordingStream
+from closedrooms.worlds.extrusion import WALL_HEIGHT, extrude
+from closedrooms.worlds.geometry import areal, wall_area
+from closedrooms.worlds.plan import FloorPlan
+
+Area = Polygon | MultiPolygon
+
+
+class RecordedBuilding:
+    """Draws a plan once and its doors whenever they move."""
+
+    def __init__(self, stream: RecordingStream, plan: FloorPlan, map_T_world: Pose2, closed: Collection[str]) -> None:
+        self._stream = stream
+        self._map_T_world = map_T_world
+        walls = wall_area(plan)
+        furniture = areal(shapely.union_all([thing.polygon for thing in plan.furniture]))
+        solids, swing = areal(shapely.union_all([walls, furniture])), SimConfig().swing
+        self._leaves = {door.id: door_leaves(plan, door, solids, swing) for door in plan.doors}
+        self._states = {door.id: 0.0 if door.id in closed else 1.0 for door in plan.doors}
+        self._closed = sorted(closed)
+        self._draw_shell(plan, walls, furniture)
+        self._draw_open_doors([door.id for door in plan.doors if door.id not in closed])
+        for door in self._closed:
+            self._draw_door(door)
+            stream.log(
+                f"door_states/{door}",
+                rr.StateConfiguration(
+                    values=["unseen", "seen", "open"],
+                    labels=["closed, not seen yet", "closed, seen", "open"],
+                    colors=[[170, 170, 175], [*colours.DOOR_CLOSED], [*colours.TRUTH]],
+                ),
+                static=True,
+            )
+            stream.log(f"door_states/{door}", rr.StateChange(state="unseen"))
+
+    def seen(self, doors: Collection[str]) -> None:
+        """The robot has seen these closed doors by now."""
+        for door in self._closed:
+            if door in doors and self._states[door] < 0.5:
+                self._stream.log(f"door_states/{door}", rr.StateChange(state="seen"))
+
+    def move(self, states: Mapping[str, float]) -> None:
+        """Draw the doors that have moved: 0 is closed, 1 is open."""
+        for door in self._closed:
+            if door in states and abs(states[door] - self._states[door]) > 1e-6:
+                opens = self._states[door] <= 0.5 < states[door]
+                self._states[door] = states[door]
+                self._draw_door(door)
+                if opens:
+                    self._stream.log(f"door_states/{door}", rr.StateChange(state="open"))
+
+    def _draw_shell(self, plan: FloorPlan, walls: Area, furniture: Area) -> None:
+        self._draw_solid("building/walls", walls, WALL_HEIGHT, colours.WALL)
+        floors = [Polygon(self._map_T_world.transform(np.asarray(room.polygon.exterior.coords))) for room in plan.rooms]
+        self._stream.log("building/floor", drawables.fill(floors, colours.FLOOR, alpha=255, z=-0.02), static=True)
+        if not furniture.is_empty:
+            self._draw_solid("building/furniture", furniture, FURNITURE_HEIGHT, colours.FURNITURE)
+
+    def _draw_solid(self, path: str, area: Area, height: float, colour: colours.Colour) -> None:
+        vertices, triangles = extrude(area, height=height)
+        self._stream.log(path, drawables.solid(self._in_map(vertices), triangles, colour), static=True)
+
+    def _draw_open_doors(self, doors: Collection[str]) -> None:
+        """Doors that stay open are one mesh: a large floor has hundreds."""
+        parts = [_mesh(leaf, 1.0) for door in doors for leaf in self._leaves[door]]
+        if parts:
+            counts = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
+            vertices = np.concatenate([vertices for vertices, _ in parts])
+            triangles = np.concatenate([part + count for (_, part), count in zip(parts, counts, strict=False)])
+            self._stream.log(
+                "building/open_doors",
+                drawables.solid(self._in_map(vertices), triangles, colours.DOOR_OPEN),
+                static=True,
+            )
+
+    def _draw_door(self, door: str) -> None:
+        opening = self._states[door]
+        colour = colours.DOOR_CLOSED if opening < 0.5 else colours.DOOR_OPEN
+        for number, leaf in enumerate(self._leaves[door]):
+            vertices, triangles = _mesh(leaf, opening)
+            self._stream.log(
+                f"building/doors/{door}/{number}", drawables.solid(self._in_map(vertices), triangles, colour)
+            )
+
+    def _in_map(self, vertices: FloatArray) -> FloatArray:
+        return np.column_stack((self._map_T_world.transform(vertices[:, :2]), vertices[:, 2]))
+
+
+def _mesh(leaf: Leaf, opening: float) -> tuple[FloatArray, IntArray]:
+    """Vertices and triangles of a leaf when its door is open by ``opening``, 0 to 1."""
+    return extrude(Polygon(leaf.at(opening * leaf.travel)), height=DOOR_HEIGHT)

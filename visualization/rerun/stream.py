@@ -1,0 +1,117 @@
+"""One rerun file, its two timelines and its log."""
+
+import contextlib
+import logging
+from collections.abc import Iterator, Sequence
+from enum import IntEnum
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import rerun as rr
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.errors import OutputError
+from closedrooms.visualization.rerun.blueprint import Layout, arrange
+
+APPLICATION = "closedrooms"
+# Chunks are cut by size alone: a cut by wall-clock time would differ from one run to the next.
+CHUNK_BYTES = 1_000_000
+NEVER_SECONDS = 1e6
+
+
+class Stage(IntEnum):
+    """Steps of the timeline ``stage``; level k of the expansion is ``EXPANSION + k``, but before ``ROOMS``."""
+
+    BUILDING = 0
+    MAPPING = 1
+    SEGMENTS = 2
+    LINES = 3
+    FACES = 4
+    INITIAL = 5
+    EXPANSION = 6
+    ROOMS = 30
+    COVERAGE = 31
+    DRIVING = 32
+
+
+class RecordingStream:
+    """A rerun file that is being written; a context manager, whole only after it ends.
+
+    Two timelines: ``sim_time``, a duration [s] by the simulation's (or the log's) clock, and ``stage``, a sequence
+    over the steps of :class:`Stage`. Everything of a run carries both; a prediction without a run only ``stage``.
+    No wall clock is recorded, so that equal runs give equal recordings.
+    """
+
+    def __init__(self, path: Path, name: str) -> None:
+        self._path, self._name = path, name
+        self._stage: int = Stage.BUILDING
+        self._rec = rr.RecordingStream(
+            APPLICATION,
+            recording_id=f"{APPLICATION}-{name}",
+            send_properties=False,
+            batcher_config=rr.ChunkBatcherConfig(flush_tick=NEVER_SECONDS, flush_num_bytes=CHUNK_BYTES),
+        )
+        self._handler = rr.LoggingHandler("log")
+        self._log_level = logging.NOTSET
+
+    def __enter__(self) -> Self:
+        with self._clear_errors():
+            self._rec.save(self._path)
+        self._rec.set_log_time_enabled(False)
+        self._rec.send_recording_name(self._name)
+        # The logging handler writes to the recording of its thread.
+        self._previous = rr.set_thread_local_data_recording(self._rec)
+        logger = logging.getLogger(APPLICATION)
+        self._log_level = logger.level
+        logger.setLevel(min(logger.getEffectiveLevel(), logging.INFO))
+        logger.addHandler(self._handler)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        logger = logging.getLogger(APPLICATION)
+        logger.removeHandler(self._handler)
+        logger.setLevel(self._log_level)
+        rr.set_thread_local_data_recording(self._previous)
+        try:
+            with self._clear_errors():
+                self._rec.flush()
+        finally:
+            self._rec.disconnect()
+
+    @contextlib.contextmanager
+    def _clear_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except RuntimeError as failure:
+            raise OutputError(f"cannot write the recording ({failure}): {self._path}") from failure
+
+    def arrange(self, layout: Layout) -> None:
+        """Say how the recording opens; once, as soon as it is known where the maps lie."""
+        self._rec.send_blueprint(arrange(layout))
+
+    def at(self, stamp: float | None = None, stage: int | None = None) -> None:
+        """What follows belongs to ``stamp`` [s] and ``stage``; either stays as it was where not given."""
+        if stamp is not None:
+            self._rec.set_time("sim_time", duration=stamp)
+        if stage is not None:
+            self._stage = stage
+        self._rec.set_time("stage", sequence=int(self._stage))
+
+    def log(self, path: str, *archetypes: Any, static: bool = False) -> None:
+        """Log at the current time, or for all times."""
+        self._rec.log(path, *archetypes, static=static)
+
+    def columns(self, path: str, stamps: FloatArray, columns: Any, stages: Sequence[int]) -> None:
+        """Send one value a stamp [s] and stage at once."""
+        times = [
+            rr.TimeColumn("sim_time", duration=stamps),
+            rr.TimeColumn("stage", sequence=[int(stage) for stage in stages]),
+        ]
+        self._rec.send_columns(path, times, columns)
+
+    def property(self, name: str, values: dict[str, str]) -> None:
+        """A property of the whole recording, shown by the viewer beside its name."""
+        self._rec.send_property(name, rr.AnyValues(drop_untyped_nones=True, **values))

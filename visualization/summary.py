@@ -1,0 +1,235 @@
+"""``summary.png``: one look at a run, a prediction or a tour."""
+
+import io
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.files import write_bytes
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.room import Room
+from closedrooms.pipeline.scores import room_iou
+from closedrooms.visualization import colours
+
+if TYPE_CHECKING:
+    from closedrooms.coverage.tour import CoverageTour
+    from closedrooms.predictor.prediction import Prediction
+    from closedrooms.visualization.canvas import Bounds, Canvas, Pixels
+
+# Size of one panel, of the strip with its title, and of the gap between panels [pixels].
+PANEL, TITLE, GAP = 900, 40, 14
+# A room lower than this has its name and figure on one line [pixels].
+TWO_LINES = 44
+# Free space around what is known [m].
+MARGIN = 1.0
+
+Panel = tuple[str, "Pixels"]
+
+
+def draw_summary(
+    path: Path,
+    observed: OccupancyGrid,
+    prediction: "Prediction",
+    doors: Sequence[ClosedDoor],
+    *,
+    truth: OccupancyGrid | None = None,
+    truth_rooms: Sequence[Room] = (),
+    tours: Mapping[str, "CoverageTour"] | None = None,
+    trajectory: FloatArray | None = None,
+) -> None:
+    """Write one picture: the map, the prediction, and where they are known the truth and the tour.
+
+    Args:
+        path: The PNG.
+        observed: M, with the closed doors unseen behind.
+        prediction: Rooms and M_pred.
+        doors: Closed doors in the map.
+        truth: M_GT.
+        truth_rooms: True rooms behind the closed doors.
+        tours: Coverage tours; that for ``predicted`` is drawn.
+        trajectory: Where the robot went, shape (n, 2 or 3) [m].
+
+    Raises:
+        OutputError: The folder cannot be written.
+    """
+    grids = [observed, prediction.grid, *([] if truth is None else [truth])]
+    bounds = _bounds(grids)
+    palette = colours.room_colours([d.id for d in doors] + [d for room in truth_rooms for d in room.doors])
+    panels = [
+        _map_panel(bounds, observed, doors, trajectory),
+        _prediction_panel(bounds, prediction, doors, truth_rooms, palette),
+    ]
+    if truth is not None:
+        panels.append(_truth_panel(bounds, truth, truth_rooms, prediction, palette))
+    if tours and "predicted" in tours:
+        panels.append(_tour_panel(bounds, prediction.grid, tours["predicted"], "Coverage tour on the predicted map"))
+    _write(path, panels)
+
+
+def draw_cover(path: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor], tour: "CoverageTour") -> None:
+    """Write one picture of a map with its topological graph and the tour over it.
+
+    Args:
+        path: The PNG.
+        grid: The map.
+        doors: Closed doors in the map.
+        tour: Graph and tour.
+
+    Raises:
+        OutputError: The folder cannot be written.
+    """
+    _write(path, [_tour_panel(_bounds([grid]), grid, tour, "Coverage tour", doors=doors)])
+
+
+def draw_map(path: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor], trajectory: FloatArray) -> None:
+    """Write one picture of a map with the way that the robot took.
+
+    Args:
+        path: The PNG.
+        grid: The map.
+        doors: Closed doors in the map.
+        trajectory: ``(x, y, theta)``, shape (n, 3), map frame.
+
+    Raises:
+        OutputError: The folder cannot be written.
+    """
+    _write(path, [_map_panel(_bounds([grid]), grid, doors, trajectory)])
+
+
+def _map_panel(
+    bounds: "Bounds", grid: OccupancyGrid, doors: Sequence[ClosedDoor], trajectory: FloatArray | None
+) -> Panel:
+    canvas = _canvas(bounds)
+    canvas.grid(grid)
+    if trajectory is not None and len(trajectory):
+        way = np.asarray(trajectory)[:, :2]
+        canvas.line(way, colours.ESTIMATE, width=2)
+        canvas.dots(way[:1], colours.ESTIMATE, radius=6)
+    _draw_doors(canvas, doors, named=True)
+    plural = "" if len(doors) == 1 else "s"
+    return f"Map with {len(doors)} closed door{plural}", canvas.finished()
+
+
+def _prediction_panel(
+    bounds: "Bounds",
+    prediction: "Prediction",
+    doors: Sequence[ClosedDoor],
+    truth_rooms: Sequence[Room],
+    palette: Mapping[str, colours.Colour],
+) -> Panel:
+    canvas = _canvas(bounds)
+    canvas.grid(prediction.grid)
+    seen = {door.id for door in doors}
+    figures = {door: iou for door, iou in room_iou(prediction.rooms, truth_rooms).items() if door in seen}
+    _draw_rooms(canvas, prediction.rooms, palette, figures)
+    _draw_doors(canvas, doors)
+    title = f"Predicted: {len(prediction.rooms)} of {len(doors)} closed doors"
+    if figures:
+        title += f", mean IoU {np.mean(list(figures.values())):.2f}"
+    return title, canvas.finished()
+
+
+def _truth_panel(
+    bounds: "Bounds",
+    truth: OccupancyGrid,
+    rooms: Sequence[Room],
+    prediction: "Prediction",
+    palette: Mapping[str, colours.Colour],
+) -> Panel:
+    canvas = _canvas(bounds)
+    canvas.grid(truth)
+    _draw_rooms(canvas, rooms, palette, {})
+    for room in prediction.rooms:
+        canvas.outline(room.polygon, colours.INK, width=2)
+    return "Truth (dark outline: predicted)", canvas.finished()
+
+
+def _tour_panel(
+    bounds: "Bounds", grid: OccupancyGrid, tour: "CoverageTour", title: str, *, doors: Sequence[ClosedDoor] = ()
+) -> Panel:
+    canvas = _canvas(bounds)
+    canvas.grid(grid)
+    graph, path = tour.graph, np.asarray(tour.path, dtype=np.float64).reshape(-1, 2)
+    for edge in np.asarray(graph.edges).reshape(-1, 2):
+        canvas.line(np.asarray(graph.vertices)[edge], (175, 175, 185), width=1)
+    canvas.course(path, width=2)
+    canvas.dots(graph.vertices, colours.INK, radius=2.5)
+    canvas.dots(path[:1], colours.TOURS["truth"], radius=7)
+    _draw_doors(canvas, doors, named=True)
+    return f"{title}: {tour.length:.0f} m (blue to orange, from the green dot)", canvas.finished()
+
+
+def _draw_doors(canvas: "Canvas", doors: Sequence[ClosedDoor], *, named: bool = False) -> None:
+    for door in doors:
+        if door.segment is not None:
+            canvas.line(np.asarray(door.segment), colours.DOOR_CLOSED, width=4)
+        canvas.dots(np.array([door.midpoint]), colours.DOOR_CLOSED, radius=4)
+        if named:
+            canvas.text((door.midpoint[0], door.midpoint[1] + 14 / canvas.scale), door.id, colour=colours.DOOR_CLOSED)
+
+
+def _draw_rooms(
+    canvas: "Canvas", rooms: Sequence[Room], palette: Mapping[str, colours.Colour], figures: Mapping[str, float]
+) -> None:
+    for room in rooms:
+        colour = palette.get(next(iter(room.doors), ""), colours.INK)
+        canvas.fill(room.polygon, colour, opacity=0.4)
+        canvas.outline(room.polygon, colour)
+        label = "+".join(room.doors)
+        known = [figures[door] for door in room.doors if door in figures]
+        if known:
+            _, low, _, high = room.polygon.bounds
+            label += ("\n" if (high - low) * canvas.scale > TWO_LINES else "  ") + f"{max(known):.2f}"
+        place = shapely.get_coordinates(room.polygon.representative_point())[0]
+        canvas.text(place, label)
+
+
+def _bounds(grids: Sequence[OccupancyGrid]) -> "Bounds":
+    """What is known in any of the grids, with a margin [m]."""
+    boxes = []
+    for grid in grids:
+        window = grid.known_bounds()
+        if window is not None:
+            boxes.append(grid.frame.cropped(*window).bounds)
+    if not boxes:
+        return grids[0].frame.bounds
+    x_min, y_min = np.min(boxes, axis=0)[:2] - MARGIN
+    x_max, y_max = np.max(boxes, axis=0)[2:] + MARGIN
+    return (float(x_min), float(y_min), float(x_max), float(y_max))
+
+
+def _canvas(bounds: "Bounds") -> "Canvas":
+    from closedrooms.visualization.canvas import Canvas
+
+    x_min, y_min, x_max, y_max = bounds
+    return Canvas(bounds, PANEL / max(x_max - x_min, y_max - y_min))
+
+
+def _write(path: Path, panels: Sequence[Panel]) -> None:
+    """Panels in the grid that comes nearest to the shape of a screen, each under its title, as PNG."""
+    from PIL import Image, ImageDraw
+
+    from closedrooms.visualization.canvas import font
+
+    height, width = panels[0][1].shape[:2]
+    cols = min(
+        range(1, len(panels) + 1),
+        key=lambda n: abs(math.log(n * width / (math.ceil(len(panels) / n) * (height + TITLE)) / 1.4)),
+    )
+    rows = math.ceil(len(panels) / cols)
+    step_x, step_y = width + GAP, height + TITLE + GAP
+    image = Image.new("RGB", (cols * step_x + GAP, rows * step_y + GAP), "white")
+    draw = ImageDraw.Draw(image)
+    for number, (title, pixels) in enumerate(panels):
+        x, y = GAP + number % cols * step_x, GAP + number // cols * step_y
+        draw.text((x + 2, y + TITLE / 2), title, fill=colours.INK, font=font(22), anchor="lm")
+        image.paste(Image.fromarray(pixels), (x, y + TITLE))
+    data = io.BytesIO()
+    image.save(data, format="PNG", compress_level=6)
+    write_bytes(path, data.getvalue())

@@ -1,0 +1,49 @@
+"""How doors hang: into which room they swing, and on which side."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom
+from closedrooms.worlds.start_pose import CIRCULATION
+
+
+def is_circulation(label: str) -> bool:
+    """Whether people walk through rooms of this label rather than into them."""
+    return any(word in label.lower() for word in CIRCULATION)
+
+
+def hung(doors: Sequence[PlanDoor], openings: Sequence[Opening], rooms: Sequence[PlanRoom]) -> tuple[PlanDoor, ...]:
+    """The doors swung into the room that they close.
+
+    That is the room with fewer passages; between equals the one that is no circulation, then the smaller one.
+    """
+    sides = [p.rooms for p in doors] + [p.rooms for p in openings]
+    passages = Counter(room for pair in sides for room in pair if room is not None)
+    by_id = {room.id: room for room in rooms}
+
+    def closes(room: str) -> tuple[bool, int, bool, float, str]:
+        label, area = by_id[room].label, by_id[room].polygon.area
+        return (passages[room] > 1, passages[room], is_circulation(label), area, room)
+
+    result = []
+    for door in doors:
+        inside = [room for room in door.rooms if room is not None]
+        result.append(replace(door, opens_into=min(inside, key=closes)))
+    return tuple(result)
+
+
+def without_entrances(plan: FloorPlan) -> FloorPlan:
+    """The plan with its doors and openings to the outside walled up, each named in ``meta["sealed"]``.
+
+    A robot that maps a floor must not leave it.
+    """
+    entrances = [p.id for p in plan.passages if None in p.rooms]
+    if not entrances:
+        return plan
+    return replace(
+        plan,
+        doors=tuple(door for door in plan.doors if None not in door.rooms),
+        openings=tuple(opening for opening in plan.openings if None not in opening.rooms),
+        meta={**plan.meta, "sealed": entrances},
+    )

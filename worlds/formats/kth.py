@@ -1,0 +1,145 @@
+"""Floor plans of the KTH campus as XML, after Aydemir, Jensfelt and Folkesson."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import shapely
+from shapely.geometry import Polygon
+
+from closedrooms.core.door import Point, Segment
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.worlds.formats.portals import Portal, paired, plan_of_portals
+from closedrooms.worlds.formats.room_outlines import clean_outlines, repaired
+from closedrooms.worlds.formats.xml_text import attribute, child, descendants, parse_xml, text
+from closedrooms.worlds.plan import FloorPlan, PlanRoom
+from closedrooms.worlds.validation import validate
+
+WHAT = "a floor plan (KTH XML)"
+# Both rooms draw a door on their own side of the wall, about 0.16 m apart; up to this distance it is one door [m].
+SAME_DOOR = 0.8
+# Widths of a single door and of the widest passage that is still a door [m].
+NARROWEST, WIDEST = 0.6, 2.4
+MAX_SPACES = 5000
+
+
+def read_kth(path: str | Path) -> FloorPlan:
+    """Read one floor; what was repaired stands in ``meta["repairs"]``.
+
+    Raises:
+        InvalidInputError: Missing file, broken XML, no scale, no room with a contour.
+    """
+    path = Path(path)
+    root = parse_xml(path, what=WHAT)
+    metres = _scale(root, path)
+    spaces = descendants(root, "space")
+    if len(spaces) > MAX_SPACES:
+        raise InvalidInputError(f"{len(spaces)} spaces", expected=f"at most {MAX_SPACES}", where=path)
+    repairs: list[str] = []
+    outlines = [_outline(space, number, metres, repairs) for number, space in enumerate(spaces)]
+    polygons = clean_outlines(outlines, repairs, what="space")
+    kept = [(space, polygon) for space, polygon in zip(spaces, polygons, strict=True) if polygon is not None]
+    if not kept:
+        raise InvalidInputError("a plan without rooms", expected="spaces with a contour", where=path)
+    rooms = tuple(PlanRoom(f"r{i:02d}", _label(space), polygon) for i, (space, polygon) in enumerate(kept))
+    portals = _portals([space for space, _ in kept], rooms, metres, repairs)
+    plan = plan_of_portals(rooms, portals, repairs)
+    plan = replace(plan, name=path.stem, meta={"source": path.name, "format": "kth", "repairs": repairs})
+    validate(plan, str(path))
+    return plan
+
+
+def _field(element: Any, name: str) -> str:
+    """An attribute or, without it, the text of a child."""
+    return ((attribute(element, name) if element is not None else None) or text(child(element, name))).strip()
+
+
+def _scale(root: Any, path: Path) -> float:
+    """Metres per pixel."""
+    scale = next(iter(descendants(root, "scale")), None)
+    pixels, real = _field(scale, "PixelDistance"), _field(scale, "RealDistance")
+    try:
+        value = float(real) / float(pixels)
+    except (ValueError, ZeroDivisionError):
+        value = math.nan
+    if not (math.isfinite(value) and value > 0.0):
+        raise InvalidInputError(
+            f"scale of {real!r} metres for {pixels!r} pixels", expected="two numbers above 0", where=path
+        )
+    return value
+
+
+def _label(space: Any) -> str:
+    return (_field(space, "type") or "room").lower()
+
+
+def _lines(space: Any, metres: float) -> list[tuple[Any, Segment]]:
+    """The line segments of a contour that have four coordinates, in metres, y up."""
+    found = []
+    for line in descendants(child(space, "contour"), "linesegment"):
+        try:
+            x1, y1, x2, y2 = (float(_field(line, name)) * metres for name in ("x1", "y1", "x2", "y2"))
+        except ValueError:
+            continue
+        if all(map(math.isfinite, (x1, y1, x2, y2))):
+            found.append((line, ((x1, -y1), (x2, -y2))))
+    return found
+
+
+def _outline(space: Any, number: int, metres: float, repairs: list[str]) -> Polygon | None:
+    name = f"space {number} ({_field(space, 'name') or _label(space)})"
+    segments = [segment for _, segment in _lines(space, metres)]
+    points: list[Point] = []
+    for a, b in segments:
+        points += [p for p in (a, b) if not points or math.dist(p, points[-1]) > 1e-6]
+    polygon = Polygon(points) if len(set(points)) >= 3 else None
+    if polygon is None:
+        repairs.append(f"{name}: left out, its contour has fewer than 3 points")
+        return None
+    if not polygon.is_valid:
+        # Segments out of order still close when they are put together by their ends.
+        faces = shapely.get_parts(shapely.polygonize([shapely.LineString(s) for s in segments if s[0] != s[1]]))
+        closed = [face for face in faces if isinstance(face, Polygon)]
+        if len(closed) == 1:
+            repairs.append(f"{name}: contour put in order")
+            polygon = closed[0]
+    return repaired(polygon, name, repairs)
+
+
+def _portals(spaces: list[Any], rooms: tuple[PlanRoom, ...], metres: float, repairs: list[str]) -> list[Portal]:
+    """Doors between rooms, each once although it stands on both contours as a rule."""
+    index: dict[str, list[int]] = {}
+    for number, space in enumerate(spaces):
+        index.setdefault(_field(space, "name").lower(), []).append(number)
+    found: list[tuple[int, Portal]] = []
+    outside = 0
+    for number, space in enumerate(spaces):
+        for line, (a, b) in _lines(space, metres):
+            if _field(line, "type").lower() != "portal":
+                continue
+            middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
+            other = _target(_field(line, "target"), number, middle, index, rooms)
+            if other is None:
+                outside += 1
+                continue
+            width = min(max(math.dist(a, b), NARROWEST), WIDEST)
+            pair = (min(number, other), max(number, other))
+            found.append((number, Portal(middle, pair, True, width)))
+    if outside:
+        repairs.append(f"{outside} portals left out: they lead outside or to a room that is not there")
+    portals = paired(found, within=SAME_DOOR)
+    single = 2 * len(portals) - len(found)
+    if single:
+        repairs.append(f"{single} portals stand on one contour only")
+    return portals
+
+
+def _target(
+    name: str, room: int, middle: Point, index: dict[str, list[int]], rooms: tuple[PlanRoom, ...]
+) -> int | None:
+    """The room that a portal leads to: by its name, the nearest of several; never the room itself."""
+    point = shapely.Point(middle)
+    named = [number for number in index.get(name.lower(), []) if number != room]
+    near = sorted((rooms[number].polygon.distance(point), number) for number in named)
+    return near[0][1] if near and near[0][0] < 2.0 else None

@@ -1,0 +1,208 @@
+"""Floor plans as JSON, the project's own format."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from shapely.geometry import Polygon
+
+from closedrooms.core.door import Point, Segment
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files import read_json, write_bytes
+from closedrooms.worlds.plan import FloorPlan, Furniture, Opening, PlanDoor, PlanRoom, Wall
+from closedrooms.worlds.validation import validate
+
+FORMAT, VERSION = "closedrooms-plan", 1
+WHAT = "a floor plan (JSON)"
+# A plan with more elements than this is refused before shapes are built.
+MAX_ELEMENTS = 100_000
+
+
+def write_plan(path: str | Path, plan: FloorPlan) -> None:
+    """Write a plan, one element a line, coordinates rounded to 0.1 mm.
+
+    Raises:
+        OutputError: The folder cannot be written.
+    """
+    write_bytes(Path(path), plan_text(plan).encode())
+
+
+def plan_text(plan: FloorPlan) -> str:
+    """The JSON text of a plan; the same plan gives the same bytes."""
+    head: dict[str, Any] = {
+        "format": FORMAT,
+        "version": VERSION,
+        "name": plan.name,
+        "units": "m",
+        "start": None if plan.start is None else [_rounded(v) for v in plan.start],
+        "meta": plan.meta,
+    }
+    tables: dict[str, list[dict[str, Any]]] = {
+        "rooms": [{"id": r.id, "label": r.label, **_polygon_fields(r.polygon)} for r in plan.rooms],
+        "walls": [{"id": w.id, "segment": _segment(w.segment), "thickness": _rounded(w.thickness)} for w in plan.walls],
+        "doors": [
+            {
+                "id": d.id,
+                "segment": _segment(d.segment),
+                "rooms": list(d.rooms),
+                "kind": d.kind,
+                "hinge": d.hinge,
+                "opens_into": d.opens_into,
+            }
+            for d in plan.doors
+        ],
+        "openings": [{"id": o.id, "segment": _segment(o.segment), "rooms": list(o.rooms)} for o in plan.openings],
+        "furniture": [{"id": f.id, **_polygon_fields(f.polygon)} for f in plan.furniture],
+    }
+    lines = [f" {json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in head.items()]
+    for key, rows in tables.items():
+        body = ",\n".join("  " + json.dumps(row, allow_nan=False) for row in rows)
+        lines.append(f" {json.dumps(key)}: [\n{body}\n ]" if rows else f" {json.dumps(key)}: []")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _rounded(value: float) -> float:
+    return round(float(value), 4) + 0.0
+
+
+def _segment(segment: Segment) -> list[list[float]]:
+    return [[_rounded(x), _rounded(y)] for x, y in segment]
+
+
+def _polygon_fields(polygon: Polygon) -> dict[str, Any]:
+    rings = [[[_rounded(x), _rounded(y)] for x, y, *_ in ring.coords[:-1]] for ring in _rings(polygon)]
+    return {"polygon": rings[0], "holes": rings[1:]} if len(rings) > 1 else {"polygon": rings[0]}
+
+
+def _rings(polygon: Polygon) -> list[Any]:
+    return [polygon.exterior, *polygon.interiors]
+
+
+def read_plan(path: str | Path) -> FloorPlan:
+    """Read and validate an untrusted plan.
+
+    Raises:
+        InvalidInputError: A missing or broken file, another format or version, an element that is not as it should
+            be (named by its kind, number and id).
+    """
+    return plan_from(read_json(Path(path), what=WHAT), Path(path))
+
+
+def plan_from(data: Any, path: Path) -> FloorPlan:
+    """The validated plan that parsed JSON ``data`` of the file ``path`` holds; see :func:`read_plan`."""
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise InvalidInputError("no closedrooms plan", expected=f"format {FORMAT!r}", where=path)
+    if data.get("version") != VERSION:
+        raise InvalidInputError(
+            f"a plan of version {data.get('version')!r}", expected=f"version {VERSION}, the latest known", where=path
+        )
+    if data.get("units", "m") != "m":
+        raise InvalidInputError(f"a plan in {data['units']!r}", expected="metres ('m')", where=path)
+    reader = _Reader(path)
+    plan = FloorPlan(
+        name=str(data.get("name") or path.stem),
+        rooms=tuple(
+            PlanRoom(reader.name(r), str(r.get("label", "room")), reader.polygon(r)) for r in reader.rows(data, "rooms")
+        ),
+        walls=tuple(
+            Wall(reader.name(w), reader.segment(w), reader.number(w, "thickness")) for w in reader.rows(data, "walls")
+        ),
+        doors=tuple(reader.door(d) for d in reader.rows(data, "doors")),
+        openings=tuple(
+            Opening(reader.name(o), reader.segment(o), reader.sides(o)) for o in reader.rows(data, "openings")
+        ),
+        start=reader.start(data.get("start")),
+        furniture=tuple(Furniture(reader.name(f), reader.polygon(f)) for f in reader.rows(data, "furniture")),
+        meta=data["meta"] if isinstance(data.get("meta"), dict) else {},
+    )
+    validate(plan, str(path))
+    return plan
+
+
+class _Reader:
+    """Reads fields and names the element that is wrong."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._element = ""
+
+    def rows(self, data: dict[str, Any], key: str) -> list[dict[str, Any]]:
+        value = data.get(key, [])
+        self._element = key
+        if not isinstance(value, list) or len(value) > MAX_ELEMENTS:
+            raise self._error("no list of a usable size", f"a list of at most {MAX_ELEMENTS}")
+        for number, row in enumerate(value):
+            self._element = f"{key}[{number}]"
+            if not isinstance(row, dict):
+                raise self._error("no object", "an object with an id")
+        self._element = key
+        return value
+
+    def name(self, row: dict[str, Any]) -> str:
+        value = row.get("id")
+        if not isinstance(value, str) or not value:
+            raise self._error(f"an element with the id {value!r}", "a text")
+        self._element = f"{self._element.split(' ')[0]} {value}"
+        return value
+
+    def door(self, row: dict[str, Any]) -> PlanDoor:
+        name = self.name(row)
+        kind, hinge, into = row.get("kind", "hinged"), row.get("hinge", 0), row.get("opens_into")
+        if kind not in {"hinged", "double", "sliding"}:
+            raise self._error(f"kind {kind!r}", "hinged, double or sliding")
+        if hinge not in (0, 1) or isinstance(hinge, bool):
+            raise self._error(f"hinge {hinge!r}", "0 or 1, an end of the segment")
+        if into is not None and not isinstance(into, str):
+            raise self._error(f"opens_into {into!r}", "a room id or null")
+        return PlanDoor(name, self.segment(row), self.sides(row), kind, hinge, into)
+
+    def sides(self, row: dict[str, Any]) -> tuple[str | None, str | None]:
+        value = row.get("rooms")
+        if not isinstance(value, list) or len(value) != 2 or not all(v is None or isinstance(v, str) for v in value):
+            raise self._error(f"rooms {value!r}", "two room ids (null is outside)")
+        return (value[0], value[1])
+
+    def number(self, row: dict[str, Any], key: str) -> float:
+        value = row.get(key)
+        if not _is_number(value):
+            raise self._error(f"{key} {value!r}", "a number in metres")
+        return float(value)  # type: ignore[arg-type]
+
+    def start(self, value: Any) -> tuple[float, float, float] | None:
+        self._element = "start"
+        if value is None:
+            return None
+        if not isinstance(value, list) or len(value) != 3 or not all(map(_is_number, value)):
+            raise self._error(f"{value!r}", "[x, y, heading] in metres and radians")
+        return (float(value[0]), float(value[1]), float(value[2]))
+
+    def segment(self, row: dict[str, Any]) -> Segment:
+        points = self._points(row.get("segment"), "segment")
+        if len(points) != 2:
+            raise self._error(f"a segment of {len(points)} points", "2 points")
+        return (points[0], points[1])
+
+    def polygon(self, row: dict[str, Any]) -> Polygon:
+        rings = [row.get("polygon"), *(row.get("holes") or [])]
+        points = [self._points(ring, "polygon") for ring in rings]
+        if any(len(ring) < 3 for ring in points):
+            raise self._error("a polygon of fewer than 3 points", "at least 3 points")
+        return Polygon(points[0], points[1:])
+
+    def _points(self, value: Any, key: str) -> list[Point]:
+        if not isinstance(value, list) or len(value) > MAX_ELEMENTS:
+            raise self._error(f"no {key}", "a list of points [x, y]")
+        points = []
+        for point in value:
+            if not isinstance(point, list) or len(point) != 2 or not all(map(_is_number, point)):
+                raise self._error(f"{key} point {point!r}", "[x, y] in metres")
+            points.append((float(point[0]), float(point[1])))
+        return points
+
+    def _error(self, what: str, expected: str) -> InvalidInputError:
+        return InvalidInputError(f"{self._element}: {what}", expected=expected, where=self._path)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
