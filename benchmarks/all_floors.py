@@ -4,12 +4,12 @@
                                     [--workers 1] [--limit 1200] [--smallest-first] [--only-table]
 
 Every file below the folder that an importer knows is a floor; a file with several levels is one floor a level. A floor
-is two processes: ``closedrooms run`` with the preset ``best``, then ``closedrooms predict`` with the preset ``paper``
+is two processes: ``closedrooms run`` with the method ``best``, then ``closedrooms predict`` with the method ``paper``
 on the map that the run left. Each has a time limit; its wall time, CPU time and peak memory are noted beside its run
 directory. A floor whose ``run.json`` is there is not run again, so that the same command goes on where it was stopped.
 
 ``floors.csv`` and ``floors.md`` in the output folder hold a row a floor: extent, rooms, closed doors, area mapped,
-doors seen, ATE, mean IoU by door of both presets, tour errors, seconds, memory, and why a floor failed. Seconds of a
+doors seen, ATE, mean IoU by door of both methods, tour errors, seconds, memory, and why a floor failed. Seconds of a
 loaded machine mislead; CPU seconds stand beside them.
 """
 
@@ -132,7 +132,7 @@ def run_floor(floor: Floor, out: Path, options: argparse.Namespace) -> None:
         words = ["run", floor.path, *level, *close, "--no-record", "--out", str(folder)]
         note(out, floor.name, spend(words, options.limit))
     if (folder / "run.json").exists() and not (paper / "run.json").exists():
-        words = ["predict", str(folder / "map.yaml"), "--doors", str(folder / "doors.geojson"), "--preset", "paper"]
+        words = ["predict", str(folder / "map.yaml"), "--doors", str(folder / "doors.geojson"), "--method", "paper"]
         note(out, f"{floor.name}-paper", spend([*words, "--out", str(paper)], options.limit))
     print(" | ".join(row(floor, out)), flush=True)
 
@@ -176,7 +176,7 @@ def remark_of(status: str, doors: dict[str, Any], notes: list[str]) -> str:
 
 
 def paper_iou(floor: Floor, out: Path, seen: set[str]) -> float | None:
-    """Mean IoU by door of the preset ``paper`` on the map of the run."""
+    """Mean IoU by door of the method ``paper`` on the map of the run."""
     predicted = out / f"{floor.name}-paper" / "rooms.geojson"
     if not predicted.exists():
         return None

@@ -1,6 +1,6 @@
 """Run the main job on many worlds and print one table, in Markdown: area mapped, trajectory error, doors, IoU, seconds.
 
-    python benchmarks/all_worlds.py [WORLD ...] [--noise medium] [--seed 0] [--close 5] [--preset best] [--drive]
+    python benchmarks/all_worlds.py [WORLD ...] [--noise medium] [--seed 0] [--close 5] [--method best] [--drive]
 
 Without worlds it takes the 20 bundled ones. Nothing is recorded; one process, one world after the other.
 """
@@ -53,7 +53,7 @@ def main() -> None:
     parser.add_argument("--noise", default="medium", choices=("none", "low", "medium", "high"))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--close", type=int, default=5)
-    parser.add_argument("--preset", default="best", choices=("paper", "best"))
+    parser.add_argument("--method", default="best")
     parser.add_argument("--drive", action="store_true")
     options = parser.parse_args()
     print(f"| {' | '.join(HEAD)} |\n|{' --- |' * len(HEAD)}", flush=True)
@@ -64,7 +64,7 @@ def main() -> None:
                 noise=options.noise,
                 seed=options.seed,
                 close=options.close,
-                preset=options.preset,
+                method=options.method,
                 drive=options.drive,
                 record=False,
                 out=Path(folder) / "run",

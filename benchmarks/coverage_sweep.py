@@ -27,24 +27,23 @@ from closedrooms.experiments.dataset.open_survey import survey_open
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.pipeline.scores import mean, room_iou, rooms_seen
-from closedrooms.predictor.config import PredictorConfig
-from closedrooms.predictor.predict import predict
+from closedrooms.predictor.methods import predict
 from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.library import bundled_names, load_world
 from closedrooms.worlds.truth import rasterise, true_rooms, truth_bounds
 
-PRESETS = ("paper", "best")
+METHODS = ("paper", "best")
 SHARES = (1, 2, 3)
 FIELDS = (
     "world", "seed", "thirds", "closed", "seen", "rooms_seen", "tsp_closed", "tsp_gt",
-    *(f"{figure}_{preset}" for preset in PRESETS for figure in ("tsp", "iou", "predicted")),
+    *(f"{figure}_{method}" for method in METHODS for figure in ("tsp", "iou", "predicted")),
 )  # fmt: skip
 # What the paper reports over its own environments: mean and standard deviation [%].
 PAPER = {"closed": (21.37, 16.18), "baseline": (21.4, 23.38), "paper": (6.21, 9.06)}
-KINDS = ("closed", "baseline", *PRESETS)
+KINDS = ("closed", "baseline", *METHODS)
 NAMES = {
-    "closed": "closed", "baseline": "baseline", "paper": "predicted, preset paper", "best": "predicted, preset best",
+    "closed": "closed", "baseline": "baseline", "paper": "predicted by paper", "best": "predicted by best",
 }  # fmt: skip
 COLOURS = {"closed": "#0072b2", "baseline": "#e69f00", "paper": "#009e73", "best": "#cc79a7"}
 START = (0.0, 0.0)
@@ -77,24 +76,24 @@ def samples(world: str, seed: int, done: set[int], out: Path, noise: str) -> Ite
         stem = f"{plan.name}-{seed}-{thirds}"
         write_map(out / stem, erased.grid)
         write_doors(out / f"{stem}-doors.geojson", erased.doors)
-        for preset in PRESETS:
-            prediction = predict(erased.grid, erased.doors, PredictorConfig(preset=preset), trace=False)
-            row[f"tsp_{preset}"] = round(plan_coverage(prediction.grid, start=START).length, 3)
-            row[f"iou_{preset}"] = round(mean(room_iou(prediction.rooms, rooms)) or 0.0, 4)
-            row[f"predicted_{preset}"] = len(prediction.rooms)
-            write_map(out / f"{stem}-{preset}", prediction.grid)
+        for method in METHODS:
+            prediction = predict(erased.grid, erased.doors, method)
+            row[f"tsp_{method}"] = round(plan_coverage(prediction.grid, start=START).length, 3)
+            row[f"iou_{method}"] = round(mean(room_iou(prediction.rooms, rooms)) or 0.0, 4)
+            row[f"predicted_{method}"] = len(prediction.rooms)
+            write_map(out / f"{stem}-{method}", prediction.grid)
         yield {key: str(row[key]) for key in FIELDS}
 
 
 def errors(row: Row) -> dict[str, float]:
     """The errors of one row in percent, by kind of estimate."""
     found = {}
-    for preset in PRESETS:
+    for method in METHODS:
         figures = errors_of_lengths(
-            float(row["tsp_closed"]), float(row[f"tsp_{preset}"]), float(row["tsp_gt"]),
+            float(row["tsp_closed"]), float(row[f"tsp_{method}"]), float(row["tsp_gt"]),
             n_rooms=int(row["rooms_seen"]), n_doors=int(row["seen"]),
         )  # fmt: skip
-        found |= {"closed": figures.error_closed, "baseline": figures.error_baseline, preset: figures.error_pred}
+        found |= {"closed": figures.error_closed, "baseline": figures.error_baseline, method: figures.error_pred}
     return found
 
 
@@ -116,12 +115,12 @@ def report(rows: list[Row]) -> Iterator[str]:
             f"| {NAMES[kind]} | {paper} | {values.mean():.2f} ({values.std():.2f}) | {np.median(values):.1f} | "
             f"{' | '.join(cells)} |"
         )
-    for preset in PRESETS:
-        iou = np.array([float(row[f"iou_{preset}"]) for row in rows])
-        worst = sorted(zip(rows, table, strict=True), key=lambda pair: -pair[1][preset])[:6]
-        names = ", ".join(f"{r['world']}-{r['seed']}-{r['thirds']} {e[preset]:.0f} %" for r, e in worst)
+    for method in METHODS:
+        iou = np.array([float(row[f"iou_{method}"]) for row in rows])
+        worst = sorted(zip(rows, table, strict=True), key=lambda pair: -pair[1][method])[:6]
+        names = ", ".join(f"{r['world']}-{r['seed']}-{r['thirds']} {e[method]:.0f} %" for r, e in worst)
         yield ""
-        yield f"`{preset}`: mean IoU by door {iou.mean():.3f}; largest errors: {names}"
+        yield f"`{method}`: mean IoU by door {iou.mean():.3f}; largest errors: {names}"
 
 
 def draw(rows: list[Row], picture: Path) -> None:

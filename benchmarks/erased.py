@@ -5,7 +5,7 @@
 Ten bundled worlds, one order of closing each, with one door, a third, two thirds and all of the doors closed.
 Resumable: what OUT holds is not made again. Tolerances, set before the first measurement: on average over the samples
 the known areas agree with IoU of at least 0.97 and the hidden rooms with at least 0.95, and the mean IoU of the
-prediction (preset `paper`, by door) differs by at most 0.03.
+prediction (method `paper`, by door) differs by at most 0.03.
 """
 
 import argparse
@@ -23,8 +23,7 @@ from closedrooms.experiments.evaluation.scores import iou
 from closedrooms.experiments.workers import Crew
 from closedrooms.pipeline.config import named_noise
 from closedrooms.pipeline.scores import room_iou
-from closedrooms.predictor.config import preset
-from closedrooms.predictor.predict import predict
+from closedrooms.predictor.methods import predict
 
 WORLDS = (
     "office-01", "office-02", "office-03", "office-05", "office-06", "school-01", "school-02", "school-03", "school-04",
@@ -58,8 +57,8 @@ def build(out: Path, maps: MapSource, workers: int) -> list[tuple[Variant, Path]
 
 
 def prediction_iou(folder: Path) -> float:
-    """Mean IoU by door of the preset ``paper``; a room whose door was not seen counts 0."""
-    prediction = predict(read_map(folder / "map.yaml"), read_doors(folder / "doors.geojson"), preset("paper"))
+    """Mean IoU by door of the method ``paper``; a room whose door was not seen counts 0."""
+    prediction = predict(read_map(folder / "map.yaml"), read_doors(folder / "doors.geojson"), "paper")
     figures = room_iou(prediction.rooms, read_rooms(folder / "truth_rooms.geojson"))
     return float(np.mean(list(figures.values())))
 

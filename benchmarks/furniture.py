@@ -19,18 +19,14 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.pipeline.scores import room_iou
 from closedrooms.pipeline.survey import true_building
-from closedrooms.predictor.config import PredictorConfig, preset
-from closedrooms.predictor.predict import predict
+from closedrooms.predictor.methods import METHODS as ALL
+from closedrooms.predictor.methods import predict
 from closedrooms.sim.config import NOISE_LEVELS, SimConfig
 from closedrooms.worlds.closing import closable_rooms, draw_closed
 from closedrooms.worlds.library import load_world
 
 WORLDS = ("office-01", "office-05", "school-01", "office-06", "office-02")
-METHODS: dict[str, PredictorConfig] = {
-    "paper": preset("paper"),
-    "rose": replace(preset("paper"), structure="rose"),
-    "best": preset("best"),
-}
+METHODS = ("paper", "rose", "best")
 
 
 def figures(world: str, share: float, sets: int, closed: int) -> list[float]:
@@ -44,9 +40,10 @@ def figures(world: str, share: float, sets: int, closed: int) -> list[float]:
         doors = draw_closed(plan, count, stream(0, "closed doors", plan.name, str(number)))
         mapped = eraser.erase(doors)
         truth = true_building(plan, doors, mapped.grid.frame, drive.world_T_map.inverse())
-        configs = [kind for config in METHODS.values() for kind in (replace(config, clutter_area=0.0), config)]
-        for column, config in zip(found, configs, strict=True):
-            by_door = room_iou(predict(mapped.grid, mapped.doors, config).rooms, truth.rooms)
+        defaults = [(name, ALL[name].config()) for name in METHODS]
+        tried = [(n, kind) for n, config in defaults for kind in (replace(config, clutter_area=0.0), config)]
+        for column, (name, config) in zip(found, tried, strict=True):
+            by_door = room_iou(predict(mapped.grid, mapped.doors, name, config).rooms, truth.rooms)
             column.append(float(np.mean([by_door.get(door, 0.0) for door in doors])))
     return [float(np.mean(column)) for column in found]
 

@@ -24,16 +24,9 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.geojson import read_doors, write_doors
 from closedrooms.core.grid import UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.rosmap import read_map, write_map
-from closedrooms.predictor.config import PresetName, Structure
 from closedrooms.predictor.structure.known_window import known_window
 
 RESOLUTION = 0.05
-METHODS: dict[str, tuple[PresetName, Structure]] = {
-    "paper": ("paper", "hough"),
-    "rose": ("paper", "rose"),
-    "best": ("best", "hough"),
-}
-BASELINES = ("line-of-sight", "geometric")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +39,7 @@ class Options:
     """Cells along each side of the tiled maps."""
     doors: int = 20
     """How many of the doors are closed, drawn with a fixed seed."""
-    methods: tuple[str, ...] = (*METHODS, *BASELINES)
+    methods: tuple[str, ...] = ("paper", "rose", "best", "line-of-sight", "geometric")
     """paper, rose, best, line-of-sight, geometric."""
 
 
@@ -87,20 +80,11 @@ def measure(method: str, folder: Path) -> tuple[float, float, int]:
 
 def only(method: str, folder: Path) -> None:
     """Predict by one method and say what it took."""
-    if method in METHODS:
-        from closedrooms.pipeline.config import PredictConfig
-        from closedrooms.pipeline.predict import predict_map
+    from closedrooms.pipeline.config import PredictConfig
+    from closedrooms.pipeline.predict import predict_map
 
-        preset, structure = METHODS[method]
-        files = {"map": folder / "map.yaml", "doors": folder / "doors.geojson", "out": folder / method}
-        rooms = len(predict_map(PredictConfig(**files, preset=preset, structure=structure)).rooms)
-    else:
-        from closedrooms.predictor import baselines
-        from closedrooms.predictor.config import preset as named
-
-        run = {"line-of-sight": baselines.line_of_sight, "geometric": baselines.geometric}[method]
-        grid, doors = read_map(folder / "map.yaml"), read_doors(folder / "doors.geojson")
-        rooms = len(run(grid, doors, named("paper")).rooms)
+    files = {"map": folder / "map.yaml", "doors": folder / "doors.geojson", "out": folder / method}
+    rooms = len(predict_map(PredictConfig(**files, method=method)).rooms)
     used = resource.getrusage(resource.RUSAGE_SELF)
     print(json.dumps((used.ru_utime + used.ru_stime, used.ru_maxrss / 1024, rooms)))
 

@@ -1,6 +1,6 @@
 """Speed, memory and agreement of the predictor, side by side with the authors' own completed maps.
 
-    python benchmarks/prediction.py ../shared/data/authors [--config preset ...]
+    python benchmarks/prediction.py ../shared/data/authors [--method best]
 
 A sample is any folder with ``map.yaml`` and ``doors.geojson``; with ``authors.yaml`` the area that the prediction adds
 (cells free in it and unknown in the map) is compared with the area that the authors' program added, with
@@ -9,7 +9,7 @@ A sample is any folder with ``map.yaml`` and ``doors.geojson``; with ``authors.y
 
 import resource
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -21,11 +21,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.geojson import read_doors
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.rosmap import read_map
-from closedrooms.predictor.baselines import geometric, line_of_sight
-from closedrooms.predictor.config import PredictorConfig
-from closedrooms.predictor.predict import predict
-
-METHODS = {"predict": predict, "line-of-sight": line_of_sight, "geometric": geometric}
+from closedrooms.predictor.methods import predict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,10 +30,8 @@ class Options:
 
     folder: tyro.conf.Positional[Path]
     """Where the samples are, at any depth."""
-    config: PredictorConfig = field(default_factory=PredictorConfig)
-    """Settings of the predictor."""
-    method: str = "predict"
-    """predict, line-of-sight or geometric."""
+    method: str = "paper"
+    """Name of a method."""
     each: bool = False
     """Print a row a map."""
 
@@ -54,7 +48,7 @@ def measure(folder: Path, options: Options) -> dict[str, float]:
     grid = read_map(folder / "map.yaml")
     doors: list[ClosedDoor] = read_doors(folder / "doors.geojson")
     start = time.perf_counter()
-    prediction = METHODS[options.method](grid, doors, options.config)
+    prediction = predict(grid, doors, options.method)
     row = {"doors": len(doors), "failures": len(prediction.failures), "seconds": time.perf_counter() - start}
     for name in ("authors", "truth"):
         if (folder / f"{name}.yaml").exists():

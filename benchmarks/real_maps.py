@@ -21,7 +21,7 @@ import argparse
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -32,8 +32,7 @@ from closedrooms.core.grid import OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.core.rosmap import read_map
 from closedrooms.experiments.evaluation.scores import iou, room_masks
-from closedrooms.predictor.config import PredictorConfig, preset
-from closedrooms.predictor.predict import predict
+from closedrooms.predictor.methods import predict
 from closedrooms.predictor.structure.clutter import filter_clutter
 
 Pixel = tuple[int, int]
@@ -42,11 +41,7 @@ Gap = tuple[Pixel, Pixel]
 CLOSING, BESIDE = 0.15, 0.4
 # Free areas below this are specks [square metres].
 SPECK = 0.5
-METHODS: dict[str, PredictorConfig] = {
-    "paper, hough": preset("paper"),
-    "paper, rose": replace(preset("paper"), structure="rose"),
-    "best": preset("best"),
-}
+METHODS = ("paper", "rose", "best")
 
 
 @dataclass(frozen=True)
@@ -247,7 +242,7 @@ def main() -> None:
         tidy = filter_clutter(case.grid)
         outcomes = {}
         for head, (method, clean) in zip(heads, columns, strict=True):
-            outcomes[head] = predict(tidy if clean else case.grid, case.doors, METHODS[method])
+            outcomes[head] = predict(tidy if clean else case.grid, case.doors, method)
         scores = {head: judge(case, outcome.rooms) for head, outcome in outcomes.items()}
         name, what = case.name.split(": ")
         several = len(case.doors) > 1

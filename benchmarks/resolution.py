@@ -9,7 +9,7 @@ what most of its area is; ``any``, occupied where anything is; ``third``, occupi
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -24,16 +24,11 @@ from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.geojson import read_doors
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.rosmap import read_map
-from closedrooms.predictor.config import preset
-from closedrooms.predictor.predict import predict
+from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Shape
 from closedrooms.predictor.structure.known_window import known_window
 
-METHODS = {
-    "paper": preset("paper"),
-    "rose": replace(preset("paper"), structure="rose"),
-    "best": preset("best"),
-}
+METHODS = ("paper", "rose", "best")
 # Points a turned cell is sampled at along each axis.
 SAMPLES = 4
 RULES: dict[str, Callable[[FloatArray, FloatArray], BoolArray]] = {
@@ -115,7 +110,7 @@ def turned_door(door: ClosedDoor, angle: float) -> ClosedDoor:
 
 def rooms(grid: OccupancyGrid, doors: Sequence[ClosedDoor], method: str, angle: float = 0.0) -> dict[str, Shape]:
     """Predicted rooms by door, turned back by ``angle`` [rad]."""
-    found = predict(grid, doors, METHODS[method]).rooms
+    found = predict(grid, doors, method).rooms
     back = -math.degrees(angle)
     return {door: affinity.rotate(room.polygon, back, origin=(0, 0)) for room in found for door in room.doors}
 

@@ -1,4 +1,4 @@
-"""Rooms with several closed doors: how often the preset ``best`` tells that they lead to one room, and what it gains.
+"""Rooms with several closed doors: how often the method ``best`` tells that they lead to one room, and what it gains.
 
     python benchmarks/shared_rooms.py [WORLD ...] [--close 10] [--draws 2]
 
@@ -26,8 +26,7 @@ from closedrooms.core.room import Room
 from closedrooms.experiments.robustness.door_noise import true_doors
 from closedrooms.pipeline.scores import room_iou
 from closedrooms.predictor.best import shared_rooms as shared
-from closedrooms.predictor.config import preset
-from closedrooms.predictor.predict import predict
+from closedrooms.predictor.methods import predict
 from closedrooms.worlds.closing import closable_rooms, draw_closed
 from closedrooms.worlds.library import bundled_names, load_world
 from closedrooms.worlds.plan import FloorPlan
@@ -154,8 +153,8 @@ def main() -> None:
             grid = seen_map(plan, closed)
             doors, truth = seen_doors(plan, closed, grid), true_rooms(plan, closed, HERE)
             with no_joining():
-                apart = predict(grid, doors, preset("best")).rooms
-            joined = predict(grid, doors, preset("best")).rooms
+                apart = predict(grid, doors, "best").rooms
+            joined = predict(grid, doors, "best").rooms
             for tally in (own, whole):
                 judge(tally, doors, truth, joined, apart)
         print(own.row(plan.name), flush=True)

@@ -18,8 +18,8 @@ from closedrooms.navigation.exploration import StepWatch, World
 from closedrooms.navigation.observer import NoObserver, Observer
 from closedrooms.navigation.opened_doors import KeyframeMap, ReopenedMap
 from closedrooms.navigation.tour_follower import Revision, TourGuide
-from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.prediction import Prediction
+from closedrooms.predictor.revision import Predict
 
 DriveStatus = Literal["complete", "limit", "stuck"]
 
@@ -82,7 +82,7 @@ def drive(
     config: NavigationConfig,
     *,
     closed: Collection[str],
-    predictor: PredictorConfig,
+    predictor: Predict,
     coverage: CoverageConfig,
     mapping: MapperConfig | None = None,
     observer: Observer | None = None,
@@ -98,7 +98,7 @@ def drive(
         doors: The closed doors as detected.
         config: Planning and driving, and the limit of simulated time for the drive.
         closed: Ids of the doors to open.
-        predictor: For rooms that are predicted anew.
+        predictor: Predicts rooms anew.
         coverage: For tours that are solved again.
         mapping: As the mapper has it.
         observer: Told of every scan and revision.

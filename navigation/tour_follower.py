@@ -24,9 +24,8 @@ from closedrooms.navigation.opened_doors import doorway_cells
 from closedrooms.navigation.planner import plan_path, reachable_cells, start_cell
 from closedrooms.navigation.prediction_monitor import SURPRISE, Lookout, changed_rooms, difference
 from closedrooms.navigation.remaining_tour import VISITED, Itinerary
-from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.prediction import Prediction
-from closedrooms.predictor.revision import overlay, update
+from closedrooms.predictor.revision import Predict, overlay, update
 
 # Of a tour that is solved again, vertices that were in sight this close to the way already driven are left out [m]; the
 # vertices of a revised map never lie just where the old ones did. At the end only what is farther off is worth the way.
@@ -89,7 +88,7 @@ class TourGuide:
         tour: CoverageTour,
         doors: Sequence[ClosedDoor],
         config: NavigationConfig,
-        predictor: PredictorConfig,
+        predictor: Predict,
         coverage: CoverageConfig,
     ) -> None:
         """Begin a tour.
@@ -99,7 +98,7 @@ class TourGuide:
             tour: A closed tour. It begins and ends at the vertex nearest to the robot.
             doors: The doors of the predicted rooms, open by now.
             config: Planning and driving.
-            predictor: For rooms that are predicted anew.
+            predictor: Predicts rooms anew.
             coverage: For tours that are solved again.
         """
         self.config = config
@@ -278,7 +277,7 @@ class TourGuide:
     def _revise(self, doors: tuple[str, ...], pose: Pose2, grid: OccupancyGrid, now: float) -> bool:
         """Revise the prediction, and the tour where the free space has changed; whether the tour was solved again."""
         before = self.prediction
-        self.prediction = update(before, grid, doors=self._doors, config=self._predictor)
+        self.prediction = update(before, grid, doors=self._doors, predictor=self._predictor)
         self._lookout.revised(doors)
         replanned = difference(before.grid, self.prediction.grid) >= SURPRISE and self._solve_again(pose, grid)
         changed = changed_rooms(before.rooms, self.prediction.rooms)

@@ -10,7 +10,8 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.predictor.config import Phi, PredictorConfig, PresetName, Structure
+from closedrooms.predictor.config import MethodConfig
+from closedrooms.predictor.methods import DEFAULT_METHOD, find_method
 from closedrooms.sim.config import LidarConfig, NoiseConfig, SimConfig, lidar_preset, noise_level
 
 NoiseName = Literal["none", "low", "medium", "high"]
@@ -42,14 +43,8 @@ class RunConfig:
     seed: int = 0
     """The one seed of the run: which rooms are closed, and every source of noise."""
 
-    preset: PresetName = "best"
-    """Predictor: ``paper`` is what the authors describe and ran, ``best`` as good as we can."""
-
-    structure: Structure = "hough"
-    """Where the predictor finds structure: ``hough`` (paper, section 3.1) or ``rose`` (section 4.2)."""
-
-    phi: Phi = "as-run"
-    """Evaluation function as the authors ran it or as the paper prints it (section 3.4)."""
+    method: str = DEFAULT_METHOD
+    """How rooms are predicted: ``paper`` is what the authors describe and ran, ``best`` as good as we can."""
 
     drive: bool = False
     """After the prediction, open the doors and drive the tour that was planned on the predicted map."""
@@ -75,8 +70,8 @@ class RunConfig:
     navigation: NavigationConfig = field(default_factory=NavigationConfig)
     """Exploration and driving."""
 
-    predictor: Annotated[PredictorConfig, tyro.conf.Suppress] = field(default_factory=PredictorConfig)
-    """The predictor, for use as a library; ``preset``, ``structure`` and ``phi`` above are laid over it."""
+    predictor: Annotated[MethodConfig | None, tyro.conf.Suppress] = None
+    """Settings of the method, of its own class; its defaults when not given."""
 
     coverage: CoverageConfig = field(default_factory=CoverageConfig)
     """Graph and tour."""
@@ -88,6 +83,7 @@ class RunConfig:
             raise InvalidInputError(f"--close {self.close}", expected="a number of rooms of at least 0")
         if self.seed < 0:
             raise InvalidInputError(f"--seed {self.seed}", expected="a whole number of at least 0")
+        object.__setattr__(self, "predictor", find_method(self.method).checked(self.predictor))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,20 +99,17 @@ class PredictConfig:
     out: Path
     """Folder to write."""
 
-    preset: PresetName = "best"
-    """``paper`` is what the authors describe and ran, ``best`` as good as we can."""
-
-    structure: Structure = "hough"
-    """Where structure is found: ``hough`` (paper, section 3.1) or ``rose`` (section 4.2)."""
-
-    phi: Phi = "as-run"
-    """Evaluation function as the authors ran it or as the paper prints it (section 3.4)."""
+    method: str = DEFAULT_METHOD
+    """How rooms are predicted: ``paper`` is what the authors describe and ran, ``best`` as good as we can."""
 
     record: bool = False
     """Write the recording ``run.rrd`` for the rerun viewer."""
 
-    predictor: Annotated[PredictorConfig, tyro.conf.Suppress] = field(default_factory=PredictorConfig)
-    """All settings, for use as a library; the three above are laid over it."""
+    predictor: Annotated[MethodConfig | None, tyro.conf.Suppress] = None
+    """Settings of the method, of its own class; its defaults when not given."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "predictor", find_method(self.method).checked(self.predictor))
 
 
 def sim_config(config: RunConfig) -> SimConfig:
@@ -129,11 +122,6 @@ def sim_config(config: RunConfig) -> SimConfig:
 def named_noise(sim: SimConfig, noise: NoiseName) -> SimConfig:
     """The noise level laid over settings of the simulation whose noise was not set one by one."""
     return replace(sim, noise=noise_level(noise)) if sim.noise == NoiseConfig() else sim
-
-
-def predictor_config(config: RunConfig | PredictConfig) -> PredictorConfig:
-    """Settings of the predictor with the options ``preset``, ``structure`` and ``phi`` laid over them."""
-    return replace(config.predictor, preset=config.preset, structure=config.structure, phi=config.phi)
 
 
 @dataclass(frozen=True, kw_only=True)

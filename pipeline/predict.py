@@ -13,11 +13,11 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.core.rosmap import read_map, write_map
 from closedrooms.navigation.observer import NoObserver, Observer
-from closedrooms.pipeline.config import PredictConfig, predictor_config
+from closedrooms.pipeline.config import PredictConfig
 from closedrooms.pipeline.manifest import resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.stopwatch import Stopwatch
-from closedrooms.predictor.predict import predict
+from closedrooms.predictor.methods import predict
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +82,7 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> P
         with watch.stage("predict"):
             progress.stage("predict")
             try:
-                prediction = predict(grid, doors, predictor_config(config), trace=config.record)
+                prediction = predict(grid, doors, config.method, config.predictor, trace=config.record)
             except InvalidInputError as error:
                 raise InvalidInputError(str(error), where=config.map) from error
         with watch.stage("record"), _recording(config, grid, folder / "run.rrd") as observer:

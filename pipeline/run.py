@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from closedrooms.mapping.trajectory import ate
 from closedrooms.navigation.drive import DriveResult, drive
 from closedrooms.navigation.exploration import ExplorationResult
 from closedrooms.navigation.observer import Observer
-from closedrooms.pipeline.config import RunConfig, predictor_config, sim_config
+from closedrooms.pipeline.config import RunConfig, sim_config
 from closedrooms.pipeline.drive_report import draw_drive, drive_features, drive_metrics
 from closedrooms.pipeline.manifest import resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
@@ -31,7 +32,7 @@ from closedrooms.pipeline.run_log import Witness
 from closedrooms.pipeline.scores import area_mapped, mean, room_iou, rooms_seen
 from closedrooms.pipeline.stopwatch import Stopwatch
 from closedrooms.pipeline.survey import Survey, Truth, survey_building, true_building
-from closedrooms.predictor.predict import predict
+from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.sim.simulation import Simulation
 from closedrooms.visualization.rerun.opening import open_recording
@@ -125,8 +126,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
         )  # fmt: skip
         with watch.stage("predict"):
             progress.stage("predict")
-            settings = predictor_config(config)
-            prediction = predict(survey.grid, survey.doors, settings, trace=config.record)
+            prediction = predict(survey.grid, survey.doors, config.method, config.predictor, trace=config.record)
             truth = true_building(plan, closed, prediction.grid.frame, map_T_world)
             observer.prediction(survey.grid, survey.doors, prediction)
             observer.truth(truth.grid, truth.rooms)
@@ -218,9 +218,10 @@ def _drive(
     observer: Observer,
 ) -> tuple[DriveResult, dict[str, Any]]:
     """Open the doors, drive the tour of the predicted map, and judge it."""
+    predictor = partial(predict, method=config.method, config=config.predictor)
     driven = drive(
         witness, mapper, prediction, tours["predicted"], survey.doors, config.navigation,
-        closed=closed, predictor=predictor_config(config), coverage=config.coverage, mapping=config.mapper,
+        closed=closed, predictor=predictor, coverage=config.coverage, mapping=config.mapper,
         observer=observer, period=1.0 / config.sim.lidar.rate,
     )  # fmt: skip
     seen, sim = driven.grid, witness.sim

@@ -10,7 +10,7 @@ from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.config import FacesConfig
 from closedrooms.predictor.inpainting import inpaint, passage
 from closedrooms.predictor.paper.arrangement import joined
 from closedrooms.predictor.paper.initial_layouts import Start, Started, start_rooms
@@ -23,14 +23,14 @@ STRETCH = 64
 
 
 def line_of_sight(
-    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PredictorConfig, *, started: Started | None = None
+    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesConfig, *, started: Started | None = None
 ) -> Prediction:
     """What can be seen from each door through unknown cells, up to known ones or the bounding box of the map.
 
     Args:
         grid: The map.
         doors: Closed doors in its frame.
-        config: Structure (the door's direction is that of its edge) and passages.
+        config: Faces (the door's direction is that of its edge) and passages.
         started: What ``start_rooms`` gave for the same, where it is at hand.
 
     Returns:
@@ -40,7 +40,7 @@ def line_of_sight(
 
 
 def geometric(
-    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PredictorConfig, *, started: Started | None = None
+    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesConfig, *, started: Started | None = None
 ) -> Prediction:
     """All unknown faces in line of sight of each door, until faces on the border are met.
 
@@ -50,7 +50,7 @@ def geometric(
     Args:
         grid: The map.
         doors: Closed doors in its frame.
-        config: Structure and passages.
+        config: Faces and passages.
         started: What ``start_rooms`` gave for the same, where it is at hand.
 
     Returns:
@@ -62,7 +62,7 @@ def geometric(
 def _each(
     grid: OccupancyGrid,
     doors: Sequence[ClosedDoor],
-    config: PredictorConfig,
+    config: FacesConfig,
     shape_of: Callable[[Start, int], Shape],
     started: Started | None,
 ) -> Prediction:

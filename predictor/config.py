@@ -1,19 +1,20 @@
-"""Settings of the predictor; lengths in metres, angles in radians. Imports nothing heavy."""
+"""Settings of the methods of prediction, one class a method; lengths in metres, angles in radians.
+
+Imports nothing heavy.
+"""
 
 import math
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from typing import Literal
 
 from closedrooms.core.errors import InvalidInputError
 
-PresetName = Literal["paper", "best"]
-Structure = Literal["hough", "rose"]
 Phi = Literal["as-run", "as-printed"]
 RoomOrder = Literal["smallest-first", "largest-first", "by-position"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class StructureConfig:
+class LinesConfig:
     """How walls become lines (paper, section 3.1). Defaults: read in the authors' published structure extraction."""
 
     resolution: float = 0.05
@@ -43,18 +44,6 @@ class StructureConfig:
     angle_bandwidth: float = math.radians(12.0)
     """Half width of the mean shift kernel over wall directions [rad]."""
 
-    direction_segment: float = 0.50
-    """Shorter segments have no say in which directions there are [m]: ten cells tell a direction to 6 degrees."""
-
-    min_direction_length: float = 2.0
-    """A direction needs this much wall in longer segments [m]; less is noise of the raster."""
-
-    min_direction_share: float = 0.03
-    """A direction needs this share of the wall of the strongest direction."""
-
-    min_concentration: float = 0.40
-    """A direction needs this share of its longer segments within 3 degrees; noise spreads evenly, to about 0.25."""
-
     collinear_distance: float = 0.35
     """Segments of one direction closer than this belong to one wall [m]."""
 
@@ -72,6 +61,26 @@ class StructureConfig:
         _check_numbers(self, positive)
         if self.canny_aperture not in {3, 5, 7}:
             raise InvalidInputError(f"canny_aperture {self.canny_aperture}", expected="3, 5 or 7")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DirectionsConfig:
+    """Which directions of walls count, by mean shift over the angles of segments (paper, section 3.1)."""
+
+    min_segment: float = 0.50
+    """Shorter segments have no say in which directions there are [m]: ten cells tell a direction to 6 degrees."""
+
+    min_length: float = 2.0
+    """A direction needs this much wall in longer segments [m]; less is noise of the raster."""
+
+    min_share: float = 0.03
+    """A direction needs this share of the wall of the strongest direction."""
+
+    min_concentration: float = 0.40
+    """A direction needs this share of its longer segments within 3 degrees; noise spreads evenly, to about 0.25."""
+
+    def __post_init__(self) -> None:
+        _check_numbers(self, ())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,32 +116,58 @@ class Weights:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PredictorConfig:
-    """All settings of ``predict``; take one from :func:`preset`."""
-
-    preset: PresetName = "paper"
-    """``paper``: what the authors describe and ran; ``best``: as good as we can."""
-
-    structure: Structure = "hough"
-    """Where lines come from: ``hough`` (section 3.1) or ``rose`` (section 4.2)."""
-
-    phi: Phi = "as-run"
-    """Evaluation function as the authors' logs show it, or as the text prints it."""
-
-    lines: StructureConfig = field(default_factory=StructureConfig)
-    """Segments, directions and lines."""
-
-    weights: Weights = field(default_factory=Weights)
-    """Weights of the evaluation functions."""
+class MethodConfig:
+    """What every method of ours reads."""
 
     clutter_area: float = 4.0
     """What free space surrounds and covers less than this counts as free where walls are looked for [m2]: furniture."""
+
+    door_reach: float = 1.0
+    """A door further than this from every wall line lies on no wall [m]."""
+
+    same_door: float = 0.30
+    """Doors closer than this are the same door [m]."""
+
+    door_width: float = 0.80
+    """Width of the passages drawn at doors [m] (section 3.7)."""
+
+    def __post_init__(self) -> None:
+        _check_numbers(self, ("door_reach", "door_width"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FacesConfig(MethodConfig):
+    """From a map and doors to faces and initial faces (sections 3.1 and 3.2): all that the two baselines read."""
+
+    lines: LinesConfig = field(default_factory=LinesConfig)
+    """Segments and lines."""
+
+    directions: DirectionsConfig | None = field(default_factory=DirectionsConfig)
+    """Directions of walls."""
 
     min_unknown: float = 0.30
     """A face is unknown when at least this share of it is unknown, or ``max_free`` holds."""
 
     max_free: float = 0.50
     """A face is unknown when at most this share of it is free."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0.0 <= self.min_unknown <= 1.0 or not 0.0 <= self.max_free <= 1.0:
+            raise InvalidInputError(
+                f"min_unknown {self.min_unknown}, max_free {self.max_free}", expected="shares between 0 and 1"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperConfig(FacesConfig):
+    """The method of the paper (section 3)."""
+
+    phi: Phi = "as-run"
+    """Evaluation function as the authors' logs show it, or as the text prints it (section 3.4)."""
+
+    weights: Weights = field(default_factory=Weights)
+    """Weights of the evaluation functions."""
 
     room_order: RoomOrder = "smallest-first"
     """Who takes its turn first in a step: by number of candidate faces, as printed, or by position, to compare."""
@@ -145,15 +180,6 @@ class PredictorConfig:
 
     max_nodes: int = 1000
     """Nodes of one branch and bound search; a cut is said in the result (``bounded``)."""
-
-    door_reach: float = 1.0
-    """A door further than this from every line lies on no wall [m]."""
-
-    same_door: float = 0.30
-    """Doors closer than this are the same door [m]."""
-
-    door_width: float = 0.80
-    """Width of the passages drawn at doors [m] (section 3.7)."""
 
     wall_thickness: float | None = None
     """Thickness of walls not counted as room [m]; measured in the map when not given, 0 draws rooms up to the lines."""
@@ -168,24 +194,25 @@ class PredictorConfig:
     """Keep segments, lines, faces and levels in the result, for recordings and pictures."""
 
     def __post_init__(self) -> None:
-        _check_numbers(self, ("door_reach", "door_width"))
-        if not 0.0 <= self.min_unknown <= 1.0 or not 0.0 <= self.max_free <= 1.0:
-            raise InvalidInputError(
-                f"min_unknown {self.min_unknown}, max_free {self.max_free}", expected="shares between 0 and 1"
-            )
+        super().__post_init__()
         if not 0 <= self.exact_candidates <= 16:
             raise InvalidInputError(f"exact_candidates {self.exact_candidates}", expected="0 to 16")
 
 
-def preset(name: PresetName) -> PredictorConfig:
-    """The settings of a preset.
+@dataclass(frozen=True, kw_only=True)
+class RoseConfig(PaperConfig):
+    """The method of the paper with walls and directions from ROSE (section 4.2)."""
 
-    Raises:
-        InvalidInputError: There is no preset of that name.
-    """
-    if name not in {"paper", "best"}:
-        raise InvalidInputError(f"preset {name!r}", expected="paper or best")
-    return replace(PredictorConfig(), preset=name)
+    directions: None = field(default=None, init=False)
+    """ROSE finds directions in the spectrum of the map."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BestConfig(MethodConfig):
+    """Rectangles between wall faces, chosen jointly by their evidence."""
+
+    keep_trace: bool = False
+    """Keep each door's best rectangle by itself beside the rooms chosen together."""
 
 
 def _check_numbers(config: object, positive: tuple[str, ...]) -> None:

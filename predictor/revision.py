@@ -5,7 +5,7 @@ nobody has looked into yet are predicted anew on the map that is now known.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,9 +18,7 @@ from closedrooms.core.arrays import BoolArray, IntArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.inpainting import fill_shape, inpaint
-from closedrooms.predictor.predict import predict
 from closedrooms.predictor.prediction import Prediction, Shape
 
 # A room counts as looked into when so much of its free space is observed [m2].
@@ -38,6 +36,9 @@ THRESHOLD = 0.15
 # Gaps in a wall up to this width lead nowhere [m]: less than any door, more than from one far beam to the next.
 GAP = 0.30
 SQUARE = np.ones((3, 3), dtype=np.uint8)
+
+# A method with its settings, for a map and its closed doors.
+Predict = Callable[[OccupancyGrid, Sequence[ClosedDoor]], Prediction]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +60,7 @@ def update(
     grid: OccupancyGrid,
     *,
     doors: Sequence[ClosedDoor] = (),
-    config: PredictorConfig | None = None,
+    predictor: Predict | None = None,
 ) -> Prediction:
     """Revise a prediction by what has been observed since.
 
@@ -67,7 +68,7 @@ def update(
         prediction: As it was made, or as the last update left it.
         grid: The map as it is known now, on the same lattice.
         doors: The doors of the predicted rooms: their doorways stay passable where the map still shows a leaf.
-        config: With it, rooms that nobody has looked into are predicted anew; without, they are only cut.
+        predictor: With it, rooms that nobody has looked into are predicted anew; without, they are only cut.
 
     Returns:
         Observed rooms with the shape that was observed, the others revised, and the map completed with them. The same
@@ -88,8 +89,8 @@ def update(
         elif index < len(prediction.rooms):
             failures |= dict.fromkeys(room.doors, "there is no room where one was predicted")
     looked_into = {index for index in rooms if observed[index].any()}
-    if config is not None and looked_into:
-        rooms |= _again(scene, rooms, looked_into, doors, config)
+    if predictor is not None and looked_into:
+        rooms |= _again(scene, rooms, looked_into, doors, predictor)
     kept = tuple(rooms[index] for index in sorted(rooms))
     found = {door for room in kept for door in room.doors}
     failures = {door: why for door, why in failures.items() if door not in found}
@@ -252,7 +253,7 @@ def _again(
     rooms: dict[int, Room],
     looked_into: set[int],
     doors: Sequence[ClosedDoor],
-    config: PredictorConfig,
+    predictor: Predict,
 ) -> dict[int, Room]:
     """The rooms that nobody has looked into, predicted on the map that is known now."""
     open_ids = {door for index in looked_into for door in scene.rooms[index].doors}
@@ -260,7 +261,7 @@ def _again(
     if not remaining:
         return {}
     known = inpaint(scene.now, [rooms[index].polygon for index in sorted(looked_into)], [])
-    fresh = predict(known, remaining, config, trace=False)
+    fresh = predictor(known, remaining)
     by_door = {door: room for room in fresh.rooms for door in room.doors}
     revised = {}
     for index, room in enumerate(scene.rooms):

@@ -1,19 +1,21 @@
 """Options of ``closedrooms evaluate``."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import tyro
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.options import check_least
+from closedrooms.predictor.methods import find_method
 
-Method = Literal["paper", "best", "rose", "line-of-sight", "geometric"]
-METHODS: tuple[Method, ...] = ("paper", "best", "rose", "line-of-sight", "geometric")
-# The baselines predict each room for itself, so their maps may contradict themselves and hold no tour (paper, section
-# 5.2).
-TOURED: tuple[Method, ...] = ("paper", "best", "rose")
+COMPARED = ("paper", "best", "rose", "line-of-sight", "geometric")
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """Names of methods in the order of tables: ours first, then the rest by name."""
+    return sorted(set(names), key=lambda name: (COMPARED.index(name) if name in COMPARED else len(COMPARED), name))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +29,7 @@ class EvaluateConfig:
     out: Path
     """Folder to write; the same command again goes on where it stopped."""
 
-    methods: tuple[Method, ...] = METHODS
+    methods: tuple[str, ...] = COMPARED
     """What to compare."""
 
     workers: int = 2
@@ -52,5 +54,7 @@ class EvaluateConfig:
         if not self.datasets:
             raise InvalidInputError("no dataset", expected="at least one folder")
         if not self.methods or len(set(self.methods)) != len(self.methods):
-            raise InvalidInputError(f"methods {self.methods}", expected=f"each once, of {', '.join(METHODS)}")
+            raise InvalidInputError(f"methods {self.methods}", expected="each once")
+        for name in self.methods:
+            find_method(name)
         check_least(self, workers=1, resamples=1, subset_worlds=1, subset_repetitions=1)

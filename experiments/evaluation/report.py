@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.experiments.evaluation.cases import draw_extremes, draw_worst, extreme_cases
-from closedrooms.experiments.evaluation.config import METHODS, EvaluateConfig
+from closedrooms.experiments.evaluation.config import EvaluateConfig, in_order
 from closedrooms.experiments.evaluation.curves import draw_errors, draw_iou
 from closedrooms.experiments.evaluation.listing import SamplePath
 from closedrooms.experiments.evaluation.numbers import number_rows
@@ -103,7 +103,7 @@ def _sections(
         if drawn:
             sections.append(Section(heading, text, folder / name, list(tables)))
 
-    every = [name for name in (*METHODS, "authors") if name in present]
+    every = [name for name in (*in_order(set(present) - {"authors"}), "authors") if name in present]
     drawn = draw_iou(folder / "iou.png", iou, every, ("matched", "by_door"))
     add("All methods: IoU by number of closed doors", "Both ways to compare a room with the truth.", "iou.png",
         _doors_table(iou, "method", every, measure), drawn=drawn)  # fmt: skip
@@ -113,7 +113,7 @@ def _sections(
     names = [name for name in ("paper", "rose") if name in present]
     drawn = draw_iou(folder / "figure-09.png", iou, names, (measure,))
     add("Figure 9: IoU with two ways to find structure", "", "figure-09.png", drawn=drawn)
-    names = [name for name in METHODS if any(row["estimate"] == name for row in coverage)]
+    names = [name for name in in_order(present) if any(row["estimate"] == name for row in coverage)]
     shown = [*WITHOUT_PREDICTION, *names[:1]]
     drawn = draw_errors(folder / "figure-12.png", coverage, shown)
     table = [row for row in coverage if row["part"] == "all"]
@@ -121,7 +121,7 @@ def _sections(
         _doors_table(table, "estimate", [*WITHOUT_PREDICTION, *names], "error"), drawn=drawn)  # fmt: skip
     drawn = draw_errors(folder / "figure-14.png", coverage, names)
     add("Figure 14: errors of the coverage cost by prediction", "", "figure-14.png", drawn=drawn)
-    method = next((name for name in METHODS if name in present), None)
+    method = next(iter(in_order(set(present) - {"authors"})), None)
     if method is not None:
         cases = extreme_cases(scores, method)
         count = draw_extremes(folder / "figure-07.png", folder / "figure-13.png", cases, samples)

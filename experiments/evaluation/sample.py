@@ -4,7 +4,7 @@ import hashlib
 import json
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,6 @@ from closedrooms.core.errors import OutputError, reason
 from closedrooms.core.files import write_json
 from closedrooms.core.geojson import write_rooms
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.experiments.evaluation.config import TOURED
 from closedrooms.experiments.evaluation.listing import SamplePath
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
 from closedrooms.experiments.evaluation.scores import (
@@ -31,7 +30,8 @@ from closedrooms.experiments.evaluation.scores import (
 from closedrooms.experiments.evaluation.tours import Tour, code_digest, kept_tour, plan_tour, tour_code, tour_figures
 from closedrooms.pipeline.manifest import versions
 from closedrooms.pipeline.scores import room_iou
-from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.config import FacesConfig
+from closedrooms.predictor.methods import find_method
 from closedrooms.predictor.paper.initial_layouts import Started
 from closedrooms.predictor.prediction import Prediction
 
@@ -130,7 +130,7 @@ def _content(folder: Path) -> str:
 
 def _fingerprint(content: str, method: str, *, tours: bool) -> str:
     """Changes with the input, the method, the versions of libraries and the code that predicts, plans and scores."""
-    parts = [content, method, json.dumps(versions()), _code(), tour_code() if tours and method in TOURED else ""]
+    parts = [content, method, json.dumps(versions()), _code(), tour_code() if tours and _has_tour(method) else ""]
     return hashlib.sha256(" ".join(parts).encode()).hexdigest()
 
 
@@ -154,46 +154,44 @@ class Starts:
 
     def __init__(self, sample: Sample) -> None:
         self._sample = sample
-        self._found: dict[str, tuple[Started, float]] = {}
+        self._found: dict[FacesConfig, tuple[Started, float]] = {}
 
-    def of(self, config: PredictorConfig) -> tuple[Started, float]:
+    def of(self, config: FacesConfig) -> tuple[Started, float]:
         """What a method starts from, and the seconds that this took when it was done."""
         from closedrooms.predictor.paper.initial_layouts import start_rooms
 
-        if config.structure not in self._found:
+        faces = FacesConfig(**{item.name: getattr(config, item.name) for item in fields(FacesConfig)})
+        if faces not in self._found:
             begin = time.perf_counter()
-            started = start_rooms(self._sample.observed, self._sample.doors, config)
-            self._found[config.structure] = started, time.perf_counter() - begin
-        return self._found[config.structure]
+            started = start_rooms(self._sample.observed, self._sample.doors, faces)
+            self._found[faces] = started, time.perf_counter() - begin
+        return self._found[faces]
 
 
-def predict_with(method: str, sample: Sample, starts: Starts | None = None) -> tuple[Prediction, float]:
+def predict_with(name: str, sample: Sample, starts: Starts | None = None) -> tuple[Prediction, float]:
     """The prediction of one method on one sample, and how long it took.
 
     Args:
-        method: ``paper``, ``best``, ``rose``, ``line-of-sight`` or ``geometric``.
+        name: Of the method.
         sample: The sample.
         starts: What methods share on this sample; the time that it took counts for each.
 
     Returns:
         The prediction and seconds.
     """
-    from closedrooms.predictor.baselines import geometric, line_of_sight
-    from closedrooms.predictor.config import preset
-    from closedrooms.predictor.predict import predict
-
-    grid, doors, config = sample.observed, sample.doors, preset("best" if method == "best" else "paper")
-    if method == "rose":
-        config = replace(config, structure="rose")
-    started, shared = (None, 0.0) if method == "best" else (starts or Starts(sample)).of(config)
+    method = find_method(name)
+    config = method.config()
+    shared, seconds = {}, 0.0
+    if method.shares_faces:
+        started, seconds = (starts or Starts(sample)).of(config)
+        shared = {"started": started}
     begin = time.perf_counter()
-    if method == "line-of-sight":
-        prediction = line_of_sight(grid, doors, config, started=started)
-    elif method == "geometric":
-        prediction = geometric(grid, doors, config, started=started)
-    else:
-        prediction = predict(grid, doors, config, started=started)
-    return prediction, shared + time.perf_counter() - begin
+    prediction: Prediction = method.predict(sample.observed, sample.doors, config, **shared)
+    return prediction, seconds + time.perf_counter() - begin
+
+
+def _has_tour(method: str) -> bool:
+    return method != AUTHORS and find_method(method).disjoint
 
 
 def _hidden(sample: Sample) -> _Hidden:
@@ -239,7 +237,7 @@ def _score(
         theirs = sample.authors.free & unknown
         ours = prediction.grid.on(sample.observed.frame).free & unknown
         scores["agreement"] = round(iou(ours, theirs), 6)
-    if tours and method in TOURED and sample.rooms_seen is not None:
+    if tours and _has_tour(method) and sample.rooms_seen is not None:
         try:
             scores["tour"] = _tours(sample, prediction.grid, sample.rooms_seen, out)
         except OutputError:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray
-from closedrooms.experiments.evaluation.config import METHODS, EvaluateConfig
+from closedrooms.experiments.evaluation.config import EvaluateConfig, in_order
 from closedrooms.experiments.evaluation.statistics import described, paired, rounded
 
 Scores = dict[str, Any]
@@ -101,7 +101,7 @@ def coverage_rows(scores: Sequence[Scores], config: EvaluateConfig, part: str) -
 def estimates(scores: Sequence[Scores]) -> dict[str, list[Scores]]:
     """Scores with tours by estimate: ``closed`` and ``baseline`` (once a sample), then the methods."""
     toured = grouped([score for score in scores if "tour" in score], "method")
-    ordered = {method: toured[method] for method in METHODS if method in toured}
+    ordered = {method: toured[method] for method in in_order(toured)}
     if not ordered:
         return {}
     largest = max(ordered.values(), key=len)

@@ -11,9 +11,9 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.options import check_least
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
+from closedrooms.predictor.methods import DEFAULT_METHOD, find_method
 from closedrooms.sim.config import SimConfig
 
-Preset = Literal["paper", "best"]
 Factor = Literal["lidar", "dropouts", "odometry", "missed", "shift", "turn", "resolution", "furniture", "together"]
 FACTORS: tuple[Factor, ...] = (
     "lidar", "dropouts", "odometry", "missed", "shift", "turn", "resolution", "furniture", "together",
@@ -39,8 +39,8 @@ class RobustnessConfig:
     closed: int = 6
     """Closed rooms in each set, or as many as the world has."""
 
-    preset: Preset = "best"
-    """Predictor: ``paper`` is what the authors describe and ran, ``best`` as good as we can."""
+    method: str = DEFAULT_METHOD
+    """How rooms are predicted."""
 
     lidar: tuple[float, ...] = (0.0, 0.01, 0.03, 0.06, 0.12)
     """Standard deviations of a measured distance [m]."""
@@ -92,6 +92,7 @@ class RobustnessConfig:
             raise InvalidInputError("no world", expected="names of bundled worlds, files, or all")
         if not self.factors or len(set(self.factors)) != len(self.factors):
             raise InvalidInputError(f"factors {self.factors}", expected=f"each once, of {', '.join(FACTORS)}")
+        find_method(self.method)
         check_least(self, repetitions=1, closed=1, workers=1, resamples=1, seed=0)
         for factor in FACTORS[:-1]:
             levels: tuple[float, ...] = getattr(self, factor)

@@ -28,8 +28,7 @@ from closedrooms.experiments.robustness.levels import Setting, first_setting
 from closedrooms.mapping.trajectory import ate
 from closedrooms.pipeline.scores import room_iou, rooms_seen
 from closedrooms.pipeline.survey import Truth, true_building
-from closedrooms.predictor.config import preset
-from closedrooms.predictor.predict import predict
+from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.worlds.closing import closable_rooms, draw_closed
 from closedrooms.worlds.geometry import door_leaf
@@ -168,7 +167,7 @@ class Building:
         }
 
     def _predict(self, grid: OccupancyGrid, doors: Sequence[ClosedDoor]) -> Prediction:
-        return predict(grid, doors, preset(self._config.preset))
+        return predict(grid, doors, self._config.method)
 
     def _seen_doors(self, doors: Sequence[ClosedDoor], setting: Setting, repetition: int) -> list[ClosedDoor]:
         return disturbed_doors(

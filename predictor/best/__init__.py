@@ -1,1 +1,1 @@
-"""The preset ``best``: rectangles between wall faces, chosen jointly by their evidence."""
+"""The method ``best``: rectangles between wall faces, chosen jointly by their evidence."""

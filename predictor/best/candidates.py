@@ -1,4 +1,4 @@
-"""Rectangles that a hidden room could fill, and the evidence for each of their sides (preset ``best``)."""
+"""Rectangles that a hidden room could fill, and the evidence for each of their sides (method ``best``)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The map seen from a closed door: ``u`` along the wall to the right, ``v`` into the hidden room (preset ``best``)."""
+"""The map seen from a closed door: ``u`` along the wall to the right, ``v`` into the hidden room (method ``best``)."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""From a door to the frame in which its room is looked for (preset ``best``)."""
+"""From a door to the frame in which its room is looked for (method ``best``)."""
 
 import math
 from collections.abc import Sequence

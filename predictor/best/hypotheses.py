@@ -1,4 +1,4 @@
-"""From doors to the rectangles that their rooms may fill, scored by themselves (preset ``best``)."""
+"""From doors to the rectangles that their rooms may fill, scored by themselves (method ``best``)."""
 
 import itertools
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The preset ``best``: rooms as rectangles between wall faces, by the evidence for their sides, chosen jointly.
+"""The method ``best``: rooms as rectangles between wall faces, by the evidence for their sides, chosen jointly.
 
 Still purely geometric. For each door, in the frame of its wall: candidate sides from walls that are seen from their
 other side, walls that continue, the middle between doors, and the sizes of observed rooms; every rectangle of such
@@ -22,7 +22,7 @@ from closedrooms.predictor.best.room_shape import room_shape
 from closedrooms.predictor.best.selection import Suspect, choose
 from closedrooms.predictor.best.shared_rooms import merge
 from closedrooms.predictor.best.wall_thickness import wall_thickness
-from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.config import BestConfig
 from closedrooms.predictor.inpainting import inpaint, passage
 from closedrooms.predictor.paper.initial_layouts import unusable
 from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
@@ -38,16 +38,13 @@ RESOLUTION = 0.05
 MARGIN = 1.0
 
 
-def predict_best(
-    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PredictorConfig, trace: bool | None = None
-) -> Prediction:
+def predict_best(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: BestConfig) -> Prediction:
     """Predict the rooms behind closed doors as well as we can.
 
     Args:
         grid: The map, of any resolution and size.
         doors: Closed doors in the frame of the map.
-        config: Door width, door reach and what counts as the same door; the rest belongs to the preset ``paper``.
-        trace: Keep the rectangles by themselves and together as two levels; ``None`` leaves it to the config.
+        config: Settings.
 
     Returns:
         The completed map on the lattice of the input, rooms in the order of the doors, failures by door id.
@@ -106,14 +103,13 @@ def predict_best(
             if not cleared.is_empty:
                 passages.append(cleared)
     completed = inpaint(grid, [room.polygon for room in rooms], passages)
-    wanted = config.keep_trace if trace is None else trace
-    record = _trace(facings, suspects.alone, rooms) if wanted else None
+    record = _trace(facings, suspects.alone, rooms) if config.keep_trace else None
     ordered = {door.id: failures[door.id] for door in doors if door.id in failures}
     return Prediction(completed, tuple(rooms), ordered, record)
 
 
 def _face_all(
-    grid: OccupancyGrid, doors: Sequence[ClosedDoor], directions: WallDirections, config: PredictorConfig
+    grid: OccupancyGrid, doors: Sequence[ClosedDoor], directions: WallDirections, config: BestConfig
 ) -> tuple[dict[float, TurnedMap], list[Facing], dict[str, str]]:
     """Maps turned along each direction in use, the doors in them, and the doors that face nothing."""
     turned = {float(directions.angles[0]): turn_map(grid, float(directions.angles[0]), margin=MARGIN)}

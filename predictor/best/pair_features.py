@@ -1,4 +1,4 @@
-"""What two rooms say about each other: they do not overlap, share a wall, and end in one line (preset ``best``)."""
+"""What two rooms say about each other: they do not overlap, share a wall, and end in one line (method ``best``)."""
 
 import numpy as np
 

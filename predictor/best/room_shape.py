@@ -1,4 +1,4 @@
-"""What known space leaves of a rectangle (preset ``best``)."""
+"""What known space leaves of a rectangle (method ``best``)."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""All rooms of a map chosen together: each by its own evidence, no two at odds (preset ``best``)."""
+"""All rooms of a map chosen together: each by its own evidence, no two at odds (method ``best``)."""
 
 import itertools
 from dataclasses import dataclass

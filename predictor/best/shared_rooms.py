@@ -1,4 +1,4 @@
-"""Two closed doors of one wall that lead to one room: decided by score (preset ``best``)."""
+"""Two closed doors of one wall that lead to one room: decided by score (method ``best``)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

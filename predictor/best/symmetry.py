@@ -1,4 +1,4 @@
-"""Buildings of two equal halves: what is hidden in one may have been seen in the other (preset ``best``)."""
+"""Buildings of two equal halves: what is hidden in one may have been seen in the other (method ``best``)."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""How thick the walls of a map are (preset ``best``)."""
+"""How thick the walls of a map are (method ``best``)."""
 
 from dataclasses import dataclass
 

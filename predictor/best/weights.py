@@ -1,4 +1,4 @@
-"""What each kind of evidence counts in the preset ``best``: the few constants that it holds.
+"""What each kind of evidence counts in the method ``best``: the few constants that it holds.
 
 Found on 182 rooms of 29 of the authors' maps (those with 2, 5, 8, 11 and 14 closed doors, 8 buildings), 100 rooms of
 the 20 bundled worlds (five closed doors each, noise medium) and 54 rooms of ideal maps of 6 other real floor plans: the

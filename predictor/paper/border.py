@@ -7,7 +7,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from closedrooms.core.arrays import FloatArray
-from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.config import PaperConfig
 from closedrooms.predictor.paper.expansion import Growth
 
 
@@ -36,7 +36,7 @@ class BorderRoom:
         return shapely.geometry.polygon.orient(ring)
 
 
-def border_rooms(growth: Growth, config: PredictorConfig) -> dict[int, BorderRoom]:
+def border_rooms(growth: Growth, config: PaperConfig) -> dict[int, BorderRoom]:
     """Rooms of border faces, by number: squares of the size of the door's edge.
 
     Where the boundary cuts the door's edge, its length says nothing: the square takes the size of the other side of

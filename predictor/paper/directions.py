@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
-from closedrooms.predictor.config import StructureConfig
+from closedrooms.predictor.config import DirectionsConfig
 from closedrooms.predictor.paper.segments import angles_of, lengths_of
 
 # What lies in a direction [rad]: three steps of the Hough transform.
@@ -32,7 +32,7 @@ def angle_between(a: FloatArray | float, b: FloatArray | float) -> FloatArray:
     return np.asarray((np.asarray(a) - b + np.pi / 2) % np.pi - np.pi / 2)
 
 
-def find_directions(segments: FloatArray, config: StructureConfig) -> Directions:
+def find_directions(segments: FloatArray, config: DirectionsConfig, *, bandwidth: float) -> Directions:
     """Cluster segments by direction; any direction may occur, and 0 and 180 degrees are the same.
 
     Mean shift with a flat kernel, weighted by squared length: the direction of a segment of few cells says little.
@@ -40,23 +40,25 @@ def find_directions(segments: FloatArray, config: StructureConfig) -> Directions
 
     Args:
         segments: Ends [m], shape (n, 4).
-        config: Kernel and thresholds.
+        config: Thresholds.
+        bandwidth: Half width of the kernel [rad].
     """
     angles, lengths = angles_of(segments), lengths_of(segments)
     weights = lengths**2
-    modes = _modes(angles, weights, config.angle_bandwidth)
+    modes = _modes(angles, weights, bandwidth)
     if modes.size == 0:
         return Directions(np.zeros(0), np.zeros(0), np.full(len(segments), -1, dtype=np.int64))
     apart = np.abs(angle_between(angles[:, None], modes[None, :]))  # (n, modes)
     nearest = apart.argmin(axis=1)
-    member = apart[np.arange(len(angles)), nearest] <= config.angle_bandwidth
-    long = member & (lengths >= config.direction_segment)
+    member = apart[np.arange(len(angles)), nearest] <= bandwidth
+    long = member & (lengths >= config.min_segment)
     carried = np.bincount(nearest[long], weights=lengths[long], minlength=modes.size)
-    needed = max(config.min_direction_length, config.min_direction_share * float(carried.max(initial=0.0)))
+    needed = max(config.min_length, config.min_share * float(carried.max(initial=0.0)))
     strengths = np.zeros(modes.size)
     np.add.at(strengths, nearest[member], lengths[member])
     centres = np.array([_refine(angles, weights, float(mode)) for mode in modes])
-    straight = _concentration(angles, lengths, centres, config) >= config.min_concentration
+    long_only = lengths >= config.min_segment
+    straight = _concentration(angles[long_only], lengths[long_only], centres, bandwidth) >= config.min_concentration
     kept = [int(i) for i in np.lexsort((modes, -strengths)) if carried[i] >= needed and straight[i]]
     labels = np.full(len(segments), -1, dtype=np.int64)
     for cluster, mode in enumerate(kept):
@@ -64,12 +66,11 @@ def find_directions(segments: FloatArray, config: StructureConfig) -> Directions
     return Directions(centres[kept] % np.pi, strengths[kept], labels)
 
 
-def _concentration(angles: FloatArray, lengths: FloatArray, centres: FloatArray, config: StructureConfig) -> FloatArray:
+def _concentration(angles: FloatArray, lengths: FloatArray, centres: FloatArray, bandwidth: float) -> FloatArray:
     """Share of the longer segments around each direction that lies in it, shape (k,)."""
-    long = lengths >= config.direction_segment
-    apart = np.abs(angle_between(angles[long][:, None], centres[None, :]))  # (long, k)
-    within = lengths[long] @ (apart <= NARROW)
-    around = lengths[long] @ (apart <= config.angle_bandwidth)
+    apart = np.abs(angle_between(angles[:, None], centres[None, :]))  # (n, k)
+    within = lengths @ (apart <= NARROW)
+    around = lengths @ (apart <= bandwidth)
     return np.asarray(within / np.maximum(around, 1e-12), dtype=np.float64)
 
 

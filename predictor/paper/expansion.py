@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
-from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.config import PaperConfig
 from closedrooms.predictor.paper.arrangement import Arrangement
 from closedrooms.predictor.paper.initial_faces import Entrance, along_edge
 from closedrooms.predictor.paper.layout_score import FaceSet, evaluate, face_set
@@ -81,7 +81,7 @@ class Growth:
         return face_set(self.arrangement, faces, returnable, self.free, self.along(room))
 
 
-def expand(growth: Growth, config: PredictorConfig, report: Callable[[int], None] = lambda _level: None) -> None:
+def expand(growth: Growth, config: PaperConfig, report: Callable[[int], None] = lambda _level: None) -> None:
     """Grow all rooms jointly until nothing improves or ``max_level`` is reached.
 
     At each level the rooms take their turn from the smallest to the largest set of candidates (or as
@@ -106,7 +106,7 @@ def expand(growth: Growth, config: PredictorConfig, report: Callable[[int], None
             break
 
 
-def _turn(growth: Growth, room: int, config: PredictorConfig) -> tuple[float, ...]:
+def _turn(growth: Growth, room: int, config: PaperConfig) -> tuple[float, ...]:
     """Order within a level: fewest candidates first; ties by their area, the layout's, then by position."""
     if config.room_order == "by-position":
         return growth.position(room)
@@ -119,7 +119,7 @@ def _turn(growth: Growth, room: int, config: PredictorConfig) -> tuple[float, ..
     )
 
 
-def _grow(growth: Growth, room: int, config: PredictorConfig) -> bool:
+def _grow(growth: Growth, room: int, config: PaperConfig) -> bool:
     """One turn of one room; whether its layout changed."""
     candidates, layout = growth.candidates(room), growth.layout(room)
     faces = np.concatenate((layout, candidates))
@@ -142,7 +142,7 @@ def _grow(growth: Growth, room: int, config: PredictorConfig) -> bool:
     return bool(found.chosen.sum() > layout.size)
 
 
-def _score(growth: Growth, room: int, config: PredictorConfig) -> None:
+def _score(growth: Growth, room: int, config: PaperConfig) -> None:
     """Value of a room's layout as it is."""
     layout = growth.layout(room)
     pool = growth.face_set(room, layout, np.zeros(layout.size, dtype=np.bool_))

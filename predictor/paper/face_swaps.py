@@ -3,13 +3,13 @@
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
-from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.config import PaperConfig
 from closedrooms.predictor.paper.expansion import Growth
 from closedrooms.predictor.paper.layout_score import FaceSet, free_faces_penalty
 from closedrooms.predictor.paper.subsets import TIE
 
 
-def swap_faces(growth: Growth, config: PredictorConfig) -> None:
+def swap_faces(growth: Growth, config: PaperConfig) -> None:
     """Go over all pairs of adjacent dependent rooms once, in an order that depends on where they are only.
 
     Args:
@@ -37,7 +37,7 @@ def _position(growth: Growth, pair: tuple[int, int]) -> tuple[float, ...]:
     return (round(total, 6), *first, *second)
 
 
-def _swap(growth: Growth, a: int, b: int, config: PredictorConfig) -> None:
+def _swap(growth: Growth, a: int, b: int, config: PaperConfig) -> None:
     """Give every face on the common wall to the room with which ``Phi_joint`` is largest."""
     exchanged = _exchangeable(growth, a, b)
     if exchanged.size == 0:
@@ -77,7 +77,7 @@ def _exchangeable(growth: Growth, a: int, b: int) -> IntArray:
     return np.array(sorted(found), dtype=np.int64)
 
 
-def _joint(areas: FloatArray, to_a: BoolArray, pool: FaceSet, config: PredictorConfig) -> FloatArray:
+def _joint(areas: FloatArray, to_a: BoolArray, pool: FaceSet, config: PaperConfig) -> FloatArray:
     """``Phi_joint`` of each assignment, shape (k,)."""
     area_a, area_b = to_a @ areas, ~to_a @ areas
     similar = np.sqrt(np.minimum(area_a, area_b) / np.maximum(area_a, area_b))

@@ -5,7 +5,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from closedrooms.core.room import Room, RoomKind
-from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.config import PaperConfig
 from closedrooms.predictor.inpainting import passage
 from closedrooms.predictor.paper.arrangement import joined
 from closedrooms.predictor.paper.border import border_rooms
@@ -16,7 +16,7 @@ from closedrooms.predictor.structure.doorways import DoorInWall, find_doorways
 from closedrooms.predictor.structure.wall_thickness import free_interior, measure_thickness
 
 
-def finish_rooms(start: Start, growth: Growth, config: PredictorConfig) -> tuple[tuple[Room, ...], list[Shape]]:
+def finish_rooms(start: Start, growth: Growth, config: PaperConfig) -> tuple[tuple[Room, ...], list[Shape]]:
     """Polygons of the grown layouts and of the border rooms, and the passages at their doors.
 
     Args:

@@ -10,7 +10,7 @@ from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.config import FacesConfig
 from closedrooms.predictor.paper.arrangement import Arrangement, arrange
 from closedrooms.predictor.paper.initial_faces import Entrance, along_edge, find_entrance, splits_between
 from closedrooms.predictor.paper.unknown_faces import unknown_faces
@@ -55,7 +55,7 @@ class Start:
 Started = tuple[Start | None, dict[str, str]]
 
 
-def start_rooms(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PredictorConfig) -> Started:
+def start_rooms(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesConfig) -> Started:
     """Structure, faces and initial faces of a map: the same for every method with the same structure.
 
     Args:
@@ -95,7 +95,7 @@ def start_rooms(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: Predic
 
 
 def _split_until_apart(
-    grid: OccupancyGrid, structure: WallLines, doors: Sequence[ClosedDoor], config: PredictorConfig
+    grid: OccupancyGrid, structure: WallLines, doors: Sequence[ClosedDoor], config: FacesConfig
 ) -> tuple[Arrangement, BoolArray, dict[str, Entrance | str]]:
     """Split edges until no two doors share an initial face; each round adds a line, so that it ends."""
     lines = list(structure.lines)

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from closedrooms.core.arrays import FloatArray, IntArray
-from closedrooms.predictor.config import StructureConfig
+from closedrooms.predictor.config import LinesConfig
 from closedrooms.predictor.paper.directions import Directions, angle_between
 
 LineKind = Literal["wall", "border", "split"]
@@ -43,9 +43,7 @@ class Line:
         return np.asarray(points @ self.normal - self.offset)
 
 
-def find_lines(
-    segments: FloatArray, directions: Directions, config: StructureConfig
-) -> tuple[tuple[Line, ...], IntArray]:
+def find_lines(segments: FloatArray, directions: Directions, config: LinesConfig) -> tuple[tuple[Line, ...], IntArray]:
     """Cluster collinear segments of each direction and represent each cluster by a line.
 
     Segments closer than ``collinear_distance`` chain into one wall, whose line lies at the median offset; walls
@@ -157,7 +155,7 @@ def _median(values: FloatArray, weights: FloatArray) -> float:
     return float((values[min(low, high)] + values[high]) / 2.0)
 
 
-def boundary_lines(segments: FloatArray, directions: Directions, config: StructureConfig) -> tuple[Line, ...]:
+def boundary_lines(segments: FloatArray, directions: Directions, config: LinesConfig) -> tuple[Line, ...]:
     """Four lines around all segments, at ``border_margin``, along the two strongest directions.
 
     Where the second direction is within twice the kernel of the first, or missing, the perpendicular of the first

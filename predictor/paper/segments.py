@@ -4,10 +4,10 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.predictor.config import StructureConfig
+from closedrooms.predictor.config import LinesConfig
 
 
-def find_segments(grid: OccupancyGrid, config: StructureConfig) -> FloatArray:
+def find_segments(grid: OccupancyGrid, config: LinesConfig) -> FloatArray:
     """Straight pieces of wall.
 
     Canny edge detection, then the progressive probabilistic Hough transform, on a picture with occupied cells black

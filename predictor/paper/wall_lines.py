@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from closedrooms.core.arrays import FloatArray, IntArray, handed_over
 from closedrooms.core.grid import FREE, OCCUPIED, OccupancyGrid
-from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.config import FacesConfig
 from closedrooms.predictor.paper.directions import find_directions
 from closedrooms.predictor.paper.lines import Line, boundary_lines, find_lines
 from closedrooms.predictor.paper.segments import find_segments
@@ -30,17 +30,17 @@ class WallLines:
     angles: FloatArray
 
 
-def find_structure(grid: OccupancyGrid, config: PredictorConfig) -> WallLines | None:
-    """Segments, directions and lines of a map (section 3.1, or 4.2 with ``structure="rose"``).
+def find_structure(grid: OccupancyGrid, config: FacesConfig) -> WallLines | None:
+    """Segments, directions and lines of a map (section 3.1, or 4.2 where there is nothing to find directions with).
 
     Args:
         grid: The map at the working resolution, cropped to what is known with unknown cells around it.
-        config: ``structure`` and ``lines``.
+        config: ``lines`` and ``directions``; without the latter ROSE finds walls and directions.
 
     Returns:
         ``None`` without any line.
     """
-    if config.structure == "rose":
+    if config.directions is None:
         rose = find_rose(grid)
         if rose is None:
             return None
@@ -51,7 +51,7 @@ def find_structure(grid: OccupancyGrid, config: PredictorConfig) -> WallLines | 
         directions = rose_directions(segments, rose, config.lines)
     else:
         segments = find_segments(grid, config.lines)
-        directions = find_directions(segments, config.lines)
+        directions = find_directions(segments, config.directions, bandwidth=config.lines.angle_bandwidth)
     lines, clusters = find_lines(segments, directions, config.lines)
     if not lines:
         return None

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.predictor.config import StructureConfig
+from closedrooms.predictor.config import LinesConfig
 from closedrooms.predictor.paper.directions import Directions, angle_between
 from closedrooms.predictor.paper.segments import angles_of, lengths_of
 
@@ -121,7 +121,7 @@ def _between(profile: FloatArray, peak: int) -> float:
     return peak if curve >= 0.0 else peak + 0.5 * (left - right) / curve
 
 
-def rose_directions(segments: FloatArray, structure: RoseStructure, config: StructureConfig) -> Directions:
+def rose_directions(segments: FloatArray, structure: RoseStructure, config: LinesConfig) -> Directions:
     """Give each segment the dominant direction that it follows (section 4.2: lines are aligned to them).
 
     Args:

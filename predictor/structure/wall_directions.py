@@ -1,4 +1,4 @@
-"""Directions of the walls of a map, modulo a right angle, and of the wall around each door (preset ``best``)."""
+"""Directions of the walls of a map, modulo a right angle, and of the wall around each door (method ``best``)."""
 
 import math
 from dataclasses import dataclass

@@ -99,9 +99,9 @@ def test_doors_far_off_in_free_space_and_twice_the_same_are_named_and_the_others
         geometry = {"type": "Point", "coordinates": place}
         content["features"].append({"type": "Feature", "properties": {"id": name}, "geometry": geometry})
     (corridor / "doors.geojson").write_text(json.dumps(content))
-    for preset in ("paper", "best"):
-        out = corridor / preset
-        words = ("predict", corridor / "map.yaml", "--doors", corridor / "doors.geojson", "--preset", preset)
+    for method in ("paper", "best"):
+        out = corridor / method
+        words = ("predict", corridor / "map.yaml", "--doors", corridor / "doors.geojson", "--method", method)
         assert call(*words, "--out", out) == 3
         said = capsys.readouterr()
         assert "1 of 5 doors predicted" in said.out
@@ -123,9 +123,9 @@ def test_doors_far_off_in_free_space_and_twice_the_same_are_named_and_the_others
         ({"resolution": "90.0"}, "in cells of 90 m; expected at most "),
     ],
 )
-@pytest.mark.parametrize("preset", ["paper", "best"])
+@pytest.mark.parametrize("method", ["paper", "best"])
 def test_a_map_that_cannot_be_used_is_one_line_and_leaves_nothing(
-    corridor: Path, preset: str, change: dict[str, str], message: str, capsys: pytest.CaptureFixture[str]
+    corridor: Path, method: str, change: dict[str, str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (corridor / "absurd.pgm").write_bytes(b"P5\n200000 200000\n255\n\0")
     (corridor / "short.pgm").write_bytes(b"P5\n400 400\n255\n\0")
@@ -133,7 +133,7 @@ def test_a_map_that_cannot_be_used_is_one_line_and_leaves_nothing(
     fields = {key: value.strip() for key, value in lines} | change
     (corridor / "map.yaml").write_text("\n".join(f"{key}: {value}" for key, value in fields.items()))
     out = corridor / "out"
-    words = ("predict", corridor / "map.yaml", "--doors", corridor / "doors.geojson", "--preset", preset)
+    words = ("predict", corridor / "map.yaml", "--doors", corridor / "doors.geojson", "--method", method)
     assert call(*words, "--out", out) == 1
     line = one_line(capsys)
     assert message in line
@@ -141,29 +141,29 @@ def test_a_map_that_cannot_be_used_is_one_line_and_leaves_nothing(
     assert not out.exists()
 
 
-@pytest.mark.parametrize("preset", ["paper", "best"])
+@pytest.mark.parametrize("method", ["paper", "best"])
 @pytest.mark.parametrize("fill", [UNKNOWN, FREE, OCCUPIED])
 def test_a_map_of_one_kind_is_written_as_it_is_with_the_reason_for_every_door(
-    tmp_path: Path, corridor: Path, preset: str, fill: int
+    tmp_path: Path, corridor: Path, method: str, fill: int
 ) -> None:
     frame = GridFrame(0.05, 0.0, -3.0, 200, 200)
     write_map(tmp_path / "plain", OccupancyGrid(frame, np.full(frame.shape, fill, dtype=np.int8)))
     out = tmp_path / "out"
-    words = ("predict", tmp_path / "plain.yaml", "--doors", corridor / "doors.geojson", "--preset", preset)
+    words = ("predict", tmp_path / "plain.yaml", "--doors", corridor / "doors.geojson", "--method", method)
     assert call(*words, "--out", out) == 3
     assert set(json.loads((out / "run.json").read_text())["doors"]["failures"]) == {"d1"}
     assert (read_map(out / "predicted.yaml").cells == fill).all()
 
 
-@pytest.mark.parametrize("preset", ["paper", "best"])
+@pytest.mark.parametrize("method", ["paper", "best"])
 @pytest.mark.parametrize("resolution", [1e-12, 1e-4])
 def test_a_map_in_a_wrong_unit_is_written_as_it_is_with_the_reason_for_every_door(
-    corridor: Path, preset: str, resolution: float
+    corridor: Path, method: str, resolution: float
 ) -> None:
     text = (corridor / "map.yaml").read_text().replace("resolution: 0.05", f"resolution: {resolution:.13f}")
     (corridor / "map.yaml").write_text(text)
     out = corridor / "out"
-    words = ("predict", corridor / "map.yaml", "--doors", corridor / "doors.geojson", "--preset", preset)
+    words = ("predict", corridor / "map.yaml", "--doors", corridor / "doors.geojson", "--method", method)
     assert call(*words, "--out", out) == 3
     assert set(json.loads((out / "run.json").read_text())["doors"]["failures"]) == {"d1"}
 

@@ -229,7 +229,7 @@ def test_a_sweep_tells_where_the_prediction_suffers_and_goes_on_where_it_stopped
         "2",
         "--closed",
         "3",
-        "--preset",
+        "--method",
         "paper",
         "--no-tours",
         "--workers",

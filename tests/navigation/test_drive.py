@@ -1,4 +1,5 @@
 import itertools
+from functools import partial
 
 import numpy as np
 import pytest
@@ -33,8 +34,7 @@ def test_the_tour_of_a_small_office_is_driven_and_every_room_is_seen() -> None:
     from closedrooms.navigation.drive import drive
     from closedrooms.navigation.exploration import explore
     from closedrooms.pipeline.drive_report import drive_metrics
-    from closedrooms.predictor.config import PredictorConfig
-    from closedrooms.predictor.predict import predict
+    from closedrooms.predictor.methods import predict
     from closedrooms.sim.config import SimConfig
     from closedrooms.sim.simulation import Simulation
     from closedrooms.worlds.closing import draw_closed
@@ -43,11 +43,11 @@ def test_the_tour_of_a_small_office_is_driven_and_every_room_is_seen() -> None:
 
     plan = load_world("office-01")
     closed = draw_closed(plan, 2, stream(0, "closed doors"))
-    predictor, coverage, navigation = PredictorConfig(), CoverageConfig(), NavigationConfig()
+    predictor, coverage, navigation = partial(predict, method="paper"), CoverageConfig(), NavigationConfig()
     with Simulation(plan, closed, SimConfig(), 0) as sim:
         mapper = Mapper(MapperConfig())
         assert explore(sim, mapper, navigation).status == "complete"
-        prediction = predict(mapper.grid(), mapper.doors(), predictor)
+        prediction = predictor(mapper.grid(), mapper.doors())
         tour = plan_coverage(prediction.grid, (), coverage, start=(mapper.pose.x, mapper.pose.y))
         result = drive(
             sim, mapper, prediction, tour, mapper.doors(), navigation,

@@ -20,8 +20,8 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.drive import DriveResult, drive
-from closedrooms.predictor.config import PredictorConfig
 from closedrooms.predictor.inpainting import inpaint
+from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction
 
 RESOLUTION, BEAMS, RANGE, RADIUS = 0.05, 240, 8.0, 0.2
@@ -101,7 +101,7 @@ def _driven(world: CellWorld, predicted: Polygon) -> tuple[DriveResult, Predicti
     assert tour.path[:, 1].max() > 2.0  # it leads into the room
     result = drive(
         world, mapper, prediction, tour, [DOOR], NavigationConfig(time_limit=300.0),
-        closed=["d00"], predictor=PredictorConfig(), coverage=CoverageConfig(),
+        closed=["d00"], predictor=predict, coverage=CoverageConfig(),
     )  # fmt: skip
     return result, prediction
 

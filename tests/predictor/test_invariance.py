@@ -1,7 +1,6 @@
 """The answer moves with the map: exactly where the raster moves exactly, else within a tolerance."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,16 +11,12 @@ from shapely import affinity
 import closedrooms.predictor.paper.wall_lines as structure_module
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame, OccupancyGrid
-from closedrooms.predictor.config import preset
+from closedrooms.predictor.config import LinesConfig
+from closedrooms.predictor.methods import predict
 from closedrooms.predictor.paper.segments import find_segments
-from closedrooms.predictor.predict import predict
 from closedrooms.predictor.structure.rose import RoseStructure, find_rose
 
-METHODS = {
-    "paper": preset("paper"),
-    "rose": replace(preset("paper"), structure="rose"),
-    "best": preset("best"),
-}
+METHODS = ("paper", "rose", "best")
 NAMES = [f"{side}{i}" for side in "tb" for i in range(5)]
 # x' = a x + b y + tx, y' = c x + d y + ty, as shapely takes it: a, b, c, d, tx, ty.
 MOVES = {
@@ -31,8 +26,8 @@ MOVES = {
 }
 
 
-def _rooms(scene_grid, doors, config):
-    prediction = predict(scene_grid, doors, config)
+def _rooms(scene_grid, doors, method):
+    prediction = predict(scene_grid, doors, method)
     assert prediction.failures == {}
     return {room.doors: room for room in prediction.rooms}
 
@@ -69,9 +64,9 @@ def _same(before, after, how):
 @given(st.sets(st.sampled_from(NAMES), min_size=1, max_size=6), st.sampled_from([*MOVES, "reordered"]))
 @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_from_given_segments_and_directions_on_rose_moves_exactly_with_the_map(mapped, monkeypatch, closed, how):
-    scene, config = mapped(closed=tuple(sorted(closed))), METHODS["rose"]
+    scene = mapped(closed=tuple(sorted(closed)))
     rose = find_rose(scene.grid)
-    segments = find_segments(scene.grid, config.lines)
+    segments = find_segments(scene.grid, LinesConfig())
     if how == "reordered":
         grid, doors, ends, turned = scene.grid, scene.doors[::-1], segments[::-1], rose
     else:
@@ -93,7 +88,7 @@ def test_from_given_segments_and_directions_on_rose_moves_exactly_with_the_map(m
                 "find_rose",
                 lambda grid, kept=given_rose: RoseStructure(kept.angles, grid.occupied),
             )
-            found.append(_rooms(at, these, config))
+            found.append(_rooms(at, these, "rose"))
     _same(*found, how)
 
 
@@ -101,11 +96,11 @@ def test_from_given_segments_and_directions_on_rose_moves_exactly_with_the_map(m
 @pytest.mark.parametrize("closed", [("t1", "t2", "b0", "b1", "b3")])
 def test_best_moves_with_the_map_to_a_cell(mapped, iou, closed, how):
     scene = mapped(closed=closed)
-    before = _rooms(scene.grid, scene.doors, METHODS["best"])
+    before = _rooms(scene.grid, scene.doors, "best")
     if how == "reordered":
-        after = _rooms(scene.grid, scene.doors[::-1], METHODS["best"])
+        after = _rooms(scene.grid, scene.doors[::-1], "best")
     else:
-        after = _rooms(_moved_grid(scene.grid, how), _moved_doors(scene.doors, how), METHODS["best"])
+        after = _rooms(_moved_grid(scene.grid, how), _moved_doors(scene.doors, how), "best")
     if how in {"reordered", "shifted"}:
         _same(before, after, how)
         return
@@ -118,8 +113,8 @@ def test_best_moves_with_the_map_to_a_cell(mapped, iou, closed, how):
 @pytest.mark.parametrize("degrees", [30, -75])
 def test_rotating_a_building_rotates_the_answer(mapped, iou, method, degrees):
     scene, turned = mapped(), mapped(angle=math.radians(degrees))
-    upright = _rooms(scene.grid, scene.doors, METHODS[method])
-    for name, room in _rooms(turned.grid, turned.doors, METHODS[method]).items():
+    upright = _rooms(scene.grid, scene.doors, method)
+    for name, room in _rooms(turned.grid, turned.doors, method).items():
         assert iou(room.polygon, affinity.rotate(upright[name].polygon, degrees, origin=(0, 0))) > 0.85
 
 
@@ -127,7 +122,7 @@ def test_rotating_a_building_rotates_the_answer(mapped, iou, method, degrees):
 @pytest.mark.parametrize(("slant", "degrees"), [(20, 0), (20, 30), (30, 30)])
 def test_a_slanted_wing_is_predicted_like_the_rest_at_any_angle(winged, iou, method, slant, degrees):
     scene = winged(slant=slant, angle=math.radians(degrees))
-    rooms = _rooms(scene.grid, scene.doors, METHODS[method])
+    rooms = _rooms(scene.grid, scene.doors, method)
     figures = [iou(rooms[(name,)].polygon, truth) for name, truth in scene.hidden.items()]
     # Lines of the one wing cross the other: rooms that are put together of faces may end at one of them.
     assert sorted(figures)[1] > 0.85
@@ -138,8 +133,8 @@ def test_a_slanted_wing_is_predicted_like_the_rest_at_any_angle(winged, iou, met
 @pytest.mark.parametrize("resolution", [0.025, 0.03, 0.04, 0.08, 0.1])
 def test_a_map_of_other_cells_gives_the_same_rooms(mapped, iou, method, resolution):
     usual, other = mapped(), mapped(resolution=resolution)
-    before = _rooms(usual.grid, usual.doors, METHODS[method])
-    prediction = predict(other.grid, other.doors, METHODS[method])
+    before = _rooms(usual.grid, usual.doors, method)
+    prediction = predict(other.grid, other.doors, method)
     assert prediction.grid.frame.resolution == resolution
     assert len(prediction.rooms) == len(before)
     for room in prediction.rooms:

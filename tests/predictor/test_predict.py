@@ -1,6 +1,5 @@
 import itertools
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,19 +14,17 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.geojson import read_doors
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.rosmap import read_map
-from closedrooms.predictor.baselines import geometric, line_of_sight
-from closedrooms.predictor.config import preset
+from closedrooms.predictor.config import LinesConfig, PaperConfig, RoseConfig
+from closedrooms.predictor.methods import METHODS, predict
 from closedrooms.predictor.paper.segments import find_segments
-from closedrooms.predictor.predict import predict
 
-PAPER = preset("paper")
 AUTHORS = Path(__file__).parents[2].parent / "shared" / "data" / "authors"
 NAMES = [f"{side}{i}" for side in "tb" for i in range(5)]
 
 
 def test_closed_rooms_come_back_with_the_id_of_their_door(mapped, iou):
     scene = mapped()
-    prediction = predict(scene.grid, scene.doors, PAPER)
+    prediction = predict(scene.grid, scene.doors, "paper")
     assert prediction.failures == {}
     assert [room.doors for room in prediction.rooms] == [(door.id,) for door in scene.doors]
     for room in prediction.rooms:
@@ -38,8 +35,8 @@ def test_closed_rooms_come_back_with_the_id_of_their_door(mapped, iou):
 @pytest.mark.parametrize("degrees", [15, 30, 45, 77, 90])
 def test_rotating_the_map_rotates_the_answer(mapped, iou, degrees):
     scene = mapped(angle=math.radians(degrees))
-    prediction = predict(scene.grid, scene.doors, PAPER)
-    upright = {r.doors[0]: r for r in predict(mapped().grid, mapped().doors, PAPER).rooms}
+    prediction = predict(scene.grid, scene.doors, "paper")
+    upright = {r.doors[0]: r for r in predict(mapped().grid, mapped().doors, "paper").rooms}
     assert len(prediction.rooms) == 3
     for room in prediction.rooms:
         turned = affinity.rotate(upright[room.doors[0]].polygon, degrees, origin=(0, 0))
@@ -49,18 +46,18 @@ def test_rotating_the_map_rotates_the_answer(mapped, iou, degrees):
 @pytest.mark.parametrize("resolution", [0.025, 0.03, 0.04, 0.08, 0.1])
 def test_another_resolution_gives_the_same_rooms(mapped, iou, resolution):
     scene = mapped(resolution=resolution)
-    prediction = predict(scene.grid, scene.doors, PAPER)
+    prediction = predict(scene.grid, scene.doors, "paper")
     assert prediction.grid.frame.resolution == resolution
     for room in prediction.rooms:
         assert iou(room.polygon, scene.hidden[room.doors[0]]) > 0.9
 
 
 @pytest.mark.parametrize("phi", ["as-run", "as-printed"])
-@pytest.mark.parametrize("structure", ["hough", "rose"])
-def test_every_variant_predicts_a_plain_gap(mapped, iou, phi, structure):
+@pytest.mark.parametrize("method", ["paper", "rose"])
+def test_every_variant_predicts_a_plain_gap(mapped, iou, phi, method):
     scene = mapped(closed=("t2",))
-    config = PAPER.__class__(phi=phi, structure=structure)
-    prediction = predict(scene.grid, scene.doors, config)
+    config = {"paper": PaperConfig, "rose": RoseConfig}[method](phi=phi)
+    prediction = predict(scene.grid, scene.doors, method, config)
     assert iou(prediction.rooms[0].polygon, scene.hidden["t2"]) > 0.9
 
 
@@ -89,16 +86,16 @@ def _moved(grid, doors, segments, how):
 @settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_from_given_segments_on_the_answer_moves_exactly_with_the_map(mapped, monkeypatch, closed, how):
     scene = mapped(closed=tuple(sorted(closed)))
-    segments = find_segments(scene.grid, PAPER.lines)
+    segments = find_segments(scene.grid, LinesConfig())
     if how == "reordered":
         grid, doors, ends, carry = scene.grid, scene.doors[::-1], segments[::-1], lambda shape: shape
     else:
         grid, doors, ends, carry = _moved(scene.grid, scene.doors, segments, how)
     with monkeypatch.context() as patch:
         patch.setattr(structure_module, "find_segments", lambda *_: segments)
-        before = {room.doors[0]: room for room in predict(scene.grid, scene.doors, PAPER).rooms}
+        before = {room.doors[0]: room for room in predict(scene.grid, scene.doors, "paper").rooms}
         patch.setattr(structure_module, "find_segments", lambda *_: ends)
-        after = {room.doors[0]: room for room in predict(grid, doors, PAPER).rooms}
+        after = {room.doors[0]: room for room in predict(grid, doors, "paper").rooms}
     assert before.keys() == after.keys()
     for name, room in before.items():
         assert after[name].kind == room.kind
@@ -107,14 +104,14 @@ def test_from_given_segments_on_the_answer_moves_exactly_with_the_map(mapped, mo
 
 def test_two_runs_give_the_same_bytes(mapped):
     scene = mapped()
-    one, two = (predict(scene.grid, scene.doors, PAPER, trace=True) for _ in range(2))
+    one, two = (predict(scene.grid, scene.doors, "paper", trace=True) for _ in range(2))
     assert one.grid.cells.tobytes() == two.grid.cells.tobytes()
     assert [r.polygon.wkb for r in one.rooms] == [r.polygon.wkb for r in two.rooms]
 
 
 def test_the_completed_map_keeps_what_was_seen_and_opens_the_doors(mapped):
     scene = mapped()
-    prediction = predict(scene.grid, scene.doors, PAPER)
+    prediction = predict(scene.grid, scene.doors, "paper")
     before, after = scene.grid.on(prediction.grid.frame), prediction.grid
     assert (after.free | ~before.free).all()
     changed = before.occupied & after.free
@@ -135,7 +132,7 @@ def test_a_room_beyond_the_map_grows_the_frame(mapped):
     scene = mapped(closed=("t0", "t1", "t2", "t3", "t4"))
     window = scene.grid.known_bounds()
     tight = scene.grid.on(scene.grid.frame.cropped(*window))
-    prediction = predict(tight, scene.doors, PAPER)
+    prediction = predict(tight, scene.doors, "paper")
     assert {room.kind for room in prediction.rooms} == {"border"}
     frame = prediction.grid.frame
     assert frame.rows > tight.frame.rows
@@ -150,14 +147,14 @@ def test_a_room_beyond_the_map_grows_the_frame(mapped):
 
 def test_rooms_of_one_map_do_not_overlap(mapped):
     scene = mapped(closed=tuple(NAMES[:4] + NAMES[6:]))
-    rooms = predict(scene.grid, scene.doors, PAPER).rooms
+    rooms = predict(scene.grid, scene.doors, "paper").rooms
     for a, b in itertools.combinations(rooms, 2):
         assert a.polygon.intersection(b.polygon).area < 1e-6
 
 
 def test_the_trace_holds_every_stage(mapped):
     scene = mapped()
-    trace = predict(scene.grid, scene.doors, PAPER, trace=True).trace
+    trace = predict(scene.grid, scene.doors, "paper", trace=True).trace
     assert trace.segments.shape == (trace.clusters.size, 4)
     assert len(trace.lines) == len(trace.line_kinds)
     assert trace.clusters.max() < len(trace.lines)
@@ -180,7 +177,7 @@ def test_trouble_with_one_door_leaves_the_others(mapped, iou):
         ClosedDoor("inside", (2.0, 4.5)),
         ClosedDoor("twin", (t1.midpoint[0] + 0.01, t1.midpoint[1])),
     ]
-    prediction = predict(scene.grid, [*strange, *scene.doors], PAPER)
+    prediction = predict(scene.grid, [*strange, *scene.doors], "paper")
     assert set(prediction.failures) == {"far", "free", "inside", "twin"}
     assert "t1" in prediction.failures["twin"]
     assert all(prediction.failures.values())
@@ -192,17 +189,15 @@ def test_trouble_with_one_door_leaves_the_others(mapped, iou):
 def test_two_doors_of_one_id_are_refused_by_every_method(mapped):
     scene = mapped()
     twice = [*scene.doors, ClosedDoor(scene.doors[0].id, (14.0, 7.0))]
-    for method in (predict, line_of_sight, geometric):
+    for method in METHODS:
         with pytest.raises(InvalidInputError, match="two doors with the id 't1'"):
-            method(scene.grid, twice, PAPER)
-    with pytest.raises(InvalidInputError, match="two doors with the id 't1'"):
-        predict(scene.grid, twice, preset("best"))
+            predict(scene.grid, twice, method)
 
 
 @pytest.mark.parametrize("fill", [UNKNOWN, FREE, OCCUPIED])
 def test_a_map_of_one_kind_fails_every_door_with_a_reason(fill):
     grid = OccupancyGrid(GridFrame(0.05, 0, 0, 60, 60), np.full((60, 60), fill, dtype=np.int8))
-    prediction = predict(grid, [ClosedDoor("a", (1.0, 1.0)), ClosedDoor("b", (2.0, 1.0))], PAPER)
+    prediction = predict(grid, [ClosedDoor("a", (1.0, 1.0)), ClosedDoor("b", (2.0, 1.0))], "paper")
     assert prediction.rooms == ()
     assert set(prediction.failures) == {"a", "b"}
     assert prediction.grid is grid
@@ -210,27 +205,23 @@ def test_a_map_of_one_kind_fails_every_door_with_a_reason(fill):
 
 @pytest.mark.parametrize("size", [40, 60, 150, 400])
 @pytest.mark.parametrize("occupied", [0.01, 0.02, 0.1, 0.5])
-@pytest.mark.parametrize(
-    "config", [PAPER, replace(PAPER, structure="rose"), preset("best")], ids=["paper", "rose", "best"]
-)
-def test_noise_without_a_line_fails_with_a_reason(config, size, occupied):
+@pytest.mark.parametrize("method", ["paper", "rose", "best"])
+def test_noise_without_a_line_fails_with_a_reason(method, size, occupied):
     for seed, free in itertools.product(range(3), (0.5, 1.0)):
         dice = np.random.default_rng(seed).random((size, size))
         cells = np.where(dice < occupied, OCCUPIED, np.where(dice < free, FREE, UNKNOWN)).astype(np.int8)
         grid = OccupancyGrid(GridFrame(0.05, 0, 0, size, size), cells)
-        prediction = predict(grid, [ClosedDoor("a", (3.0, 3.0))], config)
+        prediction = predict(grid, [ClosedDoor("a", (3.0, 3.0))], method)
         assert prediction.rooms == ()
         assert "a" in prediction.failures
 
 
-@pytest.mark.parametrize(
-    "config", [PAPER, replace(PAPER, structure="rose"), preset("best")], ids=["paper", "rose", "best"]
-)
-def test_walls_are_found_among_noise(config, mapped, iou):
+@pytest.mark.parametrize("method", ["paper", "rose", "best"])
+def test_walls_are_found_among_noise(method, mapped, iou):
     scene = mapped(closed=("t1", "b3"))
     dice = np.random.default_rng(0).random(scene.grid.cells.shape)
     specks = np.where((dice < 0.02) & scene.grid.free, OCCUPIED, scene.grid.cells).astype(np.int8)
-    prediction = predict(OccupancyGrid(scene.grid.frame, specks), scene.doors, config)
+    prediction = predict(OccupancyGrid(scene.grid.frame, specks), scene.doors, method)
     assert prediction.failures == {}
     for room in prediction.rooms:
         assert iou(room.polygon, scene.hidden[room.doors[0]]) > 0.8
@@ -238,7 +229,7 @@ def test_walls_are_found_among_noise(config, mapped, iou):
 
 def test_no_doors_give_the_map_back(mapped):
     scene = mapped()
-    prediction = predict(scene.grid, [], PAPER)
+    prediction = predict(scene.grid, [], "paper")
     assert prediction.rooms == ()
     assert prediction.grid.cells.tobytes() == scene.grid.cells.tobytes()
 
@@ -247,8 +238,8 @@ def test_a_huge_map_costs_no_more_than_what_is_known(mapped):
     scene = mapped(closed=("t2",))
     frame = scene.grid.frame
     huge = scene.grid.on(frame.cropped(-3000, -3000, 7000, 7000))
-    small = predict(scene.grid, scene.doors, PAPER)
-    large = predict(huge, scene.doors, PAPER)
+    small = predict(scene.grid, scene.doors, "paper")
+    large = predict(huge, scene.doors, "paper")
     assert large.grid.frame.shape == (7000, 7000)
     assert large.rooms[0].polygon.symmetric_difference(small.rooms[0].polygon).area < 1e-6
 
@@ -259,7 +250,7 @@ def test_it_agrees_with_the_authors_program_on_their_maps(environment, closed):
     if not folder.exists():
         pytest.skip("the authors' maps are not beside the checkout")
     grid, theirs = read_map(folder / "map.yaml"), read_map(folder / "authors.yaml")
-    prediction = predict(grid, read_doors(folder / "doors.geojson"), PAPER)
+    prediction = predict(grid, read_doors(folder / "doors.geojson"), "paper")
     unknown = grid.unknown
     ours, other = prediction.grid.on(grid.frame).free & unknown, theirs.on(grid.frame).free & unknown
     assert (ours & other).sum() / (ours | other).sum() > 0.85
@@ -270,6 +261,6 @@ def test_importing_the_predictor_pulls_in_nothing_slow():
     import sys
 
     slow = ("sklearn", "rerun", "cv2", "scipy.signal", "pybullet", "matplotlib")
-    code = f"import sys, closedrooms.predictor.predict as _; print([m for m in {slow} if m in sys.modules])"
+    code = f"import sys, closedrooms.predictor.methods as _; print([m for m in {slow} if m in sys.modules])"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"

@@ -8,14 +8,14 @@ from shapely.geometry import box
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.predictor.baselines import geometric, line_of_sight
-from closedrooms.predictor.config import preset
+from closedrooms.predictor.config import FacesConfig
 from closedrooms.predictor.inpainting import inpaint, passage
-from closedrooms.predictor.predict import predict
+from closedrooms.predictor.methods import predict
 from closedrooms.predictor.structure.clutter import filter_clutter, free_islands
 from closedrooms.predictor.structure.rose import find_rose
 from closedrooms.predictor.structure.wall_thickness import free_interior, measure_thickness
 
-PAPER = preset("paper")
+FACES = FacesConfig()
 
 
 @pytest.mark.parametrize("degrees", [0, 20, 48])
@@ -81,7 +81,7 @@ def test_tables_in_a_known_room_change_nothing_behind_the_doors(mapped, iou, nam
     scene = mapped(closed=("t1", "t3"))
     tables = [((9.2 + x, 3.0 + y), (10.6 + x, 4.0 + y)) for x in (0.0, 1.7) for y in (0.0, 2.0)]
     furnished = _with_boxes(scene.grid, *tables)
-    bare, full = (predict(grid, scene.doors, preset(name)) for grid in (scene.grid, furnished))
+    bare, full = (predict(grid, scene.doors, name) for grid in (scene.grid, furnished))
     for before, after in zip(bare.rooms, full.rooms, strict=True):
         assert iou(before.polygon, after.polygon) > 0.99
     kept = full.grid.on(furnished.frame)
@@ -90,7 +90,7 @@ def test_tables_in_a_known_room_change_nothing_behind_the_doors(mapped, iou, nam
 
 def test_line_of_sight_fills_a_gap_and_ends_at_the_bounds_of_the_map(mapped, iou):
     scene = mapped(closed=("t1", "b3"))
-    prediction = line_of_sight(scene.grid, scene.doors, PAPER)
+    prediction = line_of_sight(scene.grid, scene.doors, FACES)
     row, col, rows, cols = scene.grid.known_bounds()
     x0, y0, x1, y1 = scene.grid.frame.cropped(row, col, rows, cols).bounds
     for room in prediction.rooms:
@@ -100,7 +100,7 @@ def test_line_of_sight_fills_a_gap_and_ends_at_the_bounds_of_the_map(mapped, iou
 
 def test_geometric_takes_the_faces_in_sight(mapped, iou):
     scene = mapped(closed=("t1", "t2"))
-    prediction = geometric(scene.grid, scene.doors, PAPER)
+    prediction = geometric(scene.grid, scene.doors, FACES)
     both = shapely.union_all(list(scene.hidden.values()))
     for room in prediction.rooms:  # nothing parts the two: each sees into the other
         assert iou(room.polygon, both) > 0.8

@@ -1,4 +1,4 @@
-"""The preset best on buildings drawn by hand: gaps, corridors at an angle, bad doors, invariance."""
+"""The method best on buildings drawn by hand: gaps, corridors at an angle, bad doors, invariance."""
 
 import math
 
@@ -11,10 +11,10 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.predictor.best.method import predict_best
-from closedrooms.predictor.config import preset
+from closedrooms.predictor.config import BestConfig
 from closedrooms.predictor.prediction import Prediction
 
-CONFIG = preset("best")
+CONFIG = BestConfig()
 WALL = 0.2
 # Five rooms of 4 x 5 m above a corridor of 2 m and as many below; walls of 0.2 m.
 WIDTH, DEPTH, CORRIDOR = 4.0, 5.0, 2.0
@@ -210,7 +210,7 @@ def test_no_doors_is_no_rooms() -> None:
 
 def test_a_trace_holds_each_room_by_itself_and_together() -> None:
     grid, doors = _building({"d1a", "d2a"})
-    prediction = predict_best(grid, doors, CONFIG, trace=True)
+    prediction = predict_best(grid, doors, BestConfig(keep_trace=True))
     assert prediction.trace is not None
     assert [level.k for level in prediction.trace.levels] == [0, 1]
     assert set(prediction.trace.levels[1].layouts) == {"d1a", "d2a"}

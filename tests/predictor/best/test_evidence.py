@@ -1,4 +1,4 @@
-"""The tables, directions and the joint choice of the preset best, against brute force."""
+"""The tables, directions and the joint choice of the method best, against brute force."""
 
 import itertools
 import math
@@ -18,7 +18,7 @@ from closedrooms.predictor.best.method import predict_best
 from closedrooms.predictor.best.pair_features import PAIR_FEATURES, pair_features
 from closedrooms.predictor.best.selection import Suspect, choose
 from closedrooms.predictor.best.wall_thickness import DEFAULT, WallThickness, wall_thickness
-from closedrooms.predictor.config import preset
+from closedrooms.predictor.config import BestConfig
 from closedrooms.predictor.structure.wall_directions import find_wall_directions
 
 MASKS = hnp.arrays(np.bool_, st.tuples(st.integers(3, 12), st.integers(3, 12)))
@@ -156,6 +156,6 @@ def test_doors_far_apart_say_the_same_from_tables_of_their_own(mapped, monkeypat
     found = []
     for cells_at_once in (1, 10 * cells.size):
         monkeypatch.setattr(suspects, "MAX_WINDOW", cells_at_once)
-        found.append(predict_best(OccupancyGrid(frame, cells), doors, preset("best")).rooms)
+        found.append(predict_best(OccupancyGrid(frame, cells), doors, BestConfig()).rooms)
     assert [room.doors for room in found[0]] == [(door.id,) for door in doors]
     assert [room.polygon.wkb for room in found[0]] == [room.polygon.wkb for room in found[1]]

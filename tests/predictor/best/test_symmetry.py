@@ -9,8 +9,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.predictor.best.door_frame import turn_map
 from closedrooms.predictor.best.symmetry import find_axis, mirrored
-from closedrooms.predictor.config import preset
-from closedrooms.predictor.predict import predict
+from closedrooms.predictor.methods import predict
 
 # Rooms of the left half above and below a corridor: first and last column, last row above it, first row below it.
 UPPER = ((20, 90, 190), (94, 150, 190), (154, 270, 210))
@@ -97,7 +96,7 @@ def test_best_gives_a_hidden_room_the_walls_of_its_counterpart(degrees) -> None:
     moved = [
         ClosedDoor(d.id, tuple(np.array([[c, -s], [s, c]]) @ (np.array(d.midpoint) - middle) + there)) for d in doors
     ]
-    found = predict(OccupancyGrid(GridFrame(0.05, 0.0, 0.0, *cells.shape), cells), moved, preset("best"))
+    found = predict(OccupancyGrid(GridFrame(0.05, 0.0, 0.0, *cells.shape), cells), moved, "best")
     areas = {room.doors[0]: room.polygon.area for room in found.rooms}
     for i in (1, 2):
         left, right, top = UPPER[i]

@@ -7,7 +7,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from closedrooms.core.door import ClosedDoor
-from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.config import PaperConfig
 from closedrooms.predictor.paper.arrangement import arrange
 from closedrooms.predictor.paper.border import border_rooms
 from closedrooms.predictor.paper.expansion import Growth, expand
@@ -15,7 +15,7 @@ from closedrooms.predictor.paper.face_swaps import swap_faces
 from closedrooms.predictor.paper.initial_faces import Entrance
 from closedrooms.predictor.paper.lines import Line
 
-CONFIG = PredictorConfig()
+CONFIG = PaperConfig()
 
 
 def _arrangement(xs, ys, size=20.0):
@@ -148,5 +148,5 @@ def test_adjacent_border_rooms_share_their_mean_depth(average, depths):
     unknown = np.ones(len(arrangement.faces), dtype=np.bool_)
     entrances = [_entrance(arrangement, n, (x, 18.0), (x, 0.0)) for n, x in (("a", -3.0), ("b", 2.0))]
     growth = Growth(arrangement, unknown, entrances)
-    rooms = border_rooms(growth, PredictorConfig(average_border_depth=average))
+    rooms = border_rooms(growth, PaperConfig(average_border_depth=average))
     assert (rooms[0].depth, rooms[1].depth) == pytest.approx(depths)

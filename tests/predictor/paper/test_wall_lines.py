@@ -7,13 +7,17 @@ from hypothesis import strategies as st
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
-from closedrooms.predictor.config import PredictorConfig, StructureConfig, preset
+from closedrooms.predictor.config import DirectionsConfig, LinesConfig, PaperConfig
 from closedrooms.predictor.paper.directions import angle_between, find_directions
 from closedrooms.predictor.paper.lines import boundary_lines, find_lines
 from closedrooms.predictor.paper.segments import angles_of, find_segments, lengths_of
 from closedrooms.predictor.structure.known_window import at_resolution, known_window
 
-CONFIG = StructureConfig()
+CONFIG = LinesConfig()
+
+
+def _directions(segments):
+    return find_directions(segments, DirectionsConfig(), bandwidth=CONFIG.angle_bandwidth)
 
 
 def _segment(angle, offset, start, end):
@@ -42,7 +46,7 @@ def test_a_wall_carries_a_line_by_its_length_whether_one_side_of_it_was_found_or
     short = [_segment(0.3, offset, 0.0, length) for offset in sides]
     long = [_segment(0.3, 5.0, 0.0, 6.0), _segment(0.3 + math.pi / 2, 0.0, 0.0, 6.0)]
     segments = np.array([*short, *long])
-    lines, labels = find_lines(segments, find_directions(segments, CONFIG), CONFIG)
+    lines, labels = find_lines(segments, _directions(segments), CONFIG)
     assert len(lines) == (3 if kept else 2)
     assert (labels[: len(short)] >= 0).all() == kept
 
@@ -56,7 +60,7 @@ def test_a_map_without_walls_has_no_segments():
 def test_any_two_perpendicular_directions_are_found(angle, wobble):
     segments = [_segment(angle + w, 3.0 * i, 0.0, 4.0 + i) for i, w in enumerate(wobble)]
     segments += [_segment(angle + math.pi / 2 + w, 3.0 * i, 0.0, 3.0) for i, w in enumerate(wobble)]
-    found = find_directions(np.array(segments), CONFIG)
+    found = _directions(np.array(segments))
     assert found.angles.size == 2
     for wanted in (angle, angle + math.pi / 2):
         assert np.abs(angle_between(found.angles, wanted)).min() < 0.031
@@ -67,7 +71,7 @@ def test_directions_near_zero_and_pi_are_one():
     segments = np.array(
         [_segment(0.02, i, 0.0, 5.0) for i in range(3)] + [_segment(-0.02, i, 0.0, 5.0) for i in range(3)]
     )
-    found = find_directions(segments, CONFIG)
+    found = _directions(segments)
     assert found.angles.size == 1
     assert abs(float(angle_between(found.angles[0], 0.0))) < 1e-9
 
@@ -77,7 +81,7 @@ def test_a_slanted_wing_has_directions_of_its_own(slant):
     main, wing = math.radians(-8.0), math.radians(-8.0 + slant)
     segments = [_segment(a, 2.0 * i, 0.0, 5.0) for a in (main, main + math.pi / 2) for i in range(6)]
     segments += [_segment(a, 2.0 * i, 9.0, 12.0) for a in (wing, wing + math.pi / 2) for i in range(3)]
-    found = find_directions(np.array(segments), CONFIG)
+    found = _directions(np.array(segments))
     assert found.angles.size == 4
     for wanted in (main, wing, main + math.pi / 2, wing + math.pi / 2):
         assert np.abs(angle_between(found.angles, wanted)).min() < 0.02
@@ -86,19 +90,19 @@ def test_a_slanted_wing_has_directions_of_its_own(slant):
 def test_segments_evenly_in_all_directions_make_none():
     angles = np.linspace(0.0, math.pi, 300, endpoint=False)
     segments = np.array([_segment(a, float(i), 0.0, 1.0) for i, a in enumerate(angles)])
-    assert find_directions(segments, CONFIG).angles.size == 0
+    assert _directions(segments).angles.size == 0
 
 
 def test_short_segments_alone_make_no_direction():
     segments = np.array([_segment(0.8, 0.1 * i, 0.0, 0.3) for i in range(40)])
-    assert find_directions(segments, CONFIG).angles.size == 0
+    assert _directions(segments).angles.size == 0
 
 
 def test_collinear_walls_far_apart_share_a_line_and_parallel_ones_do_not():
     segments = np.array(
         [_segment(0.5, 1.0, 0.0, 5.0), _segment(0.5, 1.1, 20.0, 25.0), _segment(0.5, 3.0, 0.0, 5.0), CROSSING]
     )
-    directions = find_directions(segments, CONFIG)
+    directions = _directions(segments)
     lines, labels = find_lines(segments, directions, CONFIG)
     assert len(lines) == 3
     assert labels[0] == labels[1] != labels[2]
@@ -114,7 +118,7 @@ def test_lines_are_the_same_from_either_side(offsets, seed):
     mirrored = segments * np.array([1.0, -1.0, 1.0, -1.0])
 
     def found(some):
-        lines, _ = find_lines(some, find_directions(some, CONFIG), CONFIG)
+        lines, _ = find_lines(some, _directions(some), CONFIG)
         return np.sort([line.offset * (1 if line.angle < 1.0 else -1) for line in lines])
 
     np.testing.assert_allclose(found(segments), np.sort(-found(mirrored)), atol=1e-9)
@@ -123,7 +127,7 @@ def test_lines_are_the_same_from_either_side(offsets, seed):
 @given(st.floats(0.0, math.pi, exclude_max=True))
 def test_boundary_lines_hold_all_segments_at_the_margin(angle):
     segments = np.array([_segment(angle, 2.0, 0.0, 9.0), _segment(angle + math.pi / 2, 3.0, -4.0, 2.0)])
-    lines = boundary_lines(segments, find_directions(segments, CONFIG), CONFIG)
+    lines = boundary_lines(segments, _directions(segments), CONFIG)
     assert [line.kind for line in lines] == ["border"] * 4
     for low, high in (lines[:2], lines[2:]):
         distances_low, distances_high = (line.distance(segments.reshape(-1, 2)) for line in (low, high))
@@ -133,7 +137,7 @@ def test_boundary_lines_hold_all_segments_at_the_margin(angle):
 
 def test_one_direction_alone_is_bounded_by_its_perpendicular():
     segments = np.array([_segment(0.3, float(i), 0.0, 5.0) for i in range(3)])
-    lines = boundary_lines(segments, find_directions(segments, CONFIG), CONFIG)
+    lines = boundary_lines(segments, _directions(segments), CONFIG)
     assert abs(float(angle_between(lines[0].angle, lines[2].angle))) == pytest.approx(math.pi / 2)
 
 
@@ -164,15 +168,10 @@ def test_another_resolution_keeps_walls_and_area(mapped, resolution):
 )
 def test_structure_settings_out_of_range_are_refused(wrong):
     with pytest.raises(InvalidInputError):
-        StructureConfig(**wrong)
+        LinesConfig(**wrong)
 
 
 @pytest.mark.parametrize("wrong", [{"min_unknown": 1.5}, {"door_width": 0.0}, {"exact_candidates": 40}])
 def test_predictor_settings_out_of_range_are_refused(wrong):
     with pytest.raises(InvalidInputError):
-        PredictorConfig(**wrong)
-
-
-def test_an_unknown_preset_names_those_there_are():
-    with pytest.raises(InvalidInputError, match="paper"):
-        preset("fast")
+        PaperConfig(**wrong)

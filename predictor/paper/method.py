@@ -1,10 +1,10 @@
-"""The predictor's entry: from a map and its closed doors to rooms and the completed map (paper, section 3)."""
+"""The method of the paper: from a map and its closed doors to rooms and the completed map (section 3)."""
 
 from collections.abc import Sequence
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.predictor.config import PredictorConfig
+from closedrooms.predictor.config import PaperConfig
 from closedrooms.predictor.inpainting import inpaint
 from closedrooms.predictor.paper.expansion import Growth, expand
 from closedrooms.predictor.paper.face_swaps import swap_faces
@@ -14,17 +14,12 @@ from closedrooms.predictor.paper.trace import level_of, trace_of
 from closedrooms.predictor.prediction import Level, Prediction
 
 
-def predict(
-    grid: OccupancyGrid,
-    doors: Sequence[ClosedDoor],
-    config: PredictorConfig,
-    *,
-    trace: bool | None = None,
-    started: Started | None = None,
+def predict_paper(
+    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PaperConfig, *, started: Started | None = None
 ) -> Prediction:
-    """Predict the rooms behind closed doors and complete the map with them.
+    """Predict the rooms behind closed doors as the authors describe and ran it.
 
-    The steps below are the preset ``paper``; ``best`` goes its own way (:mod:`closedrooms.predictor.best`).
+    With :class:`~closedrooms.predictor.config.RoseConfig` walls and directions come from ROSE (section 4.2).
 
     Trouble with one door is its own: it is named in ``failures`` and the other doors are predicted. On a map without
     any wall line (all unknown, all free, noise), every door fails with the reason and the map stays as it is.
@@ -32,10 +27,8 @@ def predict(
     Args:
         grid: The map, of any resolution and size.
         doors: Closed doors in the frame of the map.
-        config: Settings, from :func:`closedrooms.predictor.config.preset`.
-        trace: Keep every stage in the result; ``None`` leaves it to ``config.keep_trace``.
-        started: What ``start_rooms`` gave for this map, these doors and this configuration, where it is at hand;
-            ``best`` has no use for it.
+        config: Settings.
+        started: What ``start_rooms`` gave for this map, these doors and these settings, where it is at hand.
 
     Returns:
         The completed map on the lattice of the input, the rooms in the order of the doors, failures by door id.
@@ -44,11 +37,6 @@ def predict(
         InvalidInputError: Two doors of one id; a known area that is too large for the cells that walls are looked for
             in; a completed map of too many cells, where those of the input are tiny.
     """
-    if config.preset == "best":
-        from closedrooms.predictor.best.method import predict_best
-
-        return predict_best(grid, doors, config, trace)
-    wanted = config.keep_trace if trace is None else trace
     # 3.1, 3.2: lines, faces, and the face behind each door.
     start, reasons = started or start_rooms(grid, doors, config)
     failures = dict(reasons)
@@ -57,7 +45,7 @@ def predict(
     levels: list[Level] = []
 
     def report(k: int) -> None:
-        if wanted:
+        if config.keep_trace:
             levels.append(level_of(k, growth))
 
     # 3.3, 3.4: all rooms grow jointly, scored by the evaluation functions.
@@ -70,4 +58,4 @@ def predict(
     # 3.6, 3.7: rooms on the border, passages, and all of it drawn into the map.
     rooms, passages = finish_rooms(start, growth, config)
     completed = inpaint(grid, [room.polygon for room in rooms], passages)
-    return Prediction(completed, rooms, failures, trace_of(start, levels) if wanted else None)
+    return Prediction(completed, rooms, failures, trace_of(start, levels) if config.keep_trace else None)
