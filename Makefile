@@ -1,4 +1,6 @@
-PYTHON ?= $(shell command -v python3.11 || command -v python3)
+# The first Python that runs (a shim that fails is passed over), 3.11 before newer ones: PyBullet has wheels for it.
+PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3; do \
+	"$$p" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 15))' >/dev/null 2>&1 && echo "$$p" && break; done)
 VENV ?= .venv
 BIN := $(VENV)/bin
 
@@ -33,10 +35,8 @@ format: $(VENV)/.ready
 	$(BIN)/ruff check --fix .
 
 $(VENV)/.ready: pyproject.toml constraints.txt
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11) and "closedrooms needs Python 3.11; set PYTHON=/path/to/python3.11")'
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
-	touch $@
+	@sh .ci/install "$(PYTHON)" "$(VENV)"
+	@touch $@
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info
