@@ -82,4 +82,5 @@ def too_narrow(plan: FloorPlan, closed: tuple[str, ...], start: Pose2, config: R
         f"no passage there is {config.passage_width:.2f} m wide, which a robot of radius {config.robot.radius:g} m "
         "needs; they are seen from outside at best"
     )
-    return [Remark(action="dropped", what="rooms", why=why, names=shut_off, count=len(shut_off))]
+    what = "room" if len(shut_off) == 1 else "rooms"
+    return [Remark(action="dropped", what=what, why=why, names=shut_off, count=len(shut_off))]

@@ -24,7 +24,7 @@ class RunResult:
         closed: Doors that were closed.
         seen: Closed doors that the robot saw.
         unpredicted: Why a seen door could not be predicted, by door id.
-        stopped: Why a stage ended before it was done, by stage: ``exploration``, ``drive``.
+        stopped: Why a stage ended before it was done, by stage: ``exploration``, ``cover``, ``drive``.
         remarks: What was dropped, repaired or guessed.
         durations: Seconds by stage.
         exploration: ``exploration`` of ``run.json``: status, simulated seconds, scans, travelled distance.
@@ -97,8 +97,9 @@ def figure(value: float | None, form: str, *, scale: float = 1.0) -> str:
 def tour_rows(tour: Mapping[str, Any]) -> Rows:
     """Lengths of the tours and the errors of the estimates (paper, section 5.3)."""
     names = {"closed": "map with closed doors", "predicted": "predicted map", "truth": "true map"}
-    rows = [(f"tour on the {text}", f"{tour[name]['length_m']:.1f} m") for name, text in names.items() if name in tour]
-    errors = tour.get("errors_percent", {})
+    lengths = {name: tour[name]["length_m"] if name in tour else None for name in names}
+    rows = [(f"tour on the {text}", figure(lengths[name], "{:.1f} m")) for name, text in names.items()]
+    errors = tour["errors_percent"]
     return rows + [(f"tour error, {name}", figure(error, "{:.1f} %")) for name, error in errors.items()]
 
 

@@ -54,7 +54,8 @@ class Finding:
         prediction: The rooms behind the closed doors.
         truth: What is really there.
         tours: By the map that they were planned on: ``closed``, ``predicted``, ``truth``.
-        notes: Why a tour is missing, and what its planning says.
+        missing: Why there is no tour, by the same names.
+        notes: What their planning says.
         driven: How the predicted tour was driven, on demand.
     """
 
@@ -62,6 +63,7 @@ class Finding:
     prediction: Prediction
     truth: Truth
     tours: dict[str, CoverageTour]
+    missing: dict[str, str]
     notes: list[str]
     driven: DriveResult | None = None
 
@@ -155,9 +157,9 @@ def _find_out(
     prediction = replace(prediction, grid=prediction.grid.on(truth.grid.frame))
     with watch.stage("cover"):
         progress.stage("cover")
-        tours, notes = plan_tours(survey, prediction, truth.grid, config)
+        tours, missing, notes = plan_tours(survey, prediction, truth.grid, config)
         recorder.tours(tours)
-    found = Finding(survey, prediction, truth, tours, notes)
+    found = Finding(survey, prediction, truth, tours, missing, notes)
     if not config.drive or "predicted" not in tours:
         return found
     with watch.stage("drive"):
@@ -189,9 +191,14 @@ def choose_closed(plan: FloorPlan, config: RunConfig) -> tuple[str, ...]:
 
 def plan_tours(
     survey: Survey, prediction: Prediction, truth: OccupancyGrid, config: RunConfig
-) -> tuple[dict[str, CoverageTour], list[str]]:
-    """Tours on M with a vertex at every closed door, on M_pred and on M_GT (paper, section 5.2)."""
+) -> tuple[dict[str, CoverageTour], dict[str, str], list[str]]:
+    """Plan tours on M with a vertex at every closed door, on M_pred and on M_GT (paper, section 5.2).
+
+    Returns:
+        Tours by the names ``closed``, ``predicted`` and ``truth``, why one is missing, and what their planning says.
+    """
     tours: dict[str, CoverageTour] = {}
+    missing: dict[str, str] = {}
     notes: list[str] = []
     for name, grid, doors in (
         ("closed", survey.grid, survey.doors),
@@ -201,10 +208,10 @@ def plan_tours(
         try:
             tours[name] = plan_coverage(grid, doors, config.coverage, start=START)
         except InvalidInputError as error:
-            notes.append(f"no tour on the {name} map: {error}")
+            missing[name] = f"no tour on the {name} map: {error}"
             continue
         notes += [f"tour on the {name} map: {note}" for note in tours[name].notes]
-    return tours, notes
+    return tours, missing, notes
 
 
 def _figures(plan: FloorPlan, closed: Sequence[str], map_T_world: Pose2, found: Finding) -> dict[str, Any]:
@@ -225,14 +232,15 @@ def _figures(plan: FloorPlan, closed: Sequence[str], map_T_world: Pose2, found: 
         },
         "metrics": metrics,
         "doors": {"seen": seen, "not_seen": sorted(set(closed) - set(seen)), "failures": prediction.failures},
-        "notes": found.notes,
+        "notes": [*found.missing.values(), *found.notes],
     }
 
 
 def _stopped(found: Finding) -> dict[str, str]:
     """Which stage ended before it was done, and why."""
     logs = {"exploration": found.survey.exploration} | ({} if found.driven is None else {"drive": found.driven.log})
-    return {stage: f"{log.status}, {log.reason}" for stage, log in logs.items() if log.status != "complete"}
+    stopped = {stage: f"{log.status}, {log.reason}" for stage, log in logs.items() if log.status != "complete"}
+    return stopped | ({"cover": "; ".join(found.missing.values())} if found.missing else {})
 
 
 def _write(folder: Path, found: Finding, metrics: Mapping[str, Any]) -> None:
