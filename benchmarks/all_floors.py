@@ -31,6 +31,7 @@ from typing import Any
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
 from closedrooms.core.geojson import read_rooms
+from closedrooms.pipeline.report import figure
 from closedrooms.pipeline.scores import mean, room_iou
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.geometry import wall_area
@@ -151,7 +152,7 @@ def row(floor: Floor, out: Path) -> list[str]:
         return [*size, *[""] * 8, *cost, remark]
     run = read(out / floor.name / "run.json")
     metrics, doors = run["metrics"], run["doors"]
-    errors = metrics["tour"].get("errors_percent", {})
+    errors = metrics["tour"]["errors_percent"]
     return [
         *size,
         str(metrics["doors_closed"]),
@@ -160,7 +161,7 @@ def row(floor: Floor, out: Path) -> list[str]:
         f"{metrics['ate_m']:.3f}",
         _figure(metrics["room_iou_mean"]),
         _figure(paper_iou(floor, out, set(metrics["room_iou"]))),
-        " / ".join(f"{errors[kind]:.1f}" for kind in ("closed", "baseline", "predicted")) if errors else "",
+        " / ".join(figure(errors[kind], "{:.1f}") for kind in ("closed", "baseline", "predicted")),
         f"{run['exploration']['simulated_s']:.0f}",
         *cost,
         remark_of(run["exploration"]["status"], doors, run["notes"]),

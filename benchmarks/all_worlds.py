@@ -11,7 +11,8 @@ from pathlib import Path
 
 from closedrooms.core.errors import ClosedroomsError
 from closedrooms.pipeline.config import RunConfig
-from closedrooms.pipeline.run import RunResult, run
+from closedrooms.pipeline.report import RunResult, figure
+from closedrooms.pipeline.run import run
 from closedrooms.worlds.library import bundled_names
 
 HEAD = (
@@ -30,7 +31,7 @@ HEAD = (
 def row(name: str, result: RunResult) -> list[str]:
     metrics = result.metrics
     average = metrics["room_iou_mean"]
-    errors = metrics["tour"].get("errors_percent", {})
+    errors = metrics["tour"]["errors_percent"]
     cells = [
         Path(name).stem,
         result.exploration["status"],
@@ -38,7 +39,7 @@ def row(name: str, result: RunResult) -> list[str]:
         f"{metrics['ate_m']:.3f}",
         f"{len(result.seen)} of {len(result.closed)}",
         "" if average is None else f"{average:.3f}",
-        " / ".join(f"{errors[kind]:.1f}" for kind in ("closed", "baseline", "predicted")) if errors else "",
+        " / ".join(figure(errors[kind], "{:.1f}") for kind in ("closed", "baseline", "predicted")),
         str(result.exploration["scans"]),
         f"{result.durations['total']:.1f}",
     ]

@@ -13,10 +13,10 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import ate
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.exploration import explore
 from closedrooms.pipeline.progress import Silent
-from closedrooms.pipeline.run_log import Witness
+from closedrooms.pipeline.run_log import RunLog
 from closedrooms.pipeline.scores import area_mapped
+from closedrooms.pipeline.survey import survey_building
 from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.closing import closable_rooms, draw_closed
@@ -28,20 +28,20 @@ def measure(world: str, *, noise: str, close: int, seed: int) -> str:
     plan = load_world(world)
     closed = draw_closed(plan, min(close, len(closable_rooms(plan))), stream(seed, "closed doors"))
     with Simulation(plan, closed, SimConfig(noise=noise_level(noise)), seed) as sim:
-        witness, mapper = Witness(sim, Silent(), keep_scans=False), Mapper(MapperConfig())
-        result = explore(witness, mapper, NavigationConfig())
-        mapper.finish()
+        log, mapper = RunLog(sim, Silent(), keep_scans=False), Mapper(MapperConfig())
+        survey = survey_building(log, mapper, NavigationConfig())
+        result = survey.exploration
         start = sim.world_T_map
     map_T_world = start.inverse()
     x_min, y_min, x_max, y_max = truth_bounds(plan, map_T_world)
     grid = mapper.grid()
     grid = grid.on(grid.frame.covering(x_min, y_min, x_max, y_max))
     cells = reachable(plan, closed, grid.frame, map_T_world, (start.x, start.y))
-    error, _ = ate(mapper.trajectory()[1], witness.truth)
+    error, _ = ate(mapper.trajectory()[1], log.truth)
     each = {step: 1e3 * seconds / result.scans for step, seconds in result.wall_seconds.items()}
     return (
         f"{plan.name[:24]:<24} {x_max - x_min:4.0f} x {y_max - y_min:3.0f} m  {result.status:<9}"
-        f"{result.seconds:6.0f} s {result.distance:6.0f} m {result.plans:5d} plans  "
+        f"{result.seconds:6.0f} s {result.distance:6.0f} m {survey.searches:5d} searches  "
         f"known {100 * area_mapped(grid, cells):6.2f} %  ate {error:.3f} m  doors {len(mapper.doors())}/{len(closed)}  "
         f"sense {each['sense']:.2f}  map {each['map']:.2f}  navigate {each['navigate']:.2f} ms/scan"
     )

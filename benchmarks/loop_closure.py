@@ -25,10 +25,10 @@ from closedrooms.mapping.logs.recorded_run import RecordedRun, read_run
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import ate
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.exploration import explore
 from closedrooms.pipeline.progress import Silent
-from closedrooms.pipeline.run_log import Witness
+from closedrooms.pipeline.run_log import RunLog
 from closedrooms.pipeline.scores import area_mapped
+from closedrooms.pipeline.survey import survey_building
 from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.closing import closable_rooms, draw_closed
@@ -56,11 +56,10 @@ def measure(world: str, noise: str, options: argparse.Namespace) -> dict[str, ob
     plan = load_world(world)
     closed = draw_closed(plan, min(options.close, len(closable_rooms(plan))), stream(options.seed, "closed doors"))
     with Simulation(plan, closed, replace(SimConfig(), noise=noise_level(noise)), options.seed) as sim:
-        witness, mapper = Witness(sim, Silent(), keep_scans=True), Mapper(MapperConfig())
-        result = explore(witness, mapper, NavigationConfig())
-        mapper.finish()
+        log, mapper = RunLog(sim, Silent(), keep_scans=True), Mapper(MapperConfig())
+        result = survey_building(log, mapper, NavigationConfig()).exploration
         start = sim.world_T_map
-    run = witness.recorded()
+    run = log.recorded()
     truth = np.asarray(run.reference)
     path = options.out / f"{world}-{noise}.npz"
     write_scans(path, run, estimate=mapper.trajectory()[1], compressed=False)

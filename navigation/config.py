@@ -1,16 +1,17 @@
-"""Settings of frontiers, path planning, path following and recovery."""
+"""Settings of frontiers, path planning, path following, recovery and the limits of a run."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.robot import RobotConfig
+
+# Distances that were set for a small robot are at least so much longer than the clearance that a wide one needs [m].
+WIDE_ROBOT = 0.3
 
 
 @dataclass(frozen=True, kw_only=True)
 class NavigationConfig:
-    """How the robot chooses where to go and how it drives there."""
-
-    robot_radius: float = 0.20
-    """Radius of the robot's footprint [m]."""
+    """How the robot chooses where to go and how it drives there; what it is like itself stands in ``RobotConfig``."""
 
     clearance_margin: float = 0.03
     """Least distance kept between footprint and mapped obstacles [m]; a 0.8 m door must stay passable."""
@@ -34,7 +35,7 @@ class NavigationConfig:
     """Smallest patch of unknown cells worth a look [m2]; smaller ones are gaps between beams."""
 
     large_area: float = 2.0
-    """Unknown patches from this size on are worth any way [m2]; closed rooms and the outside are such."""
+    """Unknown patches from this size on are worth any distance [m2]; closed rooms and the outside are such."""
 
     worth: float = 15.0
     """How far the robot goes for a smaller patch, per square metre of it [m/m2]."""
@@ -48,14 +49,8 @@ class NavigationConfig:
     fruitless_radius: float = 0.80
     """Frontier cells this close to a goal that was reached without learning anything are given up [m]."""
 
-    max_speed: float = 1.0
-    """Fastest drive command [m/s]."""
-
-    max_turn_rate: float = 2.0
-    """Fastest turn command [rad/s]."""
-
-    acceleration: float = 1.2
-    """Deceleration used to plan stopping distances [m/s2]."""
+    braking_reserve: float = 1.25
+    """How many times harder the robot can brake than is planned with; at least 1."""
 
     lookahead: float = 0.55
     """Distance of the pure-pursuit target along the path [m]."""
@@ -91,24 +86,63 @@ class NavigationConfig:
     """Recoveries in a row without a goal reached after which the run ends as ``stuck``."""
 
     time_limit: float = 7200.0
-    """Simulated time after which exploration ends with the status ``limit`` [s]."""
+    """Simulated time after which a run ends with the status ``limit`` [s]."""
+
+    wall_limit: float = 1200.0
+    """The same in real time [s]; a run that ends by it may end elsewhere the next time."""
+
+    most_cells: int = 20_000_000
+    """Cells of the map from which on a run ends with the status ``limit``: 50,000 m2 at 0.05 m, more than a campus."""
 
     def __post_init__(self) -> None:
         for name in (
-            "robot_radius",
             "preferred_clearance",
             "planning_resolution",
             "frontier_resolution",
-            "max_speed",
-            "max_turn_rate",
-            "acceleration",
             "lookahead",
             "time_limit",
+            "wall_limit",
+            "most_cells",
         ):
-            if not getattr(self, name) > 0.0:
+            if not getattr(self, name) > 0:
                 raise InvalidInputError(f"navigation {name} {getattr(self, name)}", expected="a number above 0")
+        if not self.braking_reserve >= 1.0:
+            raise InvalidInputError(f"navigation braking_reserve {self.braking_reserve}", expected="a number from 1 on")
+
+    def for_robot(self, robot: RobotConfig) -> "RobotNavigation":
+        """These settings together with the robot that drives by them."""
+        settings = {item.name: getattr(self, item.name) for item in fields(NavigationConfig)}
+        return RobotNavigation(**settings, robot=robot)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotNavigation(NavigationConfig):
+    """What planning and driving read: the settings, and the robot as it is."""
+
+    robot: RobotConfig
+    """Whose radius and speeds are planned with."""
 
     @property
     def required_clearance(self) -> float:
         """Least distance of the robot's centre from a mapped obstacle [m]."""
-        return self.robot_radius + self.clearance_margin
+        return self.robot.radius + self.clearance_margin
+
+    @property
+    def passage_width(self) -> float:
+        """Width of the narrowest passage that is planned through [m]."""
+        return 2.0 * self.required_clearance
+
+    @property
+    def open_clearance(self) -> float:
+        """Distance from obstacles beyond which a path pays nothing [m]: as preferred, or what a wide robot needs."""
+        return max(self.preferred_clearance, self.required_clearance + WIDE_ROBOT)
+
+    @property
+    def farthest_approach(self) -> float:
+        """How far off a frontier may be looked at from [m]: as set, or as near as a wide robot gets to a wall."""
+        return max(self.far_approach, self.required_clearance + WIDE_ROBOT)
+
+    @property
+    def deceleration(self) -> float:
+        """Deceleration used to plan stopping distances [m/s2]."""
+        return self.robot.max_acceleration / self.braking_reserve

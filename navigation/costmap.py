@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, CellArray, FloatArray, IntArray
-from closedrooms.core.grid import FREE_BELOW, OCCUPIED_ABOVE, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.navigation.config import NavigationConfig
+from closedrooms.core.grid import UNKNOWN, GridFrame, OccupancyGrid, is_free, is_occupied
+from closedrooms.navigation.config import RobotNavigation
 
 Image = npt.NDArray[np.uint8]
 Field = npt.NDArray[np.float32]
@@ -64,7 +64,7 @@ class NavigationMap:
         blocked: Cells of ``frontier_frame`` that hold an occupied map cell (0 or 1).
     """
 
-    def __init__(self, config: NavigationConfig) -> None:
+    def __init__(self, config: RobotNavigation) -> None:
         self.config = config
         self.free: Image = np.zeros((0, 0), dtype=np.uint8)
         self.blocked: Image = np.zeros((0, 0), dtype=np.uint8)
@@ -145,12 +145,13 @@ class NavigationMap:
         """Compute everything that depends on the map cells of a window (whole coarse cells)."""
         resolution = self._frames[0].resolution
         small, large = self._factors
-        reach = -(-math.ceil(1.2 * self.config.preferred_clearance / resolution) // large) * large
+        reach = -(-math.ceil(1.2 * self.config.open_clearance / resolution) // large) * large
         inner, outer = (
             _grown((r0, r1, c0, c1), reach, self._cells.shape),
             _grown((r0, r1, c0, c1), 2 * reach, self._cells.shape),
         )
-        free, blocked = cell_masks(self._cells[_slices(outer)])
+        cells = self._cells[_slices(outer)]
+        free, blocked = is_free(cells).view(np.uint8), is_occupied(cells).view(np.uint8)
         blocked |= self._extra[_slices(outer)]
         cut = _slices((inner[0] - outer[0], inner[1] - outer[0], inner[2] - outer[2], inner[3] - outer[2]))
         field = np.minimum(clearance_field(free, blocked, resolution)[cut], np.float32(reach * resolution))
@@ -162,19 +163,11 @@ class NavigationMap:
         self.free[at] = pooled(free[own], small) & (1 - self.blocked[at])
 
 
-def build_costmap(grid: OccupancyGrid, config: NavigationConfig) -> Costmap:
+def build_costmap(grid: OccupancyGrid, config: RobotNavigation) -> Costmap:
     """The planning grid of a map, once."""
     navigation = NavigationMap(config)
     navigation.update(grid)
     return navigation.costmap
-
-
-def cell_masks(cells: CellArray) -> tuple[Image, Image]:
-    """Masks (0 or 1) of free and of occupied cells."""
-    # Cells are -1..100: as unsigned numbers the unknown ones lie above all others.
-    free = np.less(cells.view(np.uint8), math.ceil(FREE_BELOW)).view(np.uint8)
-    blocked = np.greater(cells, OCCUPIED_ABOVE).view(np.uint8)
-    return free, blocked
 
 
 def clearance_field(free: Image, blocked: Image, resolution: float) -> Field:
@@ -197,7 +190,7 @@ def pooled(values: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:
     return np.ascontiguousarray(best)
 
 
-def traversable(costmap: Costmap, config: NavigationConfig) -> BoolArray:
+def traversable(costmap: Costmap, config: RobotNavigation) -> BoolArray:
     """Coarse cells where the robot fits."""
     fits: BoolArray = costmap.clearance >= config.required_clearance
     return fits

@@ -8,7 +8,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.scan import LaserScan
-from closedrooms.navigation.config import NavigationConfig
+from closedrooms.navigation.config import RobotNavigation
 from closedrooms.navigation.path_follower import (
     Steering,
     Track,
@@ -25,7 +25,7 @@ DriveState = Literal["idle", "driving", "arrived", "stuck", "recovering"]
 BACK_SPEED = 0.25
 # How long a robot turns after it has backed off [s].
 RECOVERY_TURN = 0.8
-# A shorter way done than this is no progress [m].
+# A shorter distance done than this is no progress [m].
 PROGRESS_STEP = 0.05
 # A robot that is held up this close to the end of its path has arrived [m].
 CLOSE_ENOUGH = 0.6
@@ -42,7 +42,7 @@ class Driver:
         recoveries: Recoveries since the last path that was driven to its end.
     """
 
-    def __init__(self, config: NavigationConfig) -> None:
+    def __init__(self, config: RobotNavigation) -> None:
         self.config = config
         self.state: DriveState = "idle"
         self.remaining = 0.0
@@ -85,7 +85,7 @@ class Driver:
         if self._track is None:
             self.state = "idle"
             return (0.0, 0.0)
-        obstacles = near_points(scan)
+        obstacles = near_points(scan, self.config)
         wish = steer(self._track, pose, self._progress, self.config)
         self._progress, self.remaining = wish.progress, wish.remaining
         end = self._track.at(self._track.length)
@@ -119,7 +119,7 @@ class Driver:
 
     def _turning_time(self, wish: Steering) -> float:
         """A turn in place is allowed the time of half a turn on top."""
-        return math.pi / self.config.max_turn_rate if wish.v == 0.0 else 0.0
+        return math.pi / self.config.robot.max_turn_rate if wish.v == 0.0 else 0.0
 
     def _recover(self, pose: Pose2, scan: LaserScan, stamp: float) -> tuple[float, float]:
         """Back off as far as the scan allows, then turn a little, to alternating sides."""
@@ -129,13 +129,13 @@ class Driver:
             started = self._started_at = stamp
         limit = self.config.back_off / BACK_SPEED * 2.0
         if origin is not None:
-            room = free_distance(near_points(scan), -BACK_SPEED, 0.0, self.config)
+            room = free_distance(near_points(scan, self.config), -BACK_SPEED, 0.0, self.config)
             if pose.distance(origin) < self.config.back_off and stamp - started < limit and room > 0.0:
                 return (-BACK_SPEED, 0.0)
             self._back_until, self._started_at = None, stamp
             started = stamp
         if stamp - started < RECOVERY_TURN:
             side = 1.0 if self.recoveries % 2 else -1.0
-            return (0.0, side * self.config.max_turn_rate)
+            return (0.0, side * self.config.robot.max_turn_rate)
         self._track, self.state = None, "idle"
         return (0.0, 0.0)

@@ -35,7 +35,7 @@ class Frontiers:
     free: Image
 
     def within(self, distance: float, chosen: BoolArray) -> BoolArray:
-        """Free cells that lie within a way of ``distance`` [m] from a chosen point; ``chosen`` has shape (n,)."""
+        """Free cells that lie within a path of ``distance`` [m] from a chosen point; ``chosen`` has shape (n,)."""
         near = np.zeros(self.frame.shape, dtype=np.bool_)
         cells = self.frame.to_cells(self.points[chosen])
         if len(cells) == 0:

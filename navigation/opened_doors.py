@@ -7,13 +7,14 @@ import numpy as np
 import shapely
 
 from closedrooms.core.arrays import BoolArray
-from closedrooms.core.door import ClosedDoor
+from closedrooms.core.door import ClosedDoor, DoorSighting
 from closedrooms.core.grid import UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
+from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.keyframe import Keyframe
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
-from closedrooms.navigation.exploration import MapMaker
+from closedrooms.navigation.control_loop import MapMaker
 
 # How far from the middle of a closed leaf its hits lie, across it [m]: half of the thickest wall (0.3 m), whose face a
 # leaf may hang on, its thickness, and the error of the map.
@@ -29,7 +30,7 @@ class KeyframeMap(MapMaker, Protocol):
 
 
 class ReopenedMap:
-    """The map of a mapper, in which doorways hold only what was seen since their doors opened.
+    """A mapper with a map in which doorways hold only what was seen since their doors opened.
 
     A leaf that was seen from thirty keyframes takes as many again of passing rays until the sums of its cells say free:
     too long for a robot that wants to drive through. The sums are right for a world that stands still; where it is
@@ -50,6 +51,10 @@ class ReopenedMap:
         self._config = config or MapperConfig(resolution=mapper.grid().frame.resolution)
         self._since = EvidenceGrid(self._config)
         self._drawn: dict[int, Pose2] = {}
+
+    def process(self, scan: LaserScan, odometry: Pose2, sightings: Sequence[DoorSighting] = ()) -> Pose2:
+        """Take in one scan; returns ``map_T_robot``."""
+        return self._mapper.process(scan, odometry, sightings)
 
     def grid(self) -> OccupancyGrid:
         """The map so far; leaves that no later scan has seen or passed are unknown."""

@@ -10,14 +10,14 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.scan import LaserScan
-from closedrooms.navigation.config import NavigationConfig
+from closedrooms.navigation.config import RobotNavigation
 
 # Gain from heading error to turn rate [1/s]: a turn in place settles in about a second.
 TURN_GAIN = 3.0
 # Smallest turn rate while turning in place [rad/s], so that the last degrees do not take for ever.
 MIN_TURN_RATE = 0.3
-# Scan points beyond this cannot matter before the next command [m].
-HORIZON = 1.0
+# Scan points beyond this cannot matter before the next command [m]; for a wide robot, so far before its footprint.
+HORIZON, HORIZON_AHEAD = 1.0, 0.5
 # Stands for everything farther, and for no measurement, while ranges are smoothed [m].
 FAR = 5.0
 
@@ -92,7 +92,7 @@ class Track:
         return best
 
 
-def steer(track: Track, pose: Pose2, progress: float, config: NavigationConfig) -> Steering:
+def steer(track: Track, pose: Pose2, progress: float, config: RobotNavigation) -> Steering:
     """Pure pursuit (Coulter, CMU-RI-TR-92-01) with turns in place where the path leaves the heading.
 
     Args:
@@ -114,36 +114,42 @@ def steer(track: Track, pose: Pose2, progress: float, config: NavigationConfig) 
         return Steering(0.0, turn_rate(error, config), progress, remaining)
     curvature = 2.0 * math.sin(error) / max(distance, 0.5 * config.lookahead)
     v = min(
-        config.max_speed * max(0.25, math.cos(error) ** 2),
-        config.max_turn_rate / max(abs(curvature), 1e-6),
-        math.sqrt(2.0 * config.acceleration * max(remaining, 0.02)),
+        config.robot.max_speed * max(0.25, math.cos(error) ** 2),
+        config.robot.max_turn_rate / max(abs(curvature), 1e-6),
+        math.sqrt(2.0 * config.deceleration * max(remaining, 0.02)),
     )
     return Steering(v, v * curvature, progress, remaining)
 
 
-def turn_rate(error: float, config: NavigationConfig) -> float:
+def turn_rate(error: float, config: RobotNavigation) -> float:
     """Turn rate [rad/s] that brings a heading error [rad] to zero without overshoot."""
-    rate = min(max(TURN_GAIN * abs(error), MIN_TURN_RATE), config.max_turn_rate)
+    rate = min(max(TURN_GAIN * abs(error), MIN_TURN_RATE), config.robot.max_turn_rate)
     return math.copysign(rate, error)
 
 
-def near_points(scan: LaserScan) -> FloatArray:
+def horizon(config: RobotNavigation) -> float:
+    """How far off obstacles are looked at [m]."""
+    return max(HORIZON, config.required_clearance + HORIZON_AHEAD)
+
+
+def near_points(scan: LaserScan, config: RobotNavigation) -> FloatArray:
     """What the scan shows close to the robot, robot frame, shape (n, 2) [m].
 
     A median over five beams leaves out lone outliers and halves the noise: the nearest of a hundred noisy points would
     otherwise always lie too close.
     """
     ranges = np.where(scan.ranges < FAR, scan.ranges, FAR).astype(np.float32)
-    if float(ranges.min()) >= HORIZON:
+    reach = horizon(config)
+    if float(ranges.min()) >= reach:
         return np.empty((0, 2))
     smooth = cv2.medianBlur(np.concatenate((ranges[-2:], ranges, ranges[:2]))[None, :], 5)[0, 2:-2]
-    near = np.flatnonzero(smooth < HORIZON)
+    near = np.flatnonzero(smooth < reach)
     angles = scan.angle_min + scan.angle_increment * near
     points = np.column_stack((smooth[near] * np.cos(angles), smooth[near] * np.sin(angles)))
     return Pose2(*scan.robot_T_sensor).transform(points)
 
 
-def free_distance(points_robot: FloatArray, v: float, w: float, config: NavigationConfig) -> float:
+def free_distance(points_robot: FloatArray, v: float, w: float, config: RobotNavigation) -> float:
     """How far the robot can drive along the arc of a command before it touches a scan point [m].
 
     Args:
@@ -153,9 +159,9 @@ def free_distance(points_robot: FloatArray, v: float, w: float, config: Navigati
         config: Footprint.
 
     Returns:
-        Distance along the arc, at most ``HORIZON`` less the footprint: more than it takes to stop.
+        Distance along the arc, at most the horizon less the footprint: more than it takes to stop.
     """
-    reach = HORIZON - config.required_clearance
+    reach = horizon(config) - config.required_clearance
     if len(points_robot) == 0:
         return reach
     steps = np.arange(0.05, reach, 0.05)
@@ -169,15 +175,15 @@ def free_distance(points_robot: FloatArray, v: float, w: float, config: Navigati
     offset = path[:, None, :] - points_robot[None, :, :]
     gaps = np.sqrt(np.einsum("ijk,ijk->ij", offset, offset).min(axis=1))
     # Where the robot already is inside the margin it may still drive as long as it does not get closer.
-    limit = min(config.robot_radius + 0.3 * config.clearance_margin, now - 0.005)
+    limit = min(config.robot.radius + 0.3 * config.clearance_margin, now - 0.005)
     hit = np.flatnonzero(gaps < limit)
     return float(steps[hit[0]] - 0.05) if len(hit) else reach
 
 
-def limit_speed(command: Steering, points_robot: FloatArray, config: NavigationConfig) -> Steering:
+def limit_speed(command: Steering, points_robot: FloatArray, config: RobotNavigation) -> Steering:
     """The same arc, slow enough to stop before what the scan shows; turning in place is always possible."""
     if command.v <= 0.0:
         return command
     distance = free_distance(points_robot, command.v, command.w, config)
-    v = min(command.v, math.sqrt(2.0 * config.acceleration * distance) if distance > 0.0 else 0.0)
+    v = min(command.v, math.sqrt(2.0 * config.deceleration * distance) if distance > 0.0 else 0.0)
     return Steering(v, command.w * v / command.v, command.progress, command.remaining)

@@ -8,7 +8,7 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.door import Point
-from closedrooms.navigation.config import NavigationConfig
+from closedrooms.navigation.config import RobotNavigation
 from closedrooms.navigation.costmap import Costmap, Field, traversable
 
 # How far the robot's own estimate may lie inside an obstacle's margin before no path can start [m].
@@ -19,7 +19,7 @@ FIRST_WINDOW = 6.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path:
-    """A way through free space.
+    """A path through free space.
 
     Attributes:
         points: Corners in the map frame, shape (n, 2), n >= 1 [m].
@@ -37,7 +37,7 @@ class Path:
         return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
 
 
-def reachable_cells(costmap: Costmap, start: Point, config: NavigationConfig) -> BoolArray | None:
+def reachable_cells(costmap: Costmap, start: Point, config: RobotNavigation) -> BoolArray | None:
     """Coarse cells that the robot can reach from ``start`` (map frame), ``None`` when it is enclosed."""
     import cv2
 
@@ -65,7 +65,7 @@ def start_cell(costmap: Costmap, fits: BoolArray, start: Point) -> tuple[int, in
     return (int(cells[best, 0]), int(cells[best, 1]))
 
 
-def plan_path(costmap: Costmap, start: Point, goals: BoolArray, config: NavigationConfig) -> Path | None:
+def plan_path(costmap: Costmap, start: Point, goals: BoolArray, config: RobotNavigation) -> Path | None:
     """The cheapest path from ``start`` to the nearest of several goals.
 
     Args:
@@ -89,17 +89,17 @@ class Search:
     """Dijkstra's algorithm over the planning grid from one start (scikit-image's minimum cost path).
 
     A metre costs 1 in the open and up to ``1 + clearance_weight`` beside an obstacle. The search begins in a window
-    around the start: whatever costs less than its half width is found exactly there, as every way out of it costs more.
+    around the start: whatever costs less than its half width is found exactly there: every path out of it costs more.
     """
 
-    def __init__(self, costmap: Costmap, start: Point, first: tuple[int, int], config: NavigationConfig) -> None:
+    def __init__(self, costmap: Costmap, start: Point, first: tuple[int, int], config: RobotNavigation) -> None:
         self._costmap, self._start, self._first, self._config = costmap, start, first, config
         self._window = (slice(0), slice(0))
         self._costs: FloatArray = np.empty((0, 0))
         self._search: Any = None
 
     @classmethod
-    def begin(cls, costmap: Costmap, start: Point, config: NavigationConfig) -> "Search | None":
+    def begin(cls, costmap: Costmap, start: Point, config: RobotNavigation) -> "Search | None":
         """A search from ``start`` (map frame), ``None`` when the robot does not fit anywhere near."""
         first = start_cell(costmap, traversable(costmap, config), start)
         return None if first is None else cls(costmap, start, first, config)
@@ -108,7 +108,7 @@ class Search:
         """Spread out until the nearest of ``goals`` (coarse cells) is found or everything within ``limit`` [m]."""
         rows, cols = self._costmap.frame.shape
         reach = FIRST_WINDOW
-        # No way is shorter than the straight one: smaller windows cannot settle which goal is nearest.
+        # No path is shorter than the straight line: smaller windows cannot settle which goal is nearest.
         offsets = nonzero_cells(goals) - np.array(self._first)
         straight = math.inf if len(offsets) == 0 else float(np.hypot(*offsets.T).min()) * self._costmap.frame.resolution
         while reach < min(straight, limit, max(rows, cols) * self._costmap.frame.resolution):
@@ -143,7 +143,7 @@ class Search:
         return cells[best] + self._corner, float(costs[best])
 
     def path(self, cell: IntArray) -> Path:
-        """The way to a coarse cell that the search has reached."""
+        """The path to a coarse cell that the search has reached."""
         row, col = (int(v) for v in cell - self._corner)
         cells = np.array(self._search.traceback((row, col)), dtype=np.int64) + self._corner
         points = np.vstack((np.array(self._start), self._costmap.anchors(cells)))
@@ -160,20 +160,20 @@ def nonzero_cells(mask: BoolArray) -> IntArray:
     return np.stack(np.divmod(np.flatnonzero(mask), mask.shape[1]), axis=-1)
 
 
-def cell_costs(clearance: Field, fits: BoolArray, config: NavigationConfig) -> FloatArray:
+def cell_costs(clearance: Field, fits: BoolArray, config: RobotNavigation) -> FloatArray:
     """Cost of a metre in each coarse cell; infinite where the robot does not fit."""
-    closeness = np.clip(1.0 - clearance / config.preferred_clearance, 0.0, 1.0)
+    closeness = np.clip(1.0 - clearance / config.open_clearance, 0.0, 1.0)
     costs = np.where(fits, 1.0 + config.clearance_weight * closeness**2, np.inf)
     return costs.astype(np.float64)
 
 
-def straighten(points: FloatArray, costmap: Costmap, config: NavigationConfig) -> FloatArray:
+def straighten(points: FloatArray, costmap: Costmap, config: RobotNavigation) -> FloatArray:
     """Fewer corners: a straight piece replaces a part of the path where it keeps as much clearance.
 
     Args:
         points: Path from cell to cell, shape (n, 2) [m].
         costmap: Distance field.
-        config: ``preferred_clearance`` is enough for any straight piece.
+        config: ``open_clearance`` is enough for any straight piece.
 
     Returns:
         Corners of the straightened path, shape (k, 2) [m], same ends.
@@ -197,12 +197,12 @@ def straighten(points: FloatArray, costmap: Costmap, config: NavigationConfig) -
 
 
 def _is_clear(
-    points: FloatArray, clearance: Field, start: int, end: int, costmap: Costmap, config: NavigationConfig
+    points: FloatArray, clearance: Field, start: int, end: int, costmap: Costmap, config: RobotNavigation
 ) -> bool:
     """Whether the straight line between two path points is as clear as the part of the path it would replace."""
     if end == start + 1:
         return True
-    needed = min(float(clearance[start + 1 : end + 1].min()), config.preferred_clearance)
+    needed = min(float(clearance[start + 1 : end + 1].min()), config.open_clearance)
     span = points[end] - points[start]
     samples = max(2, math.ceil(float(np.hypot(*span)) / costmap.fine_frame.resolution))
     line = points[start] + np.linspace(0.0, 1.0, samples + 1)[1:, None] * span

@@ -25,7 +25,7 @@ SURPRISE = 1.0
 CHANGED = 0.5
 
 
-class Lookout:
+class PredictionMonitor:
     """Compares the map with the prediction and remembers since when they have been as they are."""
 
     def __init__(self) -> None:
@@ -34,7 +34,7 @@ class Lookout:
         self._looked_into: set[str] = set()
         self._surprise = (0.0, -math.inf)
 
-    def news(
+    def find_news(
         self,
         prediction: Prediction,
         grid: OccupancyGrid,
@@ -43,7 +43,7 @@ class Lookout:
         *,
         was_at: Callable[[str], bool],
     ) -> tuple[str, ...] | None:
-        """Doors of rooms that have been looked into by now; ``None`` when nothing calls for a revision.
+        """Find the rooms that have been looked into by now.
 
         Args:
             prediction: As revised so far.
@@ -51,6 +51,9 @@ class Lookout:
             completed: The map, with the prediction where it is unknown.
             now: Time [s].
             was_at: Whether the robot has been at a door, by its id.
+
+        Returns:
+            Their doors; ``None`` when nothing calls for a revision.
         """
         shares = seen_share(prediction, grid)
         if self._known_before is None:
@@ -76,8 +79,8 @@ class Lookout:
             return tuple(doors)
         return None
 
-    def revised(self, doors: Sequence[str]) -> None:
-        """The prediction has been revised; these rooms were looked into."""
+    def note_revision(self, doors: Sequence[str]) -> None:
+        """Note that the prediction has been revised and the rooms behind ``doors`` were looked into."""
         self._looked_into |= set(doors)
         self._surprise = (0.0, -math.inf)
 

@@ -19,8 +19,8 @@ from closedrooms.coverage.tour import CoverageTour
 VISITED = 0.5
 
 
-class Itinerary:
-    """Stops on a graph, in the order of their visit, and the way home after the last.
+class RemainingTour:
+    """Stops on a graph, in the order of their visit, and home after the last.
 
     Attributes:
         home: Where the tour ends, map frame [m].
@@ -78,12 +78,12 @@ class Itinerary:
         self._stops = self._stops[1:]
         return place
 
-    def way(self) -> FloatArray:
-        """The way over all stops and home along the edges of the graph, shape (k, 2) [m]."""
+    def path(self) -> FloatArray:
+        """The path over all stops and home along the edges of the graph, shape (k, 2) [m]."""
         at = {int(vertex): position for position, vertex in enumerate(self._metric.vertices)}
         stops = [at[int(vertex)] for vertex in (*self._stops, self._last)]
-        way: FloatArray = self._places[self._metric.way(stops)]
-        return way
+        path: FloatArray = self._places[self._metric.way(stops)]
+        return path
 
     def solve_again(
         self, grid: OccupancyGrid, here: Point, done: FloatArray, config: CoverageConfig, *, reach: float
@@ -109,20 +109,20 @@ class Itinerary:
         home = members[int(np.argmin(np.hypot(*(graph.vertices[members] - np.array(self.home)).T)))]
         others = [v for v in members if v not in {built.start, home}]
         others = [v for v in others if not _was_near(graph.vertices[v], done, reach, grid)]
-        ways = metric(graph, members)
+        shortest = metric(graph, members)
         at = np.searchsorted(members, [built.start, home, *others])
-        order = open_tour(ways.distances[np.ix_(at, at)], config)
+        order = open_tour(shortest.distances[np.ix_(at, at)], config)
         # At the first the robot is already, and home, the last, is driven to anyway.
-        self._places, self._metric, self._last = graph.vertices, ways, home
+        self._places, self._metric, self._last = graph.vertices, shortest, home
         self._stops = np.array([others[i - 2] for i in order[1:-1]], dtype=np.int64)
         return True
 
 
 def open_tour(distances: FloatArray, config: CoverageConfig) -> list[int]:
-    """A short way from place 0 over all places to place 1 (a closed tour where both are one).
+    """Find a short path from place 0 over all places to place 1 (a closed tour where both are one).
 
-    The closed tour is solved with the way from 1 back to 0 made free; all other ways are lengthened alike, which keeps
-    the triangle inequality and makes every good tour use the free one.
+    The closed tour is solved with the path from 1 back to 0 made free; all others are lengthened alike, which keeps the
+    triangle inequality and makes every good tour use the free one.
     """
     count = len(distances)
     if count <= 2:

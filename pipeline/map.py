@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.files import check_output_folder, output_folder
 from closedrooms.core.geojson import write_doors
@@ -16,12 +16,15 @@ from closedrooms.mapping.logs.recorded_run import RecordedRun, read_run
 from closedrooms.mapping.map_builder import BuiltMap, build_map
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import align
-from closedrooms.navigation.observer import NoObserver, Observer
 from closedrooms.pipeline.config import MapConfig
 from closedrooms.pipeline.log_observer import LogWatch
 from closedrooms.pipeline.manifest import resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.stopwatch import Stopwatch
+from closedrooms.visualization.no_recording import no_recording
+
+if TYPE_CHECKING:
+    from closedrooms.visualization.rerun.recorder import Recorder
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,9 +135,9 @@ def _write(folder: Path, run: RecordedRun, built: BuiltMap) -> None:
 
 
 @contextlib.contextmanager
-def _recording(config: MapConfig, run: RecordedRun, path: Path) -> Iterator[Observer]:
+def _recording(config: MapConfig, run: RecordedRun, path: Path) -> Iterator["Recorder"]:
     if not config.record:
-        yield NoObserver()
+        yield no_recording()
         return
     from closedrooms.visualization.rerun.blueprint import Layout
     from closedrooms.visualization.rerun.recorder import Recorder

@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
@@ -12,12 +12,15 @@ from closedrooms.core.geojson import read_doors, write_doors, write_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.core.rosmap import read_map, write_map
-from closedrooms.navigation.observer import NoObserver, Observer
 from closedrooms.pipeline.config import PredictConfig
 from closedrooms.pipeline.manifest import resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.stopwatch import Stopwatch
 from closedrooms.predictor.methods import predict
+from closedrooms.visualization.no_recording import no_recording
+
+if TYPE_CHECKING:
+    from closedrooms.visualization.rerun.recorder import Recorder
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,9 +108,9 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> P
 
 
 @contextlib.contextmanager
-def _recording(config: PredictConfig, grid: OccupancyGrid, path: Path) -> Iterator[Observer]:
+def _recording(config: PredictConfig, grid: OccupancyGrid, path: Path) -> Iterator["Recorder"]:
     if not config.record:
-        yield NoObserver()
+        yield no_recording()
         return
     from closedrooms.visualization.rerun.blueprint import Layout
     from closedrooms.visualization.rerun.recorder import Recorder

@@ -1,10 +1,10 @@
 """The main job: simulate, map, predict, plan, compare with the truth, write the run directory."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
@@ -14,22 +14,21 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
 from closedrooms.core.rosmap import write_map
 from closedrooms.core.tum import write_trajectory
-from closedrooms.coverage.estimates import coverage_errors
 from closedrooms.coverage.tour import CoverageTour
 from closedrooms.coverage.tour_features import tour_features
 from closedrooms.coverage.tour_planner import plan_coverage
 from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.mapping.trajectory import ate
-from closedrooms.navigation.drive import DriveResult, drive
-from closedrooms.navigation.exploration import ExplorationResult
-from closedrooms.navigation.observer import Observer
+from closedrooms.navigation.tour_follower import TourPlan
+from closedrooms.pipeline.bounds import check_size, too_narrow
 from closedrooms.pipeline.config import RunConfig, sim_config
+from closedrooms.pipeline.drive import DriveResult, DriveSettings, drive_tour
 from closedrooms.pipeline.drive_report import draw_drive, drive_features, drive_metrics
 from closedrooms.pipeline.manifest import resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
-from closedrooms.pipeline.run_log import Witness
-from closedrooms.pipeline.scores import area_mapped, mean, room_iou, rooms_seen
+from closedrooms.pipeline.report import RunResult, markdown
+from closedrooms.pipeline.run_log import RunLog
+from closedrooms.pipeline.run_metrics import run_metrics
 from closedrooms.pipeline.stopwatch import Stopwatch
 from closedrooms.pipeline.survey import Survey, Truth, survey_building, true_building
 from closedrooms.predictor.methods import predict
@@ -39,41 +38,35 @@ from closedrooms.visualization.rerun.opening import open_recording
 from closedrooms.worlds.closing import check_closed, closable_rooms, draw_closed
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan
-from closedrooms.worlds.truth import reachable
+
+if TYPE_CHECKING:
+    from closedrooms.visualization.rerun.recorder import Recorder
 
 DEFAULT_CLOSED = 5
 START = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RunResult:
-    """One finished run.
+class Finding:
+    """What a run finds out; maps on one frame.
 
     Attributes:
-        folder: The run directory.
-        title: Head of the table of results.
-        metrics: ``metrics`` of ``run.json``.
-        closed: Doors that were closed.
-        seen: Closed doors that the robot saw.
-        failures: Why a seen door could not be predicted, by door id.
-        durations: Seconds by stage.
-        exploration: ``exploration`` of ``run.json``: status, simulated seconds, scans, way.
+        survey: What the robot brought home.
+        prediction: The rooms behind the closed doors.
+        truth: What is really there.
+        tours: By the map that they were planned on: ``closed``, ``predicted``, ``truth``.
+        missing: Why there is no tour, by the same names.
+        notes: What their planning says.
+        driven: How the predicted tour was driven, on demand.
     """
 
-    folder: Path
-    title: str
-    metrics: dict[str, Any]
-    closed: tuple[str, ...]
-    seen: tuple[str, ...]
-    failures: dict[str, str] = field(default_factory=dict)
-    durations: dict[str, float] = field(default_factory=dict)
-    exploration: dict[str, Any] = field(default_factory=dict)
-
-    def table(self) -> list[tuple[str, str]]:
-        """Rows for people; the first is the head."""
-        from closedrooms.pipeline.report import run_rows
-
-        return run_rows(self)
+    survey: Survey
+    prediction: Prediction
+    truth: Truth
+    tours: dict[str, CoverageTour]
+    missing: dict[str, str]
+    notes: list[str]
+    driven: DriveResult | None = None
 
 
 def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
@@ -98,6 +91,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
         closed = choose_closed(plan, config)
         folder = config.out or Path("runs") / f"{plan.name}-{config.seed}"
         check_output_folder(folder)
+        check_size(plan, config.mapper.resolution, config.navigation)
     manifest: dict[str, Any] = {
         "configuration": resolved(config, leave_out=("out", "world")),
         "world": plan.name,
@@ -105,70 +99,80 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
         "closed": list(closed),
         "versions": versions(),
     }
+    name, record = f"{plan.name}-{config.seed}", config.record
     with (
         output_folder(folder, manifest) as staging,
         open_recording(
-            staging / "run.rrd" if config.record else None,
-            plan,
-            name=f"{plan.name}-{config.seed}",
-            driving=config.drive,
-        ) as observer,
+            staging / "run.rrd" if record else None, plan, config.sim.robot, name=name, driving=config.drive
+        ) as recorder,
         Simulation(plan, closed, config.sim, config.seed) as sim,
     ):
-        map_T_world = sim.world_T_map.inverse()
-        observer.configuration(manifest["configuration"])
-        observer.building(plan, map_T_world, closed)
-        witness = Witness(sim, progress, keep_scans=config.keep_scans)
-        mapper = Mapper(config.mapper)
-        survey = survey_building(
-            witness, mapper, config.navigation, period=1.0 / config.sim.lidar.rate,
-            observer=observer, progress=progress, watch=watch,
-        )  # fmt: skip
-        with watch.stage("predict"):
-            progress.stage("predict")
-            prediction = predict(survey.grid, survey.doors, config.method, config.predictor, trace=config.record)
-            truth = true_building(plan, closed, prediction.grid.frame, map_T_world)
-            observer.prediction(survey.grid, survey.doors, prediction)
-            observer.truth(truth.grid, truth.rooms)
-        frame = truth.grid.frame
-        survey = replace(survey, grid=survey.grid.on(frame))
-        prediction = replace(prediction, grid=prediction.grid.on(frame))
-        with watch.stage("cover"):
-            progress.stage("cover")
-            tours, notes = plan_tours(survey, prediction, truth.grid, config)
-            observer.tours(tours)
-        manifest["exploration"] = _exploration(survey.exploration)
-        manifest["metrics"] = _metrics(plan, closed, map_T_world, survey, prediction, truth, tours)
-        driven: DriveResult | None = None
-        if config.drive and "predicted" in tours:
-            with watch.stage("drive"):
-                progress.stage("drive")
-                driven, figures = _drive(witness, mapper, config, closed, survey, prediction, truth, tours, observer)
-            manifest["metrics"]["drive"] = figures
-        manifest["doors"] = {
-            "seen": [door.id for door in survey.doors],
-            "not_seen": sorted(set(closed) - {door.id for door in survey.doors}),
-            "failures": prediction.failures,
-        }
-        manifest["notes"] = notes
+        recorder.configuration(manifest["configuration"])
+        recorder.building(plan, sim.world_T_map.inverse(), closed)
+        log, mapper = RunLog(sim, progress, keep_scans=config.keep_scans), Mapper(config.mapper)
+        found = _find_out(config, closed, log, mapper, recorder, progress, watch)
+        remarks = too_narrow(plan, closed, sim.world_T_map, config.navigation.for_robot(config.sim.robot))
+        manifest |= _figures(plan, closed, sim.world_T_map.inverse(), found)
+        manifest["remarks"] = [remark.as_json() for remark in remarks]
         with watch.stage("write"):
             progress.stage("write")
-            _write(staging, survey, prediction, truth, tours, driven)
+            _write(staging, found, manifest["metrics"])
             if config.keep_scans:
-                write_scans(staging / "scans.npz", witness.recorded(), estimate=mapper.trajectory()[1])
+                write_scans(staging / "scans.npz", log.recorded(), estimate=mapper.trajectory()[1])
         manifest["durations"] = watch.seconds()
         result = RunResult(
             folder,
             f"{plan.name}, seed {config.seed}, noise {config.noise}",
             manifest["metrics"],
             closed,
-            tuple(door.id for door in survey.doors),
-            prediction.failures,
+            tuple(door.id for door in found.survey.doors),
+            found.prediction.failures,
+            _stopped(found),
+            tuple(remarks),
             manifest["durations"],
             manifest["exploration"],
         )
-        observer.table(_markdown(result))
+        recorder.table(markdown(result))
     return result
+
+
+def _find_out(
+    config: RunConfig,
+    closed: Sequence[str],
+    log: RunLog,
+    mapper: Mapper,
+    recorder: "Recorder",
+    progress: Progress,
+    watch: Stopwatch,
+) -> Finding:
+    """Explore, predict, plan tours and, on demand, drive the predicted one."""
+    plan, map_T_world = log.sim.plan, log.sim.world_T_map.inverse()
+    survey = survey_building(log, mapper, config.navigation, recorder=recorder, progress=progress, watch=watch)
+    with watch.stage("predict"):
+        progress.stage("predict")
+        prediction = predict(survey.grid, survey.doors, config.method, config.predictor, trace=config.record)
+        truth = true_building(plan, closed, prediction.grid.frame, map_T_world)
+        recorder.prediction(survey.grid, survey.doors, prediction)
+        recorder.truth(truth.grid, truth.rooms)
+    survey = replace(survey, grid=survey.grid.on(truth.grid.frame))
+    prediction = replace(prediction, grid=prediction.grid.on(truth.grid.frame))
+    with watch.stage("cover"):
+        progress.stage("cover")
+        tours, missing, notes = plan_tours(survey, prediction, truth.grid, config)
+        recorder.tours(tours)
+    found = Finding(survey, prediction, truth, tours, missing, notes)
+    if not config.drive or "predicted" not in tours:
+        return found
+    with watch.stage("drive"):
+        progress.stage("drive")
+        tour = TourPlan(prediction, tours["predicted"], tuple(survey.doors))
+        settings = DriveSettings(
+            navigation=config.navigation.for_robot(config.sim.robot),
+            mapper=config.mapper,
+            predictor=partial(predict, method=config.method, config=config.predictor),
+            coverage=config.coverage,
+        )
+        return replace(found, driven=drive_tour(log, mapper, tour, closed, settings, recorder))
 
 
 def choose_closed(plan: FloorPlan, config: RunConfig) -> tuple[str, ...]:
@@ -188,9 +192,14 @@ def choose_closed(plan: FloorPlan, config: RunConfig) -> tuple[str, ...]:
 
 def plan_tours(
     survey: Survey, prediction: Prediction, truth: OccupancyGrid, config: RunConfig
-) -> tuple[dict[str, CoverageTour], list[str]]:
-    """Tours on M with a vertex at every closed door, on M_pred and on M_GT (paper, section 5.2)."""
+) -> tuple[dict[str, CoverageTour], dict[str, str], list[str]]:
+    """Plan tours on M with a vertex at every closed door, on M_pred and on M_GT (paper, section 5.2).
+
+    Returns:
+        Tours by the names ``closed``, ``predicted`` and ``truth``, why one is missing, and what their planning says.
+    """
     tours: dict[str, CoverageTour] = {}
+    missing: dict[str, str] = {}
     notes: list[str] = []
     for name, grid, doors in (
         ("closed", survey.grid, survey.doors),
@@ -200,104 +209,46 @@ def plan_tours(
         try:
             tours[name] = plan_coverage(grid, doors, config.coverage, start=START)
         except InvalidInputError as error:
-            notes.append(f"no tour on the {name} map: {error}")
+            missing[name] = f"no tour on the {name} map: {error}"
             continue
         notes += [f"tour on the {name} map: {note}" for note in tours[name].notes]
-    return tours, notes
+    return tours, missing, notes
 
 
-def _drive(
-    witness: Witness,
-    mapper: Mapper,
-    config: RunConfig,
-    closed: Sequence[str],
-    survey: Survey,
-    prediction: Prediction,
-    truth: Truth,
-    tours: dict[str, CoverageTour],
-    observer: Observer,
-) -> tuple[DriveResult, dict[str, Any]]:
-    """Open the doors, drive the tour of the predicted map, and judge it."""
-    predictor = partial(predict, method=config.method, config=config.predictor)
-    driven = drive(
-        witness, mapper, prediction, tours["predicted"], survey.doors, config.navigation,
-        closed=closed, predictor=predictor, coverage=config.coverage, mapping=config.mapper,
-        observer=observer, period=1.0 / config.sim.lidar.rate,
-    )  # fmt: skip
-    seen, sim = driven.grid, witness.sim
-    start = sim.world_T_map
-    cells = reachable(sim.plan, (), seen.frame, start.inverse(), (start.x, start.y))
-    return driven, drive_metrics(driven, truth.rooms, seen, cells, tours.get("truth"))
-
-
-def _exploration(exploration: ExplorationResult) -> dict[str, Any]:
+def _figures(plan: FloorPlan, closed: Sequence[str], map_T_world: Pose2, found: Finding) -> dict[str, Any]:
+    """What ``run.json`` says of a finding."""
+    survey, log, prediction = found.survey, found.survey.exploration, found.prediction
+    metrics = run_metrics(plan, closed, map_T_world, survey, prediction, found.truth, found.tours)
+    if found.driven is not None:
+        metrics["drive"] = drive_metrics(found.driven, plan, map_T_world, found.truth, found.tours.get("truth"))
+    seen = [door.id for door in survey.doors]
     return {
-        "status": exploration.status,
-        "simulated_s": round(exploration.seconds, 3),
-        "scans": exploration.scans,
-        "distance_m": round(exploration.distance, 3),
-        "plans": exploration.plans,
+        "exploration": {
+            "status": log.status,
+            "simulated_s": round(log.seconds, 3),
+            "scans": log.scans,
+            "distance_m": round(log.distance, 3),
+            "plans": survey.searches,
+            **({"reason": log.reason} if log.reason else {}),
+        },
+        "metrics": metrics,
+        "doors": {"seen": seen, "not_seen": sorted(set(closed) - set(seen)), "failures": prediction.failures},
+        "notes": [*found.missing.values(), *found.notes],
     }
 
 
-def _metrics(
-    plan: FloorPlan,
-    closed: Sequence[str],
-    map_T_world: Pose2,
-    survey: Survey,
-    prediction: Prediction,
-    truth: Truth,
-    tours: dict[str, CoverageTour],
-) -> dict[str, Any]:
-    """Every figure of the run; units stand in the names or beside them."""
-    position, heading = ate(survey.estimate, survey.truth)
-    start = map_T_world.inverse()
-    cells = reachable(plan, closed, truth.grid.frame, map_T_world, (start.x, start.y))
-    seen = {door.id for door in survey.doors}
-    figures = {door: iou for door, iou in room_iou(prediction.rooms, truth.rooms).items() if door in seen}
-    average = mean(figures)
-    metrics: dict[str, Any] = {
-        "area_mapped": round(area_mapped(survey.grid, cells), 5),
-        "ate_m": round(position, 5),
-        "ate_rad": round(heading, 6),
-        "room_iou": {door: round(iou, 5) for door, iou in figures.items()},
-        "room_iou_mean": None if average is None else round(average, 5),
-        "doors_closed": len(closed),
-        "doors_seen": len(seen),
-        "rooms_seen": rooms_seen(plan, survey.grid, map_T_world),
-        "tour": {},
-        "units": {"area_mapped": "share 0..1", "room_iou": "share 0..1", "ate_m": "m", "ate_rad": "rad"},
-    }
-    for name, tour in tours.items():
-        metrics["tour"][name] = {
-            "length_m": round(tour.length, 4),
-            "lower_bound_m": round(tour.lower_bound, 4),
-            "vertices": len(tour.graph.vertices),
-            "status": tour.status,
-        }
-    if {"closed", "predicted", "truth"} <= tours.keys():
-        errors = coverage_errors(
-            tours["closed"], tours["predicted"], tours["truth"], metrics["rooms_seen"], len(survey.doors)
-        )
-        metrics["tour"]["errors_percent"] = {
-            "closed": round(errors.error_closed, 4),
-            "baseline": round(errors.error_baseline, 4),
-            "predicted": round(errors.error_pred, 4),
-        }
-    return metrics
+def _stopped(found: Finding) -> dict[str, str]:
+    """Which stage ended before it was done, and why."""
+    logs = {"exploration": found.survey.exploration} | ({} if found.driven is None else {"drive": found.driven.log})
+    stopped = {stage: f"{log.status}, {log.reason}" for stage, log in logs.items() if log.status != "complete"}
+    return stopped | ({"cover": "; ".join(found.missing.values())} if found.missing else {})
 
 
-def _write(
-    folder: Path,
-    survey: Survey,
-    prediction: Prediction,
-    truth: Truth,
-    tours: dict[str, CoverageTour],
-    driven: DriveResult | None,
-) -> None:
-    """Every data file of the run directory, then the picture."""
+def _write(folder: Path, found: Finding, metrics: Mapping[str, Any]) -> None:
+    """Every data file of the run directory, then the pictures."""
     from closedrooms.visualization.summary import draw_summary
 
+    survey, prediction, truth, driven = found.survey, found.prediction, found.truth, found.driven
     write_map(folder / "map", survey.grid)
     write_map(folder / "predicted", prediction.grid)
     write_map(folder / "truth", truth.grid)
@@ -306,7 +257,7 @@ def _write(
     write_rooms(folder / "truth_rooms.geojson", truth.rooms)
     write_trajectory(folder / "trajectory.tum", survey.stamps, survey.estimate)
     write_trajectory(folder / "trajectory_truth.tum", survey.stamps, survey.truth)
-    features = [f for name, tour in tours.items() for f in tour_features(tour, name)]
+    features = [f for name, tour in found.tours.items() for f in tour_features(tour, name)]
     write_features(folder / "tour.geojson", features + ([] if driven is None else drive_features(driven)))
     if driven is not None:
         draw_drive(folder / "drive.png", driven, truth.rooms)
@@ -317,13 +268,7 @@ def _write(
         survey.doors,
         truth=truth.grid,
         truth_rooms=truth.rooms,
-        tours=tours,
+        room_iou=metrics["room_iou"],
+        tours=found.tours,
         trajectory=survey.estimate,
     )
-
-
-def _markdown(result: RunResult) -> str:
-    head, *rows = result.table()
-    # Times differ from run to run, recordings of equal runs must not.
-    lines = [f"| {' | '.join(row)} |" for row in rows if not row[0].startswith("time")]
-    return "\n".join([f"# {result.title}", "", f"| {' | '.join(head)} |", "| --- | ---: |", *lines])

@@ -3,18 +3,27 @@
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray
+from closedrooms.core.observation import Observation
+from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.pipeline.progress import Progress
-from closedrooms.sim.observation import Observation
 from closedrooms.sim.simulation import Simulation
 
 
-class Witness:
-    """Stands between the simulation and who drives the robot, and writes down every observation."""
+class RunLog:
+    """Stands between the simulation and the control loop, and writes down every observation and where it was made.
+
+    The loop gets the observation; the true pose stays here.
+
+    Attributes:
+        sim: What is driven.
+        map_T_robot: The true pose at the last observation.
+    """
 
     def __init__(self, sim: Simulation, progress: Progress, *, keep_scans: bool) -> None:
-        self._sim = sim
+        self.sim = sim
+        self.map_T_robot = Pose2()
         self._progress = progress
         self._keep_scans = keep_scans
         self._stamps: list[float] = []
@@ -22,11 +31,17 @@ class Witness:
         self._odometry: list[tuple[float, float, float]] = []
         self._scans: list[LaserScan] = []
 
+    @property
+    def period(self) -> float:
+        """Time from one sweep to the next [s]."""
+        return self.sim.period
+
     def observe(self) -> Observation:
         """What the robot senses now; noted."""
-        observation = self._sim.observe()
+        observation = self.sim.observe()
+        self.map_T_robot = self.sim.map_T_robot
         self._stamps.append(observation.stamp)
-        self._truth.append(observation.map_T_robot_true.as_tuple())
+        self._truth.append(self.map_T_robot.as_tuple())
         self._odometry.append(observation.odometry.as_tuple())
         if self._keep_scans:
             self._scans.append(observation.scan)
@@ -35,25 +50,7 @@ class Witness:
 
     def step(self, v: float, w: float, duration: float) -> None:
         """Let time pass under a velocity command."""
-        self._sim.step(v, w, duration)
-
-    @property
-    def sim(self) -> Simulation:
-        """What is watched."""
-        return self._sim
-
-    def open_door(self, door_id: str) -> None:
-        """Let a closed door open."""
-        self._sim.open_door(door_id)
-
-    def door_states(self) -> dict[str, float]:
-        """How far each door is open, 0 to 1."""
-        return self._sim.door_states()
-
-    @property
-    def stamps(self) -> FloatArray:
-        """Times of the observations [s], shape (n,)."""
-        return np.array(self._stamps)
+        self.sim.step(v, w, duration)
 
     @property
     def truth(self) -> FloatArray:

@@ -17,15 +17,15 @@ from closedrooms.worlds.plan import FloorPlan
 SEEN_SPACING, SEEN_SHARE = 0.25, 0.5
 
 
-def area_mapped(grid: OccupancyGrid, reachable: BoolArray) -> float:
-    """Share (0..1) of the reachable true free cells that the map knows; NaN when nothing is reachable.
+def area_mapped(grid: OccupancyGrid, reachable: BoolArray) -> float | None:
+    """Share (0..1) of the reachable true free cells that the map knows; ``None`` when nothing is reachable.
 
     Args:
         grid: The map.
         reachable: True free cells connected to the start with the closed doors shut, shape of ``grid``.
     """
     cells = int(reachable.sum())
-    return float((grid.known & reachable).sum() / cells) if cells else float("nan")
+    return float((grid.known & reachable).sum() / cells) if cells else None
 
 
 def room_iou(predicted: Sequence[Room], truth: Sequence[Room]) -> dict[str, float]:
@@ -49,6 +49,11 @@ def _iou(a: BaseGeometry, b: BaseGeometry) -> float:
     a, b = (shape if shape.is_valid else shapely.make_valid(shape) for shape in (a, b))
     union = a.union(b).area
     return float(a.intersection(b).area / union) if union else 0.0
+
+
+def rounded(value: float | None) -> float | None:
+    """A figure as it stands in ``run.json``; ``None`` for one that cannot be computed."""
+    return None if value is None else round(value, 5)
 
 
 def mean(figures: Mapping[str, float]) -> float | None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
@@ -10,13 +11,19 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.exploration import ExplorationResult, explore
-from closedrooms.navigation.observer import NoObserver, Observer
+from closedrooms.navigation.control_loop import LoopLog, run_loop
+from closedrooms.navigation.explorer import Explorer
+from closedrooms.pipeline.bounds import Outline
+from closedrooms.pipeline.live_recording import ExplorationRecording
 from closedrooms.pipeline.progress import Progress, Silent
-from closedrooms.pipeline.run_log import Witness
+from closedrooms.pipeline.run_log import RunLog
 from closedrooms.pipeline.stopwatch import Stopwatch
+from closedrooms.visualization.no_recording import no_recording
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.truth import rasterise, true_rooms, truth_bounds
+
+if TYPE_CHECKING:
+    from closedrooms.visualization.rerun.recorder import Recorder
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,6 +34,7 @@ class Survey:
         grid: The map M.
         doors: Closed doors that were seen, map frame.
         exploration: How it went.
+        searches: Searches for a goal.
         stamps: Times of the scans [s], shape (n,).
         estimate: Poses as estimated after the last optimisation, shape (n, 3), metres and radians, map frame.
         truth: True poses, shape (n, 3), map frame.
@@ -34,7 +42,8 @@ class Survey:
 
     grid: OccupancyGrid
     doors: list[ClosedDoor]
-    exploration: ExplorationResult
+    exploration: LoopLog
+    searches: int
     stamps: FloatArray
     estimate: FloatArray
     truth: FloatArray
@@ -49,29 +58,36 @@ class Truth:
 
 
 def survey_building(
-    witness: Witness,
+    log: RunLog,
     mapper: Mapper,
     navigation: NavigationConfig,
     *,
-    period: float,
-    observer: Observer | None = None,
+    recorder: "Recorder | None" = None,
     progress: Progress | None = None,
     watch: Stopwatch | None = None,
 ) -> Survey:
-    """Explore and map until nothing reachable is left unknown.
+    """Explore and map until nothing reachable is left unknown, or the robot has left the building.
 
     Args:
-        witness: The simulation, watched.
+        log: The simulation, with its robot, and what is kept of the run.
         mapper: A fresh mapper; it keeps its keyframes.
         navigation: Exploration.
-        period: Time between scans [s].
-        observer: Told of every step.
+        recorder: Told of every step.
         progress: Told of the stages.
         watch: Given the wall-clock time of each stage.
     """
-    observer, progress, watch = observer or NoObserver(), progress or Silent(), watch or Stopwatch()
+    recorder, progress, watch = recorder or no_recording(), progress or Silent(), watch or Stopwatch()
     progress.stage("explore")
-    exploration = explore(witness, mapper, navigation, observer, period=period)
+    config = navigation.for_robot(log.sim.config.robot)
+    explorer, outline = Explorer(config), Outline(log.sim.plan)
+    exploration = run_loop(
+        log, mapper, explorer, config,
+        on_step=ExplorationRecording(recorder, log, mapper, explorer),
+        stop=lambda _: outline.check(log.sim.world_T_robot),
+    )  # fmt: skip
+    end = float(exploration.stamps[-1])
+    went = f"{exploration.status} after {exploration.seconds:.1f} s and {exploration.distance:.1f} m"
+    recorder.note(f"exploration {went}", end)
     for name, seconds in exploration.wall_seconds.items():
         watch.add(name, seconds)
     with watch.stage("finish map"):
@@ -79,12 +95,11 @@ def survey_building(
         mapper.finish()
         stamps, poses = mapper.trajectory()
         grid, doors = mapper.grid(), mapper.doors()
-        end = float(stamps[-1])
-        observer.loops(mapper.loops, end)
-        observer.trajectory(stamps, poses)
-        observer.map(grid, end, final=True)
-        observer.doors(doors, end)
-    return Survey(grid, doors, exploration, stamps, poses, witness.truth)
+        recorder.loops(mapper.loops, end)
+        recorder.trajectory(stamps, poses)
+        recorder.map(grid, end, final=True)
+        recorder.doors(doors, end)
+    return Survey(grid, doors, exploration, explorer.searches, stamps, poses, log.truth)
 
 
 def true_building(plan: FloorPlan, closed: Sequence[str], frame: GridFrame, map_T_world: Pose2) -> Truth:

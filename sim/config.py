@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.robot import RobotConfig
 
 FULL_TURN = 2.0 * math.pi
 
@@ -84,29 +85,6 @@ LIDAR_PRESETS: Mapping[str, LidarConfig] = MappingProxyType(
         "robotis-lds-01": LidarConfig(beams=360, range_min=0.12, range_max=3.5, rate=5.0),
     }
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class RobotConfig:
-    """A round differential-drive robot."""
-
-    radius: float = 0.2
-    """Radius of the body [m]."""
-    height: float = 0.5
-    """Height of the body [m]."""
-    max_speed: float = 1.0
-    """Fastest drive, forwards and backwards [m/s]."""
-    max_turn_rate: float = 2.0
-    """Fastest turn [rad/s]."""
-    max_acceleration: float = 1.5
-    """Strongest change of speed, braking included [m/s^2]."""
-    max_turn_acceleration: float = 6.0
-    """Strongest change of the turn rate [rad/s^2]."""
-
-    def __post_init__(self) -> None:
-        for name in ("radius", "height", "max_speed", "max_turn_rate", "max_acceleration", "max_turn_acceleration"):
-            value = getattr(self, name)
-            _check("robot", math.isfinite(value) and value > 0, f"{name} {value:g}", "a finite number above 0")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from closedrooms.sim.config import RobotConfig
+from closedrooms.core.robot import RobotConfig
 from closedrooms.sim.contacts import SKIN, Edge, Obstacles, distance, move_disc
 
 # While velocities change, an arc is driven with the mean of so much time [s]: at the default limits this leaves the

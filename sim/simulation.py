@@ -11,13 +11,13 @@ from shapely.geometry import Polygon
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import DoorSighting, Point
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.observation import Observation
 from closedrooms.core.pose import Pose2
 from closedrooms.sim.building import Building, gap_from
 from closedrooms.sim.config import SimConfig
 from closedrooms.sim.contacts import SKIN
 from closedrooms.sim.differential_drive import RAMP_SECONDS, Drive
 from closedrooms.sim.lidar import Lidar
-from closedrooms.sim.observation import Observation
 from closedrooms.sim.odometry import Odometry
 from closedrooms.sim.physics_world import PhysicsWorld
 from closedrooms.worlds.plan import FloorPlan
@@ -78,6 +78,11 @@ class Simulation:
         return self._time
 
     @property
+    def period(self) -> float:
+        """Time from one sweep to the next [s]."""
+        return 1.0 / self.config.lidar.rate
+
+    @property
     def collided(self) -> bool:
         """Whether the robot touched anything in the last step."""
         return self._drive.collided
@@ -94,7 +99,7 @@ class Simulation:
 
     @property
     def map_T_robot(self) -> Pose2:  # noqa: N802
-        """The true pose in the map frame."""
+        """The true pose in the map frame: for truth and for pictures, never for an estimate."""
         return self._map_T_world @ self.world_T_robot
 
     def observe(self) -> Observation:
@@ -116,7 +121,7 @@ class Simulation:
             )
             for door in seen
         )
-        return Observation(scan, self._odometry.pose, sightings, self._map_T_world @ world_T_robot, self._time)
+        return Observation(scan, self._odometry.pose, sightings)
 
     def true_ranges(self, world_T_robot: Pose2) -> FloatArray:
         """What the lidar would measure without noise from anywhere, shape (beams,) [m], infinity without a return."""

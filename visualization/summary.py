@@ -14,7 +14,6 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.files import write_bytes
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.pipeline.scores import room_iou
 from closedrooms.visualization import colours
 
 if TYPE_CHECKING:
@@ -40,6 +39,7 @@ def draw_summary(
     *,
     truth: OccupancyGrid | None = None,
     truth_rooms: Sequence[Room] = (),
+    room_iou: Mapping[str, float] | None = None,
     tours: Mapping[str, "CoverageTour"] | None = None,
     trajectory: FloatArray | None = None,
 ) -> None:
@@ -52,6 +52,7 @@ def draw_summary(
         doors: Closed doors in the map.
         truth: M_GT.
         truth_rooms: True rooms behind the closed doors.
+        room_iou: How well each room was predicted, by door id.
         tours: Coverage tours; that for ``predicted`` is drawn.
         trajectory: Where the robot went, shape (n, 2 or 3) [m].
 
@@ -63,7 +64,7 @@ def draw_summary(
     palette = colours.room_colours([d.id for d in doors] + [d for room in truth_rooms for d in room.doors])
     panels = [
         _map_panel(bounds, observed, doors, trajectory),
-        _prediction_panel(bounds, prediction, doors, truth_rooms, palette),
+        _prediction_panel(bounds, prediction, doors, room_iou or {}, palette),
     ]
     if truth is not None:
         panels.append(_truth_panel(bounds, truth, truth_rooms, prediction, palette))
@@ -88,7 +89,7 @@ def draw_cover(path: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor], tou
 
 
 def draw_map(path: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor], trajectory: FloatArray) -> None:
-    """Write one picture of a map with the way that the robot took.
+    """Write one picture of a map with the path that the robot took.
 
     Args:
         path: The PNG.
@@ -108,9 +109,9 @@ def _map_panel(
     canvas = _canvas(bounds)
     canvas.grid(grid)
     if trajectory is not None and len(trajectory):
-        way = np.asarray(trajectory)[:, :2]
-        canvas.line(way, colours.ESTIMATE, width=2)
-        canvas.dots(way[:1], colours.ESTIMATE, radius=6)
+        path = np.asarray(trajectory)[:, :2]
+        canvas.line(path, colours.ESTIMATE, width=2)
+        canvas.dots(path[:1], colours.ESTIMATE, radius=6)
     _draw_doors(canvas, doors, named=True)
     plural = "" if len(doors) == 1 else "s"
     return f"Map with {len(doors)} closed door{plural}", canvas.finished()
@@ -120,18 +121,16 @@ def _prediction_panel(
     bounds: "Bounds",
     prediction: "Prediction",
     doors: Sequence[ClosedDoor],
-    truth_rooms: Sequence[Room],
+    room_iou: Mapping[str, float],
     palette: Mapping[str, colours.Colour],
 ) -> Panel:
     canvas = _canvas(bounds)
     canvas.grid(prediction.grid)
-    seen = {door.id for door in doors}
-    figures = {door: iou for door, iou in room_iou(prediction.rooms, truth_rooms).items() if door in seen}
-    _draw_rooms(canvas, prediction.rooms, palette, figures)
+    _draw_rooms(canvas, prediction.rooms, palette, room_iou)
     _draw_doors(canvas, doors)
     title = f"Predicted: {len(prediction.rooms)} of {len(doors)} closed doors"
-    if figures:
-        title += f", mean IoU {np.mean(list(figures.values())):.2f}"
+    if room_iou:
+        title += f", mean IoU {np.mean(list(room_iou.values())):.2f}"
     return title, canvas.finished()
 
 

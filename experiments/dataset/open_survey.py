@@ -11,9 +11,9 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.exploration import ExplorationStatus
+from closedrooms.navigation.control_loop import LoopStatus
 from closedrooms.pipeline.progress import Silent
-from closedrooms.pipeline.run_log import Witness
+from closedrooms.pipeline.run_log import RunLog
 from closedrooms.pipeline.survey import survey_building
 from closedrooms.sim.config import SimConfig
 from closedrooms.sim.simulation import Simulation
@@ -44,7 +44,7 @@ class OpenSurvey:
     mapper: MapperConfig
     seed: int
     world_T_map: Pose2
-    status: ExplorationStatus
+    status: LoopStatus
     seconds: float
     keyframes: RecordedRun
     poses: FloatArray
@@ -75,9 +75,9 @@ def survey_open(
         InvalidInputError: The robot does not fit at the start, or got stuck where it knows nothing.
     """
     with Simulation(plan, (), sim, seed) as world:
-        witness, slam = Witness(world, Silent(), keep_scans=True), Mapper(mapper)
-        survey = survey_building(witness, slam, navigation, period=1.0 / sim.lidar.rate)
-        recorded, world_T_map = witness.recorded(), world.world_T_map
+        log, slam = RunLog(world, Silent(), keep_scans=True), Mapper(mapper)
+        survey = survey_building(log, slam, navigation)
+        recorded, world_T_map = log.recorded(), world.world_T_map
     if not slam.keyframes:
         raise InvalidInputError("an exploration without a scan", expected="a map", where=plan.name)
     stamps = np.array([keyframe.stamp for keyframe in slam.keyframes])

@@ -4,7 +4,7 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,17 +27,19 @@ from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import ate
-from closedrooms.navigation.observer import Observer
 from closedrooms.pipeline.manifest import resolved, versions
 from closedrooms.pipeline.progress import Silent
-from closedrooms.pipeline.run_log import Witness
-from closedrooms.pipeline.scores import area_mapped, count_seen, room_points
+from closedrooms.pipeline.run_log import RunLog
+from closedrooms.pipeline.scores import area_mapped, count_seen, room_points, rounded
 from closedrooms.pipeline.survey import Truth, survey_building
 from closedrooms.sim.simulation import Simulation
 from closedrooms.visualization.rerun.opening import open_recording
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.truth import rasterise, reachable, true_rooms, truth_bounds
+
+if TYPE_CHECKING:
+    from closedrooms.visualization.rerun.recorder import Recorder
 
 FORMAT = 1
 SURVEYS = "surveys"
@@ -137,15 +139,17 @@ def _make_sample(task: Task, variant: Variant, plan: FloorPlan) -> None:
     }
     with (
         output_folder(task.folder, manifest) as staging,
-        open_recording(staging / "run.rrd" if config.record else None, plan, name=variant.id) as observer,
+        open_recording(
+            staging / "run.rrd" if config.record else None, plan, config.sim.robot, name=variant.id
+        ) as recorder,
     ):
-        observer.configuration(manifest["configuration"])
-        observer.building(plan, start.inverse(), closed)
-        observed = _erased(config, world, closed) if erased else _simulated(config, plan, closed, seed, observer)
+        recorder.configuration(manifest["configuration"])
+        recorder.building(plan, start.inverse(), closed)
+        observed = _erased(config, world, closed) if erased else _simulated(config, plan, closed, seed, recorder)
         truth = Truth(_true_map(world.source, observed.grid.frame, start), true_rooms(plan, closed, start.inverse()))
         if erased:
-            _show(observer, observed)
-        observer.truth(truth.grid, truth.rooms)
+            _show(recorder, observed)
+        recorder.truth(truth.grid, truth.rooms)
         frame = truth.grid.frame
         write_map(staging / "map", observed.grid.on(frame))
         write_map(staging / "truth", truth.grid)
@@ -170,7 +174,7 @@ def _metrics(
     position, heading = ate(observed.estimate, observed.truth)
     cells = reachable(plan, closed, truth.frame, map_T_world, (start.x, start.y))
     return {
-        "area_mapped": round(area_mapped(observed.grid.on(truth.frame), cells), 5),
+        "area_mapped": rounded(area_mapped(observed.grid.on(truth.frame), cells)),
         "ate_m": round(position, 5),
         "ate_rad": round(heading, 6),
         "doors_closed": len(closed),
@@ -215,13 +219,12 @@ def _true_map(source: str, frame: GridFrame, start: Pose2) -> OccupancyGrid:
 
 
 def _simulated(
-    config: DatasetConfig, plan: FloorPlan, closed: Sequence[str], seed: int, observer: Observer
+    config: DatasetConfig, plan: FloorPlan, closed: Sequence[str], seed: int, recorder: "Recorder"
 ) -> Observed:
     with Simulation(plan, closed, config.sim, seed) as sim:
-        witness, mapper = Witness(sim, Silent(), keep_scans=config.keep_scans), Mapper(config.mapper)
-        period = 1.0 / config.sim.lidar.rate
-        survey = survey_building(witness, mapper, config.navigation, period=period, observer=observer)
-        scans = witness.recorded() if config.keep_scans else None
+        log, mapper = RunLog(sim, Silent(), keep_scans=config.keep_scans), Mapper(config.mapper)
+        survey = survey_building(log, mapper, config.navigation, recorder=recorder)
+        scans = log.recorded() if config.keep_scans else None
     about = {
         "status": survey.exploration.status,
         "simulated_s": round(survey.exploration.seconds, 3),
@@ -230,9 +233,9 @@ def _simulated(
     return Observed(survey.grid, survey.doors, survey.stamps, survey.estimate, survey.truth, scans, about)
 
 
-def _show(observer: Observer, observed: Observed) -> None:
+def _show(recorder: "Recorder", observed: Observed) -> None:
     """An erased map was never explored: its recording holds what there is, at the end of the survey."""
     end = float(observed.stamps[-1])
-    observer.trajectory(observed.stamps, observed.estimate)
-    observer.map(observed.grid, end, final=True)
-    observer.doors(observed.doors, end)
+    recorder.trajectory(observed.stamps, observed.estimate)
+    recorder.map(observed.grid, end, final=True)
+    recorder.doors(observed.doors, end)

@@ -18,9 +18,9 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.exploration import ExplorationStatus
+from closedrooms.navigation.control_loop import LoopStatus
 from closedrooms.pipeline.progress import Silent
-from closedrooms.pipeline.run_log import Witness
+from closedrooms.pipeline.run_log import RunLog
 from closedrooms.pipeline.survey import survey_building
 from closedrooms.sim.config import NOISE_LEVELS, NoiseConfig, SimConfig
 from closedrooms.sim.differential_drive import Motion
@@ -49,7 +49,7 @@ class Drive:
     sim: SimConfig
     run: RecordedRun
     world_T_map: Pose2
-    status: ExplorationStatus
+    status: LoopStatus
 
 
 def record_drive(
@@ -69,9 +69,9 @@ def record_drive(
     """
     ideal = replace(sim, noise=NOISE_LEVELS["none"])
     with Simulation(plan, (), ideal, seed) as world:
-        witness = Witness(world, Silent(), keep_scans=True)
-        survey = survey_building(witness, Mapper(mapper), navigation, period=1.0 / sim.lidar.rate)
-        return Drive(plan, ideal, witness.recorded(), world.world_T_map, survey.exploration.status)
+        log = RunLog(world, Silent(), keep_scans=True)
+        survey = survey_building(log, Mapper(mapper), navigation)
+        return Drive(plan, ideal, log.recorded(), world.world_T_map, survey.exploration.status)
 
 
 def map_drive(drive: Drive, noise: NoiseConfig, mapper: MapperConfig, seed: int) -> OpenSurvey:

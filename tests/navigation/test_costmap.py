@@ -4,10 +4,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from closedrooms.core.grid import GridFrame, OccupancyGrid
+from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.costmap import NavigationMap, build_costmap, pooled
 
-CONFIG = NavigationConfig()
+CONFIG = NavigationConfig().for_robot(RobotConfig())
 
 
 def grid_of(cells: np.ndarray, origin: tuple[float, float] = (0.0, 0.0)) -> OccupancyGrid:

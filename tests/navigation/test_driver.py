@@ -3,11 +3,12 @@ import math
 import numpy as np
 
 from closedrooms.core.pose import Pose2
+from closedrooms.core.robot import RobotConfig
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.driver import Driver
 
-CONFIG = NavigationConfig()
+CONFIG = NavigationConfig().for_robot(RobotConfig())
 PATH = np.array([(0.0, 0.0), (3.0, 0.0)])
 
 

@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 
 from closedrooms.core.grid import GridFrame, OccupancyGrid
+from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.costmap import NavigationMap
 from closedrooms.navigation.frontiers import Frontiers, find_frontiers, seen_from, still_unknown
 
-CONFIG = NavigationConfig()
+CONFIG = NavigationConfig().for_robot(RobotConfig())
 
 
 def room(rows: int = 80, cols: int = 120) -> np.ndarray:

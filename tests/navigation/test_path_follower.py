@@ -6,11 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from closedrooms.core.pose import Pose2
+from closedrooms.core.robot import RobotConfig
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.path_follower import Track, free_distance, limit_speed, near_points, steer
 
-CONFIG = NavigationConfig()
+CONFIG = NavigationConfig().for_robot(RobotConfig())
 
 
 def drive(points: np.ndarray, pose: Pose2, seconds: float) -> tuple[Pose2, np.ndarray]:
@@ -42,8 +43,8 @@ def test_a_path_with_a_corner_is_driven_to_its_end(heading: float, angle: float)
 @given(x=st.floats(-1, 1), y=st.floats(-1, 1), heading=st.floats(-math.pi, math.pi), progress=st.floats(0.0, 3.0))
 def test_commands_stay_within_the_limits(x: float, y: float, heading: float, progress: float) -> None:
     command = steer(Track.of(np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)])), Pose2(x, y, heading), progress, CONFIG)
-    assert 0.0 <= command.v <= CONFIG.max_speed
-    assert abs(command.w) <= CONFIG.max_turn_rate + 1e-9
+    assert 0.0 <= command.v <= CONFIG.robot.max_speed
+    assert abs(command.w) <= CONFIG.robot.max_turn_rate + 1e-9
 
 
 def test_progress_never_runs_backwards() -> None:
@@ -55,7 +56,7 @@ def test_progress_never_runs_backwards() -> None:
 def test_a_robot_that_looks_the_other_way_turns_first() -> None:
     command = steer(Track.of(np.array([(0.0, 0.0), (4.0, 0.0)])), Pose2(0.0, 0.0, math.pi), 0.0, CONFIG)
     assert command.v == 0.0
-    assert abs(command.w) == pytest.approx(CONFIG.max_turn_rate)
+    assert abs(command.w) == pytest.approx(CONFIG.robot.max_turn_rate)
 
 
 def test_free_distance_ends_where_the_body_touches() -> None:
@@ -87,9 +88,9 @@ def test_a_lone_outlier_is_no_obstacle_but_a_post_is() -> None:
     ranges = np.full(720, 5.0)
     ranges[360] = 0.3
     scan = LaserScan(ranges, -math.pi, 2 * math.pi / 720, 20.0)
-    assert len(near_points(scan)) == 0
+    assert len(near_points(scan, CONFIG)) == 0
     ranges[355:365] = 0.3
-    points = near_points(LaserScan(ranges, -math.pi, 2 * math.pi / 720, 20.0))
+    points = near_points(LaserScan(ranges, -math.pi, 2 * math.pi / 720, 20.0), CONFIG)
     assert len(points) >= 8
     assert np.allclose(points[:, 0], 0.3, atol=0.01)
 
@@ -97,4 +98,4 @@ def test_a_lone_outlier_is_no_obstacle_but_a_post_is() -> None:
 def test_drop_outs_and_no_return_are_no_obstacles() -> None:
     ranges = np.full(720, np.inf)
     ranges[::2] = np.nan
-    assert len(near_points(LaserScan(ranges, -math.pi, 2 * math.pi / 720, 20.0))) == 0
+    assert len(near_points(LaserScan(ranges, -math.pi, 2 * math.pi / 720, 20.0), CONFIG)) == 0

@@ -4,11 +4,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from closedrooms.core.grid import GridFrame, OccupancyGrid
+from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.costmap import Costmap, build_costmap
 from closedrooms.navigation.planner import Path, plan_path, reachable_cells
 
-CONFIG = NavigationConfig()
+CONFIG = NavigationConfig().for_robot(RobotConfig())
 
 
 def two_rooms(door: float, *, thickness: int = 3, at: int = 80) -> np.ndarray:

@@ -1,14 +1,17 @@
+import itertools
 from itertools import pairwise
 
 import networkx as nx
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.coverage.config import CoverageConfig, GraphConfig
 from closedrooms.coverage.line_of_sight import is_clear
 from closedrooms.coverage.tour_planner import plan_coverage
-from closedrooms.navigation.remaining_tour import Itinerary
+from closedrooms.navigation.remaining_tour import RemainingTour, open_tour
 
 FRAME = GridFrame(0.05, 0.0, 0.0, 170, 300)
 PLAIN = CoverageConfig(graph=GraphConfig(clutter_filter=False))
@@ -26,20 +29,20 @@ def _grid(rooms: int) -> OccupancyGrid:
 
 
 @pytest.fixture
-def stops() -> Itinerary:
-    return Itinerary(plan_coverage(_grid(3), config=PLAIN, start=(2.0, 2.0)))
+def stops() -> RemainingTour:
+    return RemainingTour(plan_coverage(_grid(3), config=PLAIN, start=(2.0, 2.0)))
 
 
-def test_the_way_that_is_left_crosses_no_wall_and_ends_at_home(stops: Itinerary) -> None:
+def test_the_path_that_is_left_crosses_no_wall_and_ends_at_home(stops: RemainingTour) -> None:
     for _ in range(len(stops)):
-        way = FRAME.to_corners(stops.way())[:, ::-1]
-        assert all(is_clear(_grid(3).free, a, b) for a, b in pairwise(way))
-        assert tuple(stops.way()[-1]) == stops.home
+        path = FRAME.to_corners(stops.path())[:, ::-1]
+        assert all(is_clear(_grid(3).free, a, b) for a, b in pairwise(path))
+        assert tuple(stops.path()[-1]) == stops.home
         stops.reach()
-    assert len(stops.way()) == 1
+    assert len(stops.path()) == 1
 
 
-def test_stops_that_are_passed_are_struck_off_in_any_order(stops: Itinerary) -> None:
+def test_stops_that_are_passed_are_struck_off_in_any_order(stops: RemainingTour) -> None:
     before = len(stops)
     last = tuple(stops.left[-1])
     assert not stops.pass_by((last[0] + 0.1, last[1]))
@@ -48,14 +51,14 @@ def test_stops_that_are_passed_are_struck_off_in_any_order(stops: Itinerary) -> 
     assert stops.visited + len(stops) == before
 
 
-def test_a_closed_tour_begins_and_ends_where_the_robot_is(stops: Itinerary) -> None:
+def test_a_closed_tour_begins_and_ends_where_the_robot_is(stops: RemainingTour) -> None:
     place = stops.left[2] + 0.05
     expected = tuple(stops.left[2])
     stops.begin_at(place)
     assert stops.next == stops.home == expected
 
 
-def test_a_tour_solved_again_leaves_out_what_was_in_sight_of_the_way(stops: Itinerary) -> None:
+def test_a_tour_solved_again_leaves_out_what_was_in_sight_of_the_way(stops: RemainingTour) -> None:
     room = np.array([3.0, 5.2])
     assert stops.solve_again(_grid(3), (2.0, 2.0), room[None], PLAIN, reach=1.2)
     assert np.hypot(*(stops.left - room).T).min() > 1.2
@@ -68,7 +71,7 @@ def test_a_tour_solved_again_leaves_out_what_was_in_sight_of_the_way(stops: Itin
     assert (rooms[:, 0] < 9.3).any()
 
 
-def test_a_tour_from_home_to_home_is_a_closed_one(stops: Itinerary) -> None:
+def test_a_tour_from_home_to_home_is_a_closed_one(stops: RemainingTour) -> None:
     stops.begin_at(np.array([2.0, 2.0]))
     assert stops.solve_again(_grid(3), stops.home, np.empty((0, 2)), PLAIN, reach=1.0)
     closed = plan_coverage(_grid(3), config=PLAIN, start=stops.home)
@@ -78,15 +81,29 @@ def test_a_tour_from_home_to_home_is_a_closed_one(stops: Itinerary) -> None:
         (*edge, length) for edge, length in zip(closed.graph.edges, closed.graph.lengths, strict=True)
     )
     first, home = (
-        int(np.argmin(np.hypot(*(closed.graph.vertices - place).T))) for place in (stops.way()[0], stops.home)
+        int(np.argmin(np.hypot(*(closed.graph.vertices - place).T))) for place in (stops.path()[0], stops.home)
     )
     begin = nx.dijkstra_path_length(graph, first, home)
-    steps = np.diff(stops.way(), axis=0)
+    steps = np.diff(stops.path(), axis=0)
     assert begin + np.hypot(*steps.T).sum() == pytest.approx(closed.length, rel=0.01)
 
 
-def test_without_free_space_the_stops_stay(stops: Itinerary) -> None:
+def test_without_free_space_the_stops_stay(stops: RemainingTour) -> None:
     left = stops.left.copy()
     nothing = OccupancyGrid(FRAME, np.full(FRAME.shape, OCCUPIED, dtype=np.int8))
     assert not stops.solve_again(nothing, (2.0, 2.0), np.empty((0, 2)), PLAIN, reach=1.0)
     assert np.array_equal(stops.left, left)
+
+
+@settings(max_examples=20, deadline=None)
+@given(places=st.lists(st.tuples(st.integers(0, 50), st.integers(0, 50)), min_size=3, max_size=6, unique=True))
+def test_an_open_tour_runs_from_here_to_home_by_the_shortest_way(places: list[tuple[int, int]]) -> None:
+    points = np.array(places, dtype=np.float64)
+    distances = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
+    order = open_tour(distances, CoverageConfig())
+    assert order[0] == 0
+    assert order[-1] == 1
+    assert sorted(order) == list(range(len(places)))
+    length = distances[order[:-1], order[1:]].sum()
+    best = min(distances[[0, *middle], [*middle, 1]].sum() for middle in itertools.permutations(range(2, len(places))))
+    assert length == pytest.approx(best, rel=1e-6)

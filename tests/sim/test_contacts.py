@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon, box
 
 from closedrooms.core.pose import Pose2
-from closedrooms.sim.config import RobotConfig, SimConfig, noise_level
+from closedrooms.core.robot import RobotConfig
+from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.contacts import SKIN, Obstacles, edges_of, move_disc
 from closedrooms.sim.differential_drive import Drive, Motion
 from closedrooms.sim.simulation import Simulation

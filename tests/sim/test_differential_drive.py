@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from closedrooms.core.pose import Pose2
-from closedrooms.sim.config import RobotConfig
+from closedrooms.core.robot import RobotConfig
 from closedrooms.sim.contacts import Obstacles
 from closedrooms.sim.differential_drive import Drive, Motion
 

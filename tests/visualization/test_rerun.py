@@ -1,4 +1,3 @@
-import inspect
 import logging
 import subprocess
 import sys
@@ -19,9 +18,9 @@ from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyG
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.core.scan import LaserScan
-from closedrooms.navigation.observer import NoObserver, Observer
 from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
 from closedrooms.visualization import colours
+from closedrooms.visualization.no_recording import no_recording
 from closedrooms.visualization.rerun import drawables
 from closedrooms.visualization.rerun.blueprint import Layout
 from closedrooms.visualization.rerun.recorder import Recorder
@@ -94,10 +93,7 @@ def record_run(path: Path, *, shift: float = 0.0, seconds: float = 4.0, out: str
         for number in range(round(seconds * 10)):
             stamp = number * 0.1
             pose = Pose2(0.1 * stamp + shift, 0.0)
-            observation: Any = SimpleNamespace(
-                scan=a_scan(stamp), odometry=Pose2(0.11 * stamp, 0.0), sightings=(), map_T_robot_true=pose, stamp=stamp
-            )
-            recorder.observation(observation, pose)
+            recorder.scan(a_scan(stamp), Pose2(0.11 * stamp, 0.0), pose, truth=pose)
             if recorder.wants_map(stamp):
                 recorder.map(a_map(), stamp)
                 recorder.doors([door], stamp)
@@ -305,14 +301,15 @@ def test_a_full_disk_is_one_clear_error(tmp_path: Path) -> None:
         record_run(tmp_path / "run.rrd", seconds=2.0)
 
 
-@pytest.mark.parametrize("kind", [Recorder, NoObserver])
-def test_observers_take_the_calls_that_stages_make(kind: type) -> None:
-    for name, call in inspect.getmembers(Observer, inspect.isfunction):
-        if not name.startswith("_"):
-            theirs = inspect.signature(getattr(kind, name)).parameters
-            assert list(theirs) == list(inspect.signature(call).parameters), name
+def test_no_recording_takes_every_call_of_a_recorder_and_wants_nothing() -> None:
+    recorder = no_recording()
+    recorder.scan(a_scan(0.0), Pose2(), Pose2(), truth=Pose2())
+    recorder.map(a_map(), 0.0, final=True)
+    recorder.tours({})
+    recorder.table("")
+    assert not recorder.wants_map(10.0)
 
 
-def test_watching_nothing_loads_no_rerun() -> None:
-    code = "import sys, closedrooms.navigation.exploration; sys.exit('rerun' in sys.modules)"
+def test_recording_nothing_loads_no_rerun() -> None:
+    code = "import sys, closedrooms.pipeline.survey; sys.exit('rerun' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,4 +1,4 @@
-"""The recorder: an observer that writes what a run does into one rerun file."""
+"""The recorder: writes what a run does into one rerun file."""
 
 import json
 from collections.abc import Collection, Mapping, Sequence
@@ -25,7 +25,6 @@ from closedrooms.visualization.rerun.stream import RecordingStream, Stage
 if TYPE_CHECKING:
     from closedrooms.coverage.tour import CoverageTour
     from closedrooms.predictor.prediction import Prediction
-    from closedrooms.sim.observation import Observation
     from closedrooms.visualization.rerun.building import RecordedBuilding
     from closedrooms.worlds.plan import FloorPlan
 
@@ -49,8 +48,9 @@ LEGEND = """| colour | what |
 
 
 class Recorder:
-    """Writes one ``.rrd``; a context manager, see :class:`closedrooms.navigation.observer.Observer` for its calls.
+    """Writes one ``.rrd``; a context manager.
 
+    All coordinates in the map frame [m] unless a name says otherwise; stamps [s] by the clock of the simulation or log.
     Timelines: ``sim_time``, a duration [s] by the simulation's or the log's clock, and ``stage``, a sequence over
     :class:`closedrooms.visualization.rerun.stream.Stage`.
     """
@@ -122,10 +122,6 @@ class Recorder:
         if self._building is not None:
             self._stream.at(stamp, self._stage)
             self._building.move(states)
-
-    def observation(self, observation: "Observation", map_T_robot: Pose2) -> None:
-        """One observation of the simulation."""
-        self.scan(observation.scan, observation.odometry, map_T_robot, truth=observation.map_T_robot_true)
 
     def scan(self, scan: LaserScan, odometry: Pose2, map_T_robot: Pose2, *, truth: Pose2 | None = None) -> None:
         """Keep the poses, and draw every few scans."""

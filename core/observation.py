@@ -1,4 +1,4 @@
-"""What the robot gets to know at one instant."""
+"""What a robot gets to know at one instant: nothing else may decide what it does."""
 
 from dataclasses import dataclass
 
@@ -11,16 +11,19 @@ from closedrooms.core.scan import LaserScan
 class Observation:
     """One sweep, the odometry at that time and the closed doors it hit.
 
+    The true pose is not part of it: a simulation tells it to whoever keeps the truth, beside the observation.
+
     Attributes:
-        scan: The sweep, with the lidar's noise.
+        scan: The sweep as measured; its stamp is the observation's.
         odometry: ``odom_T_robot`` as accumulated by the odometry; the identity at the start of a run.
         sightings: Closed doors that a ray of this sweep hit, robot frame.
-        map_T_robot_true: The true pose, for truth and for pictures; never for an estimate.
-        stamp: Time since the start of the run [s].
     """
 
     scan: LaserScan
     odometry: Pose2
-    sightings: tuple[DoorSighting, ...]
-    map_T_robot_true: Pose2
-    stamp: float
+    sightings: tuple[DoorSighting, ...] = ()
+
+    @property
+    def stamp(self) -> float:
+        """Time since the start of the run [s]."""
+        return self.scan.stamp

@@ -1,7 +1,6 @@
-"""Exploration in a world of cells: a ray caster as simulation and a mapper that knows its pose."""
+"""The control loop, exploring in a world of cells: a ray caster as simulation and a mapper that knows its pose."""
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -11,33 +10,31 @@ import pytest
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame, OccupancyGrid
+from closedrooms.core.observation import Observation
 from closedrooms.core.pose import Pose2
+from closedrooms.core.robot import RobotConfig
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.exploration import explore
-from closedrooms.navigation.observer import NoObserver
+from closedrooms.navigation.control_loop import LoopLog, Step, Stop, run_loop
+from closedrooms.navigation.explorer import Explorer
 
 RESOLUTION, BEAMS, RANGE, RADIUS = 0.05, 180, 6.0, 0.2
-
-
-@dataclass(frozen=True)
-class Sensed:
-    scan: LaserScan
-    odometry: Pose2
-    sightings: tuple[()] = ()
 
 
 class CellWorld:
     """Walls are cells; the robot is a disc that stops at them."""
 
-    def __init__(self, walls: np.ndarray, start: tuple[float, float]) -> None:
+    period = 0.1
+
+    def __init__(self, walls: np.ndarray, start: tuple[float, float], *, radius: float = RADIUS) -> None:
         self.walls = walls
+        self.radius = radius
         self.pose = Pose2(*start)
         self.time = 0.0
         self.jammed = False
         self._gap: Any = cv2.distanceTransform((1 - walls).astype(np.uint8), cv2.DIST_L2, 5) * RESOLUTION
 
-    def observe(self) -> Any:
+    def observe(self) -> Observation:
         angles = -math.pi + 2.0 * math.pi / BEAMS * np.arange(BEAMS) + self.pose.theta
         s = np.arange(0.0, RANGE, RESOLUTION / 2)
         rows = ((self.pose.y + np.sin(angles)[:, None] * s) / RESOLUTION).astype(int).clip(0, self.walls.shape[0] - 1)
@@ -45,7 +42,7 @@ class CellWorld:
         hit = self.walls[rows, cols] > 0
         ranges = np.where(hit.any(axis=1), s[hit.argmax(axis=1)], np.inf)
         scan = LaserScan(ranges, -math.pi, 2.0 * math.pi / BEAMS, RANGE, stamp=self.time)
-        return Sensed(scan, self.pose)
+        return Observation(scan, self.pose)
 
     def step(self, v: float, w: float, duration: float) -> None:
         self.time += duration
@@ -53,7 +50,7 @@ class CellWorld:
             return
         for _ in range(5):
             pose = self.pose @ Pose2(v * duration / 5, 0.0, w * duration / 5)
-            if self._gap[int(pose.y / RESOLUTION), int(pose.x / RESOLUTION)] < RADIUS:
+            if self._gap[int(pose.y / RESOLUTION), int(pose.x / RESOLUTION)] < self.radius:
                 pose = Pose2(self.pose.x, self.pose.y, pose.theta)
             self.pose = pose
 
@@ -94,19 +91,23 @@ class CellMapper:
         return []
 
 
-class Notes(NoObserver):
+class Notes:
     """Keeps what an exploration tells."""
 
     def __init__(self) -> None:
         self.goals: list[tuple[float, float]] = []
         self.scans = 0
 
-    def observation(self, observation: Any, map_T_robot: Pose2) -> None:  # noqa: ARG002
+    def take(self, explorer: Explorer) -> None:
         self.scans += 1
+        if explorer.goal is not None:
+            self.goals.append(explorer.goal.place)
 
-    def frontiers(self, points: FloatArray, goal: Any, path: Any, stamp: float) -> None:  # noqa: ARG002
-        if goal is not None:
-            self.goals.append(goal)
+
+def explore(world: CellWorld, mapper: CellMapper, config: NavigationConfig, notes: Notes | None = None) -> LoopLog:
+    settings = config.for_robot(RobotConfig(radius=world.radius))
+    explorer, notes = Explorer(settings), notes or Notes()
+    return run_loop(world, mapper, explorer, settings, on_step=lambda _: notes.take(explorer))
 
 
 def building(*, closed: bool = False) -> np.ndarray:
@@ -170,11 +171,53 @@ def test_the_limit_ends_the_run_with_a_status() -> None:
     assert result.seconds == pytest.approx(5.0)
 
 
+def test_a_map_that_grows_too_large_ends_the_run_and_says_so() -> None:
+    world = CellWorld(building(), START)
+    result = explore(world, CellMapper(world.walls.shape), NavigationConfig(most_cells=10_000))
+    assert result.status == "limit"
+    assert "72800 cells" in result.reason
+    assert result.seconds < 5.0
+
+
+def test_real_time_ends_a_run_too() -> None:
+    world = CellWorld(building(), START)
+    result = explore(world, CellMapper(world.walls.shape), NavigationConfig(wall_limit=0.2))
+    assert result.status == "limit"
+    assert "real time" in result.reason
+
+
+def test_whoever_knows_more_may_stop_the_run() -> None:
+    world = CellWorld(building(), START)
+    config = NavigationConfig().for_robot(RobotConfig())
+
+    def after_a_second(step: Step) -> Stop | None:
+        return Stop("outside", "far out") if step.stamp >= 0.95 else None
+
+    result = run_loop(world, CellMapper(world.walls.shape), Explorer(config), config, stop=after_a_second)
+    assert (result.status, result.reason) == ("outside", "far out")
+    assert result.seconds == pytest.approx(1.0)
+
+
+def test_a_robot_as_wide_as_the_doors_is_planned_for_as_it_is() -> None:
+    # Doors of 0.8 m: a robot of 0.3 m radius enters every room, one of 0.42 m none, and it does not get stuck in one.
+    known = {}
+    for radius in (0.3, 0.42):
+        world = CellWorld(building(), START, radius=radius)
+        mapper = CellMapper(world.walls.shape)
+        assert explore(world, mapper, NavigationConfig(time_limit=600.0)).status == "complete"
+        known[radius] = free_share(world, mapper, START)
+        free = mapper.grid().free
+        assert free[110:150, 10:270].mean() > 0.99  # the corridor
+    assert known[0.3] > 0.97
+    assert known[0.42] < known[0.3]
+
+
 def test_a_robot_that_cannot_move_ends_as_stuck() -> None:
     world = CellWorld(building(), START)
     world.jammed = True
     result = explore(world, CellMapper(world.walls.shape), NavigationConfig(max_recoveries=1, stuck_time=1.0))
     assert result.status == "stuck"
+    assert result.reason
     assert result.seconds < 60.0
 
 
