@@ -24,9 +24,9 @@ from closedrooms.mapping.trajectory import ate
 from closedrooms.navigation.drive import DriveResult, drive
 from closedrooms.navigation.exploration import ExplorationResult
 from closedrooms.navigation.observer import Observer
-from closedrooms.pipeline.config import RunConfig, sim_config
+from closedrooms.pipeline.config import RunConfig
 from closedrooms.pipeline.drive_report import draw_drive, drive_features, drive_metrics
-from closedrooms.pipeline.manifest import resolved, versions
+from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.run_log import Witness
 from closedrooms.pipeline.scores import area_mapped, mean, room_iou, rooms_seen
@@ -91,7 +91,6 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
         OutputError: The run directory cannot be written, or holds something that is not ours.
     """
     progress, watch = progress or Silent(), Stopwatch()
-    config = replace(config, sim=sim_config(config))
     with watch.stage("world"):
         progress.stage("world")
         plan = load_world(config.world, level=config.level)
@@ -99,7 +98,9 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
         folder = config.out or Path("runs") / f"{plan.name}-{config.seed}"
         check_output_folder(folder)
     manifest: dict[str, Any] = {
+        "command": "run",
         "configuration": resolved(config, leave_out=("out", "world")),
+        "paths": {"world": input_path(config.world)},
         "world": plan.name,
         "seed": config.seed,
         "closed": list(closed),
