@@ -10,8 +10,9 @@ import tempfile
 from pathlib import Path
 
 from closedrooms.core.errors import ClosedroomsError
+from closedrooms.core.report import Report
 from closedrooms.pipeline.config import RunConfig
-from closedrooms.pipeline.report import RunResult, figure
+from closedrooms.pipeline.report import figure
 from closedrooms.pipeline.run import run
 from closedrooms.worlds.library import bundled_names
 
@@ -28,20 +29,21 @@ HEAD = (
 )
 
 
-def row(name: str, result: RunResult) -> list[str]:
-    metrics = result.metrics
+def row(name: str, result: Report) -> list[str]:
+    figures = result.figures
+    metrics, doors = figures["metrics"], figures["doors"]
     average = metrics["room_iou_mean"]
     errors = metrics["tour"]["errors_percent"]
     cells = [
         Path(name).stem,
-        result.exploration["status"],
+        figures["exploration"]["status"],
         f"{100 * metrics['area_mapped']:.1f} %",
         f"{metrics['ate_m']:.3f}",
-        f"{len(result.seen)} of {len(result.closed)}",
+        f"{len(doors['seen'])} of {len(figures['closed'])}",
         "" if average is None else f"{average:.3f}",
         " / ".join(figure(errors[kind], "{:.1f}") for kind in ("closed", "baseline", "predicted")),
-        str(result.exploration["scans"]),
-        f"{result.durations['total']:.1f}",
+        str(figures["exploration"]["scans"]),
+        f"{figures['durations']['total']:.1f}",
     ]
     if "drive" in metrics:
         cells.append(" ".join(f"{key}={value}" for key, value in metrics["drive"].items() if key != "revisions"))

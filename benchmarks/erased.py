@@ -9,7 +9,6 @@ prediction (method `paper`, by door) differs by at most 0.03.
 """
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,6 @@ from closedrooms.experiments.dataset.sample import Outcome, Task, make
 from closedrooms.experiments.dataset.variants import Variant, find_variants, find_worlds
 from closedrooms.experiments.evaluation.scores import iou
 from closedrooms.experiments.workers import Crew
-from closedrooms.pipeline.config import named_noise
 from closedrooms.pipeline.scores import room_iou
 from closedrooms.predictor.methods import predict
 
@@ -45,7 +43,6 @@ def chosen(config: DatasetConfig) -> list[Variant]:
 def build(out: Path, maps: MapSource, workers: int) -> list[tuple[Variant, Path]]:
     """Make the samples one way; those that failed are named and left out."""
     config = DatasetConfig(worlds=WORLDS, out=out.resolve() / maps, repetitions=1, maps=maps)
-    config = replace(config, sim=named_noise(config.sim, config.noise))
     variants = chosen(config)
     tasks = [Task(config, world) for world in find_worlds(config)] if maps == "erased" else []
     crew: Crew[Task, Outcome] = Crew(workers)

@@ -84,7 +84,7 @@ def only(method: str, folder: Path) -> None:
     from closedrooms.pipeline.predict import predict_map
 
     files = {"map": folder / "map.yaml", "doors": folder / "doors.geojson", "out": folder / method}
-    rooms = len(predict_map(PredictConfig(**files, method=method)).rooms)
+    rooms = len(predict_map(PredictConfig(**files, method=method)).figures["rooms"])
     used = resource.getrusage(resource.RUSAGE_SELF)
     print(json.dumps((used.ru_utime + used.ru_stime, used.ru_maxrss / 1024, rooms)))
 

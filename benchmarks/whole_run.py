@@ -32,10 +32,10 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             config = RunConfig(world=name, record=options.record, out=Path(folder) / "run")
             result = run(config)
-        exploration = result.exploration
-        seconds = "".join(f"{result.durations.get(stage, 0.0):>12.2f}" for stage in STAGES)
+        exploration = result.figures["exploration"]
+        seconds = "".join(f"{result.figures['durations'].get(stage, 0.0):>12.2f}" for stage in STAGES)
         size = f"{x_max - x_min:.0f} x {y_max - y_min:.0f} m"
-        speed = exploration["simulated_s"] / result.durations["total"]
+        speed = exploration["simulated_s"] / result.figures["durations"]["total"]
         print(f"{Path(name).stem[:23]:<24}{size:>12}{exploration['scans']:>7}{seconds}{speed:>13.1f}", flush=True)
 
 

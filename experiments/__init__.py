@@ -1,1 +1,24 @@
-"""Ground-truth datasets, evaluation, robustness, and the workers that they share."""
+"""Ground-truth datasets, evaluation, robustness, and the workers that they share.
+
+``dataset.dataset.dataset`` and ``robustness.sweep.robustness`` are named like their packages and so stand there.
+"""
+
+from typing import TYPE_CHECKING
+
+from closedrooms.core.lazy import lazy_face
+
+if TYPE_CHECKING:
+    from closedrooms.experiments.dataset.config import DatasetConfig as DatasetConfig
+    from closedrooms.experiments.evaluation.config import EvaluateConfig as EvaluateConfig
+    from closedrooms.experiments.evaluation.evaluate import evaluate as evaluate
+    from closedrooms.experiments.robustness.config import RobustnessConfig as RobustnessConfig
+
+__getattr__, __dir__, __all__ = lazy_face(
+    __name__,
+    {
+        "dataset.config": ("DatasetConfig",),
+        "evaluation.config": ("EvaluateConfig",),
+        "evaluation.evaluate": ("evaluate",),
+        "robustness.config": ("RobustnessConfig",),
+    },
+)

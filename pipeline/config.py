@@ -1,6 +1,6 @@
 """Options of every command. Nothing heavy is imported, so that ``--help`` is quick."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,7 +12,7 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.predictor.config import MethodConfig
 from closedrooms.predictor.methods import DEFAULT_METHOD, find_method
-from closedrooms.sim.config import LidarConfig, NoiseConfig, SimConfig, lidar_preset, noise_level
+from closedrooms.sim.config import SimConfig, lidar_preset, noise_level
 
 NoiseName = Literal["none", "low", "medium", "high"]
 LidarName = Literal["default", "hokuyo-utm-30lx", "hokuyo-urg-04lx", "sick-lms111", "rplidar-a2", "robotis-lds-01"]
@@ -61,8 +61,8 @@ class RunConfig:
     level: str | None = None
     """Which level of a file with several."""
 
-    sim: SimConfig = field(default_factory=SimConfig)
-    """Robot, lidar and odometry."""
+    sim: SimConfig = field(default=None)  # type: ignore[assignment]
+    """Robot, lidar and odometry; where not given, with the noise and the lidar named above."""
 
     mapper: MapperConfig = field(default_factory=MapperConfig)
     """The mapper."""
@@ -83,6 +83,8 @@ class RunConfig:
             raise InvalidInputError(f"--close {self.close}", expected="a number of rooms of at least 0")
         if self.seed < 0:
             raise InvalidInputError(f"--seed {self.seed}", expected="a whole number of at least 0")
+        if self.sim is None:
+            object.__setattr__(self, "sim", named_sim(self.noise, self.lidar))
         object.__setattr__(self, "predictor", find_method(self.method).checked(self.predictor))
 
 
@@ -112,16 +114,13 @@ class PredictConfig:
         object.__setattr__(self, "predictor", find_method(self.method).checked(self.predictor))
 
 
-def sim_config(config: RunConfig) -> SimConfig:
-    """Settings of the simulation: noise level and lidar by name, where their numbers were not set one by one."""
-    sim = named_noise(config.sim, config.noise)
-    lidar = lidar_preset(config.lidar) if sim.lidar == LidarConfig() else sim.lidar
-    return replace(sim, lidar=lidar)
+def named_sim(noise: str = "medium", lidar: str = "default") -> SimConfig:
+    """Settings of the simulation with the numbers that a level of noise and a lidar stand for.
 
-
-def named_noise(sim: SimConfig, noise: NoiseName) -> SimConfig:
-    """The noise level laid over settings of the simulation whose noise was not set one by one."""
-    return replace(sim, noise=noise_level(noise)) if sim.noise == NoiseConfig() else sim
+    Raises:
+        InvalidInputError: No such level or lidar.
+    """
+    return SimConfig(noise=noise_level(noise), lidar=lidar_preset(lidar))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,11 +218,3 @@ class ConvertWorld:
 
     level: str | None = None
     """Which level of a file with several."""
-
-
-WORLD_ACTIONS: dict[str, tuple[str, type[ListWorlds | ShowWorld | GenerateWorld | ConvertWorld]]] = {
-    "list": ("List the bundled worlds, one a line, its name first.", ListWorlds),
-    "show": ("Draw a floor plan.", ShowWorld),
-    "generate": ("Generate a floor plan.", GenerateWorld),
-    "convert": ("Convert a floor plan to another format.", ConvertWorld),
-}

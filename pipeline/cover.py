@@ -1,57 +1,23 @@
 """``closedrooms cover``: a coverage tour on anybody's map."""
 
-from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
 from closedrooms.core.geojson import read_doors, write_doors, write_features
+from closedrooms.core.report import Report
 from closedrooms.core.rosmap import read_map, write_map
 from closedrooms.coverage.tour import CoverageTour
 from closedrooms.coverage.tour_features import tour_features
 from closedrooms.coverage.tour_planner import plan_coverage
 from closedrooms.pipeline.config import CoverConfig
-from closedrooms.pipeline.manifest import resolved, versions
+from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.stopwatch import Stopwatch
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CoverResult:
-    """One finished tour.
-
-    Attributes:
-        folder: What was written.
-        title: Head of the table.
-        tour: The tour.
-        failures: Why a door could not be visited, by door id.
-        durations: Seconds by stage.
-    """
-
-    folder: Path
-    title: str
-    tour: CoverageTour
-    failures: dict[str, str] = field(default_factory=dict)
-    durations: dict[str, float] = field(default_factory=dict)
-
-    def table(self) -> list[tuple[str, str]]:
-        """Rows for people; the first is the head."""
-        tour = self.tour
-        return [
-            ("figure", "value"),
-            ("vertices", f"{len(tour.graph.vertices)}"),
-            ("length", f"{tour.length:.1f} m"),
-            ("lower bound", f"{tour.lower_bound:.1f} m (gap {100 * tour.gap:.1f} %)"),
-            ("status", tour.status),
-            *[("note", note) for note in tour.notes],
-            *[(f"not visited: {door}", reason) for door, reason in self.failures.items()],
-            ("time", f"{self.durations['cover']:.2f} s"),
-        ]
-
-
-def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> CoverResult:
+def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Report:
     """Read a map, plan a tour that covers it, write the folder.
 
     Args:
@@ -69,8 +35,9 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Cover
         grid = read_map(config.map)
         doors: list[ClosedDoor] = read_doors(config.doors) if config.doors else []
     manifest: dict[str, Any] = {
+        "command": "cover",
         "configuration": resolved(config, leave_out=("map", "doors", "out")),
-        "paths": {"map": str(config.map), "doors": str(config.doors) if config.doors else None},
+        "paths": {"map": input_path(config.map), "doors": input_path(config.doors) if config.doors else None},
         "versions": versions(),
     }
     with watch.stage("cover"):
@@ -101,4 +68,24 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Cover
         }
         manifest["notes"] = list(tour.notes)
         manifest["durations"] = watch.seconds()
-    return CoverResult(config.out, f"{config.map.name}: coverage tour", tour, missed, manifest["durations"])
+    return Report(
+        folder=config.out,
+        title=f"{config.map.name}: coverage tour",
+        rows=_rows(tour, missed, manifest["durations"]["cover"]),
+        failures=missed,
+        figures=manifest["metrics"],
+    )
+
+
+def _rows(tour: CoverageTour, missed: dict[str, str], seconds: float) -> list[tuple[str, str]]:
+    """The table for people."""
+    return [
+        ("figure", "value"),
+        ("vertices", f"{len(tour.graph.vertices)}"),
+        ("length", f"{tour.length:.1f} m"),
+        ("lower bound", f"{tour.lower_bound:.1f} m (gap {100 * tour.gap:.1f} %)"),
+        ("status", tour.status),
+        *(("note", note) for note in tour.notes),
+        *((f"not visited: {door}", reason) for door, reason in missed.items()),
+        ("time", f"{seconds:.2f} s"),
+    ]

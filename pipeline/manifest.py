@@ -35,6 +35,11 @@ def resolved(config: Any, *, leave_out: tuple[str, ...] = ("out",)) -> dict[str,
     return {name: _plain(value) for name, value in values.items() if name not in leave_out}
 
 
+def input_path(given: str | Path) -> str:
+    """An input as a run elsewhere finds it again: the whole path of a file, a name as it is."""
+    return str(Path(given).resolve()) if isinstance(given, Path) or Path(given).exists() else given
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}

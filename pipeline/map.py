@@ -3,13 +3,13 @@
 import contextlib
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.files import check_output_folder, output_folder
 from closedrooms.core.geojson import write_doors
 from closedrooms.core.pose import Pose2
+from closedrooms.core.report import Report
 from closedrooms.core.rosmap import write_map
 from closedrooms.core.tum import write_trajectory
 from closedrooms.mapping.logs.recorded_run import RecordedRun, read_run
@@ -18,7 +18,7 @@ from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import align
 from closedrooms.pipeline.config import MapConfig
 from closedrooms.pipeline.log_observer import LogWatch
-from closedrooms.pipeline.manifest import resolved, versions
+from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.stopwatch import Stopwatch
 from closedrooms.visualization.no_recording import no_recording
@@ -27,47 +27,7 @@ if TYPE_CHECKING:
     from closedrooms.visualization.rerun.recorder import Recorder
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MapResult:
-    """The map of one log.
-
-    Attributes:
-        folder: What was written.
-        title: Head of the table.
-        built: Map, trajectory, loops and errors.
-        skipped: Lines and scans that were left out or mended, counted by reason.
-        failures: Always empty: a log is mapped or refused.
-    """
-
-    folder: Path
-    title: str
-    built: BuiltMap
-    skipped: dict[str, int]
-    failures: dict[str, str] = field(default_factory=dict)
-
-    def table(self) -> list[tuple[str, str]]:
-        """Rows for people; the first is the head."""
-        built = self.built
-        names = {"odometry": "raw odometry", "online": "as estimated on the way", "final": "final"}
-        return [
-            ("figure", "value"),
-            ("scans", f"{len(built.stamps)}"),
-            ("keyframes", f"{built.keyframes}"),
-            ("loops closed", f"{len(built.loops)}"),
-            ("scans a second", f"{len(built.stamps) / max(built.seconds, 1e-9):.0f}"),
-            *[
-                (
-                    f"error to the reference, {text}",
-                    f"{built.errors[name][0]:.3f} m, {math.degrees(built.errors[name][1]):.2f} deg",
-                )
-                for name, text in names.items()
-                if name in built.errors
-            ],
-            *[(f"left out: {reason}", f"{count}") for reason, count in self.skipped.items()],
-        ]
-
-
-def map_log(config: MapConfig, *, progress: Progress | None = None) -> MapResult:
+def map_log(config: MapConfig, *, progress: Progress | None = None) -> Report:
     """Read a recorded run, map it scan after scan, write the folder.
 
     Args:
@@ -84,8 +44,9 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> MapResult
         progress.stage("read")
         run = read_run(config.log, scan_topic=config.scan_topic, odometry_topic=config.odometry_topic)
     manifest: dict[str, Any] = {
+        "command": "map",
         "configuration": resolved(config, leave_out=("log", "out")),
-        "paths": {"log": str(config.log)},
+        "paths": {"log": input_path(config.log)},
         "versions": versions(),
     }
     with (
@@ -108,7 +69,31 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> MapResult
             _write(folder, run, built)
         manifest["metrics"] = _metrics(run, built)
         manifest["durations"] = watch.seconds() | {"mapping alone": round(built.seconds, 3)}
-    return MapResult(config.out, f"{config.log.name}: {len(built.stamps)} scans", built, run.skipped)
+    return Report(
+        folder=config.out,
+        title=f"{config.log.name}: {len(built.stamps)} scans",
+        rows=_rows(run, built),
+        figures=manifest["metrics"],
+    )
+
+
+def _rows(run: RecordedRun, built: BuiltMap) -> list[tuple[str, str]]:
+    """The table for people."""
+    names = {"odometry": "raw odometry", "online": "as estimated on the way", "final": "final"}
+    errors = {
+        text: f"{built.errors[name][0]:.3f} m, {math.degrees(built.errors[name][1]):.2f} deg"
+        for name, text in names.items()
+        if name in built.errors
+    }
+    return [
+        ("figure", "value"),
+        ("scans", f"{len(built.stamps)}"),
+        ("keyframes", f"{built.keyframes}"),
+        ("loops closed", f"{len(built.loops)}"),
+        ("scans a second", f"{len(built.stamps) / max(built.seconds, 1e-9):.0f}"),
+        *((f"error to the reference, {text}", error) for text, error in errors.items()),
+        *((f"left out: {reason}", f"{count}") for reason, count in run.skipped.items()),
+    ]
 
 
 def _metrics(run: RecordedRun, built: BuiltMap) -> dict[str, Any]:

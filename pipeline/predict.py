@@ -2,7 +2,6 @@
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,54 +9,22 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
 from closedrooms.core.geojson import read_doors, write_doors, write_rooms
 from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.report import Report
 from closedrooms.core.room import Room
 from closedrooms.core.rosmap import read_map, write_map
 from closedrooms.pipeline.config import PredictConfig
-from closedrooms.pipeline.manifest import resolved, versions
+from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.stopwatch import Stopwatch
 from closedrooms.predictor.methods import predict
+from closedrooms.predictor.prediction import Prediction
 from closedrooms.visualization.no_recording import no_recording
 
 if TYPE_CHECKING:
     from closedrooms.visualization.rerun.recorder import Recorder
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PredictResult:
-    """One finished prediction.
-
-    Attributes:
-        folder: What was written.
-        title: Head of the table.
-        rooms: Predicted rooms.
-        failures: Why a door could not be predicted, by door id.
-        durations: Seconds by stage.
-    """
-
-    folder: Path
-    title: str
-    rooms: tuple[Room, ...]
-    failures: dict[str, str] = field(default_factory=dict)
-    durations: dict[str, float] = field(default_factory=dict)
-
-    def table(self) -> list[tuple[str, ...]]:
-        """Rows for people; the first is the head."""
-        rows: list[tuple[str, ...]] = [("doors", "room", "area")]
-        rows += [
-            (
-                ", ".join(room.doors),
-                f"{room.kind}{', search was cut' if room.bounded else ''}",
-                f"{room.polygon.area:.1f} m2",
-            )
-            for room in self.rooms
-        ]
-        rows += [(door, f"not predicted: {reason}", "") for door, reason in self.failures.items()]
-        rows.append(("time", "prediction", f"{self.durations['predict']:.2f} s"))
-        return rows
-
-
-def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> PredictResult:
+def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> Report:
     """Read a map and its closed doors, predict the rooms behind them, write the folder.
 
     Args:
@@ -65,7 +32,7 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> P
         progress: Told what is done.
 
     Returns:
-        The rooms and what failed; all of it is written to ``config.out``.
+        The rooms by door and what failed; all of it is written to ``config.out``.
 
     Raises:
         InvalidInputError: The map or the doors cannot be read.
@@ -77,8 +44,9 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> P
         progress.stage("read")
         grid, doors = read_map(config.map), read_doors(config.doors)
     manifest: dict[str, Any] = {
+        "command": "predict",
         "configuration": resolved(config, leave_out=("map", "doors", "out")),
-        "paths": {"map": str(config.map), "doors": str(config.doors)},
+        "paths": {"map": input_path(config.map), "doors": input_path(config.doors)},
         "versions": versions(),
     }
     with output_folder(config.out, manifest) as folder:
@@ -103,8 +71,36 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> P
             draw_summary(folder / "summary.png", observed, prediction, doors)
         manifest["doors"] = {"given": [door.id for door in doors], "failures": prediction.failures}
         manifest["durations"] = watch.seconds()
-    title = f"{config.map.name}: {len(prediction.rooms)} of {len(doors)} doors predicted"
-    return PredictResult(config.out, title, prediction.rooms, prediction.failures, manifest["durations"])
+    return Report(
+        folder=config.out,
+        title=f"{config.map.name}: {len(prediction.rooms)} of {len(doors)} doors predicted",
+        rows=_rows(prediction, manifest["durations"]["predict"]),
+        failures=prediction.failures,
+        figures={"rooms": [_figures(room) for room in prediction.rooms]},
+    )
+
+
+def _rows(prediction: Prediction, seconds: float) -> list[tuple[str, str, str]]:
+    """The table for people."""
+    return [
+        ("doors", "room", "area"),
+        *(
+            (
+                ", ".join(room.doors),
+                f"{room.kind}{', search was cut' if room.bounded else ''}",
+                f"{room.polygon.area:.1f} m2",
+            )
+            for room in prediction.rooms
+        ),
+        *((door, f"not predicted: {reason}", "") for door, reason in prediction.failures.items()),
+        ("time", "prediction", f"{seconds:.2f} s"),
+    ]
+
+
+def _figures(room: Room) -> dict[str, Any]:
+    """One room for programs."""
+    area = round(room.polygon.area, 4)
+    return {"doors": list(room.doors), "kind": room.kind, "area_m2": area, "bounded": room.bounded}
 
 
 @contextlib.contextmanager

@@ -1,9 +1,13 @@
 """What people see while a command works: progress on standard error, results on standard output."""
 
 import sys
+import time
 from collections.abc import Iterable, Sequence
 from types import TracebackType
 from typing import Protocol, Self
+
+# Off a terminal, how often a long stage says how far it is [s].
+EVERY = 30.0
 
 
 class Progress(Protocol):
@@ -26,16 +30,57 @@ class Silent:
         """Ignore an advance."""
 
 
-class Terminal:
-    """Progress and tables by rich; a context manager that owns the live display."""
+class Pace:
+    """How fast a stage goes: what is done of how much, and how long the rest will take."""
 
-    def __init__(self) -> None:
+    def __init__(self, name: str, total: float | None, now: float) -> None:
+        self.name, self.total = name, total
+        self.said = now
+        self._first: tuple[float, float] | None = None
+
+    def line(self, done: float, note: str, now: float) -> str:
+        """Say how far the stage is; what was done before the first call tells nothing of its speed."""
+        remaining = self.remaining(done, now)
+        number = note or (f"{done:g}" if self.total is None else f"{done:g} of {self.total:g}")
+        return f"{self.name}: {number}" + ("" if remaining is None else f", {_duration(remaining)} left")
+
+    def remaining(self, done: float, now: float) -> float | None:
+        """Seconds that the rest will take; ``None`` while nobody knows."""
+        if self._first is None:
+            self._first = (done, now)
+        start, since = self._first
+        if self.total is None or done <= start:
+            return None
+        return max(self.total - done, 0.0) * (now - since) / (done - start)
+
+
+def _duration(seconds: float) -> str:
+    """A time in words, to two units at most."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes} min"
+    return f"{minutes} min" if minutes >= 10 else f"{minutes} min {rest} s" if minutes else f"{rest} s"
+
+
+class Terminal:
+    """Progress and tables by rich; a context manager that owns the live display.
+
+    On a terminal a bar with the time left, elsewhere a line for each stage and every 30 s how far it is.
+
+    Args:
+        quiet: No progress.
+        verbose: Every advance is a line, and no bar.
+    """
+
+    def __init__(self, *, quiet: bool = False, verbose: bool = False) -> None:
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
         self._out = Console(file=sys.stdout, soft_wrap=False, width=None if sys.stdout.isatty() else 120)
         console = Console(file=sys.stderr)
-        self._live = console.is_terminal
+        self._live = console.is_terminal and not quiet and not verbose
+        self._quiet, self._every = quiet, 0.0 if verbose else EVERY
         self._error = console
         self._progress = Progress(
             SpinnerColumn(),
@@ -43,11 +88,14 @@ class Terminal:
             BarColumn(bar_width=24),
             TextColumn("{task.fields[note]}"),
             TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
             console=console,
             transient=True,
             disable=not self._live,
         )
         self._task: int | None = None
+        self._pace = Pace("", None, time.monotonic())
 
     def __enter__(self) -> Self:
         self._progress.start()
@@ -60,17 +108,28 @@ class Terminal:
 
     def stage(self, name: str, total: float | None = None) -> None:
         """Begin a stage: a new bar on a terminal, a line elsewhere."""
+        self._pace = Pace(name, total, time.monotonic())
         if not self._live:
-            self._error.print(f"{name} ...", highlight=False)
+            self._tell(f"{name} ...")
             return
         if self._task is not None:
             self._progress.remove_task(self._task)  # type: ignore[arg-type]
         self._task = self._progress.add_task(name, total=total, note="")
 
     def advance(self, done: float, note: str = "") -> None:
-        """Move the bar of the current stage."""
+        """Move the bar of the current stage; elsewhere say now and then how far it is."""
         if self._live and self._task is not None:
             self._progress.update(self._task, completed=done, note=note)  # type: ignore[arg-type]
+            return
+        now = time.monotonic()
+        line = self._pace.line(done, note, now)
+        if now - self._pace.said >= self._every:
+            self._pace.said = now
+            self._tell(line)
+
+    def _tell(self, line: str) -> None:
+        if not self._quiet:
+            self._error.print(line, highlight=False, markup=False, soft_wrap=True)
 
     def table(self, title: str, rows: Iterable[Sequence[str]]) -> None:
         """Print a table; the first row is its head."""

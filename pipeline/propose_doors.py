@@ -2,13 +2,14 @@
 
 import json
 import tempfile
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import ClosedroomsError, OutputError
 from closedrooms.core.files import read_json
 from closedrooms.core.geojson import Feature, write_features
+from closedrooms.core.report import Report
 from closedrooms.core.rosmap import read_map
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.propose_doors_config import DoorsConfig
@@ -16,37 +17,7 @@ from closedrooms.pipeline.stopwatch import Stopwatch
 from closedrooms.predictor.structure.door_proposals import DoorProposal, propose_doors
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DoorsResult:
-    """Proposed doors of one map.
-
-    Attributes:
-        folder: The file that was written.
-        title: Head of the table.
-        proposals: The doors, by id, the best first.
-        failures: Nothing: a map without a door is a result.
-        durations: Seconds by stage.
-    """
-
-    folder: Path
-    title: str
-    proposals: dict[str, DoorProposal]
-    failures: dict[str, str] = field(default_factory=dict)
-    durations: dict[str, float] = field(default_factory=dict)
-
-    def table(self) -> list[tuple[str, ...]]:
-        """Rows for people; the first is the head."""
-        rows: list[tuple[str, ...]] = [("door", "score", "width", "set back", "middle")]
-        for name, door in self.proposals.items():
-            x, y = door.midpoint
-            rows.append(
-                (name, f"{door.score:.2f}", f"{door.width:.2f} m", f"{door.recess:.2f} m", f"({x:.2f}, {y:.2f}) m")
-            )
-        rows.append(("time", f"{self.durations['propose']:.2f} s", "", "", ""))
-        return rows
-
-
-def doors_map(config: DoorsConfig, *, progress: Progress | None = None) -> DoorsResult:
+def doors_map(config: DoorsConfig, *, progress: Progress | None = None) -> Report:
     """Read a map, propose closed doors, write them.
 
     Args:
@@ -76,15 +47,33 @@ def doors_map(config: DoorsConfig, *, progress: Progress | None = None) -> Doors
         draw_map(config.picture, grid, doors, np.zeros((0, 3)))
     write_features(config.out, [_feature(name, proposal) for name, proposal in proposals.items()])
     plural = "" if len(found) == 1 else "s"
-    title = f"{config.map.name}: {len(found)} closed door{plural} proposed"
-    return DoorsResult(config.out, title, proposals, durations=watch.seconds())
+    return Report(
+        folder=config.out,
+        title=f"{config.map.name}: {len(found)} closed door{plural} proposed",
+        rows=_rows(proposals, watch.seconds()["propose"]),
+        figures={"doors": {name: _properties(name, door) for name, door in proposals.items()}},
+    )
+
+
+def _rows(proposals: dict[str, DoorProposal], seconds: float) -> list[tuple[str, ...]]:
+    """The table for people, the best proposal first."""
+    rows: list[tuple[str, ...]] = [("door", "score", "width", "set back", "middle")]
+    for name, door in proposals.items():
+        x, y = door.midpoint
+        rows.append((name, f"{door.score:.2f}", f"{door.width:.2f} m", f"{door.recess:.2f} m", f"({x:.2f}, {y:.2f}) m"))
+    return [*rows, ("time", f"{seconds:.2f} s", "", "", "")]
 
 
 def _feature(name: str, door: DoorProposal) -> Feature:
     from shapely.geometry import LineString
 
+    return LineString(door.segment), _properties(name, door)
+
+
+def _properties(name: str, door: DoorProposal) -> dict[str, Any]:
+    """What the file says of a proposal beside its segment."""
     properties = {"id": name, "state": "closed", "width": round(door.width, 4), "score": round(door.score, 4)}
-    return LineString(door.segment), {**properties, "recess": round(door.recess, 4)}
+    return {**properties, "recess": round(door.recess, 4)}
 
 
 def check_replaceable(path: Path) -> None:

@@ -1,11 +1,11 @@
 """What a run found, as a table for people."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from closedrooms.core.remarks import Remark, remark_rows
+from closedrooms.core.remarks import Remark
+from closedrooms.core.report import Report
 
 Rows = list[tuple[str, str]]
 
@@ -13,73 +13,61 @@ Rows = list[tuple[str, str]]
 NOT_AVAILABLE = "n/a"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RunResult:
-    """One finished run.
+def run_report(
+    folder: Path,
+    title: str,
+    manifest: Mapping[str, Any],
+    *,
+    stopped: Mapping[str, str] | None = None,
+    remarks: Sequence[Remark] = (),
+) -> Report:
+    """The report of a finished run.
 
-    Attributes:
+    Args:
         folder: The run directory.
-        title: Head of the table of results.
-        metrics: ``metrics`` of ``run.json``.
-        closed: Doors that were closed.
-        seen: Closed doors that the robot saw.
-        unpredicted: Why a seen door could not be predicted, by door id.
+        title: Head of the table.
+        manifest: What ``run.json`` holds: ``metrics``, ``closed``, ``doors``, ``exploration``, ``durations``.
         stopped: Why a stage ended before it was done, by stage: ``exploration``, ``cover``, ``drive``.
         remarks: What was dropped, repaired or guessed.
-        durations: Seconds by stage.
-        exploration: ``exploration`` of ``run.json``: status, simulated seconds, scans, travelled distance.
     """
+    metrics, unpredicted, stopped = manifest["metrics"], manifest["doors"]["failures"], stopped or {}
+    durations: Mapping[str, float] = manifest["durations"]
+    rows: Rows = [
+        ("figure", "value"),
+        *((f"{stage} ended early", why) for stage, why in stopped.items()),
+        *_map_rows(manifest),
+        *_room_rows(manifest),
+        *tour_rows(metrics["tour"]),
+        *drive_rows(metrics.get("drive")),
+        *((f"time: {stage}", f"{seconds:.2f} s") for stage, seconds in durations.items()),
+    ]
+    figures = {name: manifest[name] for name in ("closed", "doors", "exploration", "metrics", "durations")}
+    failures = {**unpredicted, **stopped}
+    return Report(folder=folder, title=title, rows=rows, failures=failures, remarks=remarks, figures=figures)
 
-    folder: Path
-    title: str
-    metrics: dict[str, Any]
-    closed: tuple[str, ...]
-    seen: tuple[str, ...]
-    unpredicted: dict[str, str] = field(default_factory=dict)
-    stopped: dict[str, str] = field(default_factory=dict)
-    remarks: tuple[Remark, ...] = ()
-    durations: dict[str, float] = field(default_factory=dict)
-    exploration: dict[str, Any] = field(default_factory=dict)
 
-    @property
-    def failures(self) -> dict[str, str]:
-        """What is missing from the result and why; with any, the command ends with exit status 3."""
-        lost = {remark.what: str(remark) for remark in self.remarks if remark.loss}
-        return {**self.unpredicted, **self.stopped, **lost}
+def _map_rows(manifest: Mapping[str, Any]) -> Rows:
+    metrics, closed, seen = manifest["metrics"], manifest["closed"], manifest["doors"]["seen"]
+    missed = [door for door in closed if door not in seen]
+    return [
+        ("doors closed", f"{len(closed)}" + (f": {', '.join(closed)}" if closed else "")),
+        ("doors seen", f"{len(seen)}" + (f"; never seen: {', '.join(missed)}" if missed else "")),
+        ("area mapped", figure(metrics["area_mapped"], "{:.1f} %", scale=100.0)),
+        ("trajectory error (ATE RMSE)", f"{metrics['ate_m']:.3f} m"),
+    ]
 
-    def table(self) -> Rows:
-        """Rows for people; the first is the head."""
-        return [
-            ("figure", "value"),
-            *((f"{stage} ended early", reason) for stage, reason in self.stopped.items()),
-            *remark_rows(self.remarks),
-            *self._map_rows(),
-            *self._room_rows(),
-            *tour_rows(self.metrics["tour"]),
-            *drive_rows(self.metrics.get("drive")),
-            *((f"time: {stage}", f"{seconds:.2f} s") for stage, seconds in self.durations.items()),
-        ]
 
-    def _map_rows(self) -> Rows:
-        missed = [door for door in self.closed if door not in self.seen]
-        return [
-            ("doors closed", f"{len(self.closed)}" + (f": {', '.join(self.closed)}" if self.closed else "")),
-            ("doors seen", f"{len(self.seen)}" + (f"; never seen: {', '.join(missed)}" if missed else "")),
-            ("area mapped", figure(self.metrics["area_mapped"], "{:.1f} %", scale=100.0)),
-            ("trajectory error (ATE RMSE)", f"{self.metrics['ate_m']:.3f} m"),
-        ]
-
-    def _room_rows(self) -> Rows:
-        if not self.closed:
-            return [("closed rooms", "none: no door was closed")]
-        metrics = self.metrics
-        rows = [
-            (f"IoU behind {door}", f"{iou:.3f}" + ("" if door in self.seen else ", never seen"))
-            for door, iou in metrics["room_iou"].items()
-        ]
-        if metrics["room_iou_mean"] is not None:
-            rows.append(("IoU mean", f"{metrics['room_iou_mean']:.3f} of {_count(metrics)}"))
-        return rows + [(f"not predicted: {door}", reason) for door, reason in self.unpredicted.items()]
+def _room_rows(manifest: Mapping[str, Any]) -> Rows:
+    if not manifest["closed"]:
+        return [("closed rooms", "none: no door was closed")]
+    metrics, doors = manifest["metrics"], manifest["doors"]
+    rows = [
+        (f"IoU behind {door}", f"{iou:.3f}" + ("" if door in doors["seen"] else ", never seen"))
+        for door, iou in metrics["room_iou"].items()
+    ]
+    if metrics["room_iou_mean"] is not None:
+        rows.append(("IoU mean", f"{metrics['room_iou_mean']:.3f} of {_count(metrics)}"))
+    return rows + [(f"not predicted: {door}", why) for door, why in doors["failures"].items()]
 
 
 def _count(metrics: Mapping[str, Any]) -> str:
@@ -121,8 +109,8 @@ def drive_rows(drive: Mapping[str, Any] | None) -> Rows:
     return rows
 
 
-def markdown(result: RunResult) -> str:
+def markdown(report: Report) -> str:
     """The table of results for a recording; times differ from run to run, recordings of equal runs must not."""
-    head, *rows = result.table()
+    head, *rows = report.table()
     lines = [f"| {' | '.join(row)} |" for row in rows if not row[0].startswith("time")]
-    return "\n".join([f"# {result.title}", "", f"| {' | '.join(head)} |", "| --- | ---: |", *lines])
+    return "\n".join([f"# {report.title}", "", f"| {' | '.join(head)} |", "| --- | ---: |", *lines])

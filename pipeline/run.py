@@ -12,6 +12,7 @@ from closedrooms.core.geojson import write_doors, write_features, write_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
+from closedrooms.core.report import Report
 from closedrooms.core.rosmap import write_map
 from closedrooms.core.tum import write_trajectory
 from closedrooms.coverage.tour import CoverageTour
@@ -21,12 +22,12 @@ from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.tour_follower import TourPlan
 from closedrooms.pipeline.bounds import check_size, too_narrow
-from closedrooms.pipeline.config import RunConfig, sim_config
+from closedrooms.pipeline.config import RunConfig
 from closedrooms.pipeline.drive import DriveResult, DriveSettings, drive_tour
 from closedrooms.pipeline.drive_report import draw_drive, drive_features, drive_metrics
-from closedrooms.pipeline.manifest import resolved, versions
+from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
-from closedrooms.pipeline.report import RunResult, markdown
+from closedrooms.pipeline.report import markdown, run_report
 from closedrooms.pipeline.run_log import RunLog
 from closedrooms.pipeline.run_metrics import run_metrics
 from closedrooms.pipeline.stopwatch import Stopwatch
@@ -69,7 +70,7 @@ class Finding:
     driven: DriveResult | None = None
 
 
-def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
+def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
     """Simulate a robot in a building with closed doors and predict what it could not see.
 
     Args:
@@ -84,7 +85,6 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
         OutputError: The run directory cannot be written, or holds something that is not ours.
     """
     progress, watch = progress or Silent(), Stopwatch()
-    config = replace(config, sim=sim_config(config))
     with watch.stage("world"):
         progress.stage("world")
         plan = load_world(config.world, level=config.level)
@@ -93,7 +93,9 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
         check_output_folder(folder)
         check_size(plan, config.mapper.resolution, config.navigation)
     manifest: dict[str, Any] = {
+        "command": "run",
         "configuration": resolved(config, leave_out=("out", "world")),
+        "paths": {"world": input_path(config.world)},
         "world": plan.name,
         "seed": config.seed,
         "closed": list(closed),
@@ -120,18 +122,8 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> RunResult:
             if config.keep_scans:
                 write_scans(staging / "scans.npz", log.recorded(), estimate=mapper.trajectory()[1])
         manifest["durations"] = watch.seconds()
-        result = RunResult(
-            folder,
-            f"{plan.name}, seed {config.seed}, noise {config.noise}",
-            manifest["metrics"],
-            closed,
-            tuple(door.id for door in found.survey.doors),
-            found.prediction.failures,
-            _stopped(found),
-            tuple(remarks),
-            manifest["durations"],
-            manifest["exploration"],
-        )
+        title = f"{plan.name}, seed {config.seed}, noise {config.noise}"
+        result = run_report(folder, title, manifest, stopped=_stopped(found), remarks=remarks)
         recorder.table(markdown(result))
     return result
 

@@ -11,7 +11,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.options import check_least
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.pipeline.config import NoiseName
+from closedrooms.pipeline.config import NoiseName, named_sim
 from closedrooms.sim.config import SimConfig
 
 MapSource = Literal["erased", "simulated"]
@@ -55,8 +55,8 @@ class DatasetConfig:
     record: bool = False
     """Write the recording ``run.rrd`` into every sample."""
 
-    sim: SimConfig = field(default_factory=SimConfig)
-    """Robot, lidar and odometry; ``noise`` above is laid over it."""
+    sim: SimConfig = field(default=None)  # type: ignore[assignment]
+    """Robot, lidar and odometry; where not given, with the noise named above."""
 
     mapper: MapperConfig = field(default_factory=MapperConfig)
     """The mapper."""
@@ -67,6 +67,8 @@ class DatasetConfig:
     def __post_init__(self) -> None:
         if not self.worlds:
             raise InvalidInputError("no world", expected="names of bundled worlds, files, or all")
+        if self.sim is None:
+            object.__setattr__(self, "sim", named_sim(self.noise))
         check_least(self, repetitions=1, max_closed=1, workers=1, seed=0)
         if self.scheduler is not None and not re.fullmatch(r"(tcp|tls|ws|ucx)://\S+:\d+", self.scheduler):
             raise InvalidInputError(f"--scheduler {self.scheduler}", expected="tcp://host:port")

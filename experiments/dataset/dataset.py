@@ -1,12 +1,13 @@
 """``closedrooms dataset``: maps of many buildings with closed doors, and what is really behind them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files import MANIFEST, read_json, write_bytes, write_json
+from closedrooms.core.report import Report
 from closedrooms.experiments.dataset.card import card
 from closedrooms.experiments.dataset.checksums import check
 from closedrooms.experiments.dataset.config import DatasetConfig
@@ -24,39 +25,10 @@ from closedrooms.experiments.dataset.layout import (
 from closedrooms.experiments.dataset.sample import Outcome, Task, make
 from closedrooms.experiments.dataset.variants import SPLITS, Variant, World, find_variants, find_worlds
 from closedrooms.experiments.workers import Crew, Lost
-from closedrooms.pipeline.config import named_noise
 from closedrooms.pipeline.progress import Progress, Silent
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DatasetResult:
-    """A finished dataset.
-
-    Attributes:
-        folder: Where it is.
-        title: Head of the table.
-        counts: Buildings, samples and bytes by split.
-        failures: Why a sample is missing, by id.
-        fingerprint: SHA-256 of ``SHA256SUMS``.
-    """
-
-    folder: Path
-    title: str
-    counts: dict[str, tuple[int, int, int]]
-    failures: dict[str, str] = field(default_factory=dict)
-    fingerprint: str = ""
-
-    def table(self) -> list[tuple[str, ...]]:
-        """Rows for people; the first is the head."""
-        rows: list[tuple[str, ...]] = [("split", "buildings", "samples", "MB")]
-        rows += [(split, str(b), str(s), f"{size / 1e6:.1f}") for split, (b, s, size) in self.counts.items()]
-        rows += [(f"missing: {name}", reason, "", "") for name, reason in sorted(self.failures.items())[:10]]
-        if len(self.failures) > 10:
-            rows.append((f"and {len(self.failures) - 10} more", "see manifest.json", "", ""))
-        return rows
-
-
-def dataset(config: DatasetConfig, *, progress: Progress | None = None) -> DatasetResult:
+def dataset(config: DatasetConfig, *, progress: Progress | None = None) -> Report:
     """Make a dataset, or what is missing of it.
 
     Args:
@@ -69,7 +41,7 @@ def dataset(config: DatasetConfig, *, progress: Progress | None = None) -> Datas
         OutputError: The folder cannot be written, or holds something that is not ours.
     """
     progress = progress or Silent()
-    config = replace(config, out=config.out.resolve(), sim=named_noise(config.sim, config.noise))
+    config = replace(config, out=config.out.resolve())
     progress.stage("worlds")
     worlds = find_worlds(config)
     variants = [variant for world in worlds for variant in find_variants(world, config)]
@@ -129,7 +101,7 @@ def _there(folder: Path) -> bool:
 
 def _finish(
     config: DatasetConfig, worlds: Sequence[World], variants: Sequence[Variant], failed: dict[str, str]
-) -> DatasetResult:
+) -> Report:
     """Write what stands at the root and in front of each split."""
     out = config.out
     made = sorted((v for v in variants if v.id not in failed), key=lambda v: v.id)
@@ -166,7 +138,19 @@ def _finish(
         }
         for variant in sorted(variants, key=lambda v: v.id)
     ]
-    write_json(out / DATASET_MANIFEST, {**description(config, worlds), "complete": True, "samples": samples})
+    manifest = {"command": "dataset", **description(config, worlds), "complete": True, "samples": samples}
+    write_json(out / DATASET_MANIFEST, manifest)
     write_sums(out, abouts)
-    title = f"{len(made)} of {len(variants)} samples, {len(worlds)} worlds, {config.maps}, noise {config.noise}"
-    return DatasetResult(out, title, counts, failed, fingerprint(out))
+    return Report(
+        folder=out,
+        title=f"{len(made)} of {len(variants)} samples, {len(worlds)} worlds, {config.maps}, noise {config.noise}",
+        rows=[
+            ("split", "buildings", "samples", "MB"),
+            *((split, str(b), str(s), f"{size / 1e6:.1f}") for split, (b, s, size) in counts.items()),
+        ],
+        failures=dict(sorted(failed.items())),
+        figures={
+            "fingerprint": fingerprint(out),
+            "splits": {split: {"buildings": b, "samples": s, "bytes": size} for split, (b, s, size) in counts.items()},
+        },
+    )

@@ -51,7 +51,7 @@ def claim(config: DatasetConfig, worlds: Sequence[World]) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot write ({error.strerror}): {folder}") from error
-    write_json(folder / DATASET_MANIFEST, {**wanted, "complete": False, "samples": []})
+    write_json(folder / DATASET_MANIFEST, {"command": "dataset", **wanted, "complete": False, "samples": []})
 
 
 def _unfinished(path: Path) -> bool:

@@ -1,54 +1,23 @@
 """``closedrooms evaluate``: methods against the truth, over datasets (paper, section 4.1)."""
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from pathlib import Path
 from statistics import median
 from typing import Any
 
 from closedrooms.core.files import MANIFEST, PROGRAM, write_json
+from closedrooms.core.report import Report
 from closedrooms.experiments.evaluation.claimed_folder import claim
 from closedrooms.experiments.evaluation.config import EvaluateConfig
 from closedrooms.experiments.evaluation.listing import SamplePath, find_samples
 from closedrooms.experiments.evaluation.sample import Outcome, Scores, evaluate_sample
 from closedrooms.experiments.workers import Crew, Lost
-from closedrooms.pipeline.manifest import resolved, versions
+from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class EvaluationResult:
-    """A finished evaluation.
-
-    Attributes:
-        folder: What was written.
-        title: Head of the table.
-        summary: One row a method over all samples.
-        failures: Why a sample failed, by ``sample``, or ``method sample`` where one method did.
-        seconds: Median time of a prediction by method [s].
-    """
-
-    folder: Path
-    title: str
-    summary: list[dict[str, Any]]
-    failures: dict[str, str] = field(default_factory=dict)
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    def table(self) -> list[tuple[str, ...]]:
-        """Rows for people; the first is the head."""
-        head = ("method", "rooms", "IoU matched", "median", "IoU by door", "IoU whole area", "agreement", "s a map")
-        names = ("matched_mean", "matched_median", "by_door_mean", "area_mean", "agreement_mean")
-        rows: list[tuple[str, ...]] = [head]
-        for row in self.summary:
-            figures = ["" if row[name] is None else f"{row[name]:.3f}" for name in names]
-            seconds = self.seconds.get(row["method"])
-            rows.append((row["method"], str(row["rooms"]), *figures, "" if seconds is None else f"{seconds:.3f}"))
-        return rows
-
-
-def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> EvaluationResult:
+def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Report:
     """Predict every sample with every method, score it, write tables and pictures.
 
     What was finished before with the same input, method and code is not done again.
@@ -82,6 +51,7 @@ def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Eva
         "program": PROGRAM,
         "command": "evaluate",
         "configuration": resolved(config, leave_out=("datasets", "out", "workers")),
+        "paths": {"datasets": [input_path(folder) for folder in config.datasets]},
         "versions": versions(),
         "samples": len(samples),
         "summary": summary,
@@ -90,7 +60,25 @@ def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Eva
         "files": sorted(path.name for path in config.out.iterdir() if path.name != MANIFEST),
     }
     write_json(config.out / MANIFEST, manifest)
-    return EvaluationResult(config.out, f"{len(samples)} samples", summary, failures, seconds)
+    return Report(
+        folder=config.out,
+        title=f"{len(samples)} samples",
+        rows=_rows(summary, seconds),
+        failures=failures,
+        figures={"summary": summary, "prediction_median_s": seconds},
+    )
+
+
+def _rows(summary: Sequence[Mapping[str, Any]], seconds: Mapping[str, float]) -> list[tuple[str, ...]]:
+    """The table for people, one row a method over all samples."""
+    head = ("method", "rooms", "IoU matched", "median", "IoU by door", "IoU whole area", "agreement", "s a map")
+    names = ("matched_mean", "matched_median", "by_door_mean", "area_mean", "agreement_mean")
+    rows: list[tuple[str, ...]] = [head]
+    for row in summary:
+        figures = ["" if row[name] is None else f"{row[name]:.3f}" for name in names]
+        time = seconds.get(row["method"])
+        rows.append((row["method"], str(row["rooms"]), *figures, "" if time is None else f"{time:.3f}"))
+    return rows
 
 
 def _seconds(scores: Sequence[Scores]) -> dict[str, float]:

@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from functools import lru_cache
 from multiprocessing import get_context
 from pathlib import Path
@@ -13,13 +13,14 @@ from typing import Any
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError, reason
 from closedrooms.core.files import MANIFEST, PROGRAM, write_json
+from closedrooms.core.report import Report
 from closedrooms.experiments.evaluation.claimed_folder import claim
 from closedrooms.experiments.evaluation.tours import code_digest
 from closedrooms.experiments.robustness.config import RobustnessConfig
 from closedrooms.experiments.robustness.levels import Case, Setting, cases
 from closedrooms.experiments.robustness.onset import Onset
 from closedrooms.experiments.workers import one_thread
-from closedrooms.pipeline.manifest import resolved, versions
+from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.worlds.library import bundled_names, load_world
 
@@ -32,38 +33,7 @@ LOOK = 1.0
 NOT_CONTENT = ("out", "worlds", "workers", "resamples", "factors")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RobustnessResult:
-    """A finished sweep.
-
-    Attributes:
-        folder: What was written.
-        title: Head of the table.
-        onsets: Where every factor starts to hurt.
-        failures: Why a world failed, by its name.
-    """
-
-    folder: Path
-    title: str
-    onsets: list[Onset]
-    failures: dict[str, str] = field(default_factory=dict)
-
-    def table(self) -> list[tuple[str, ...]]:
-        """Rows for people; the first is the head."""
-        rows: list[tuple[str, ...]] = [
-            ("factor", "suffers from", "IoU there", "first to give way", "its share", "coverage from")
-        ]
-        for onset in self.onsets:
-            if onset.level is None or onset.difference is None or onset.stage is None or onset.share is None:
-                own = ("none", "", "", "")
-            else:
-                own = (f"{onset.level:g}", f"{onset.difference.mean:+.3f}", onset.stage, f"{onset.share.mean:.3f}")
-            coverage = "none" if onset.coverage_level is None else f"{onset.coverage_level:g}"
-            rows.append((onset.factor, *own, coverage))
-        return rows
-
-
-def robustness(config: RobustnessConfig, *, progress: Progress | None = None) -> RobustnessResult:
+def robustness(config: RobustnessConfig, *, progress: Progress | None = None) -> Report:
     """Disturb, measure, and tell where the prediction starts to suffer.
 
     What was finished before with the same configuration and code is not done again.
@@ -97,15 +67,36 @@ def robustness(config: RobustnessConfig, *, progress: Progress | None = None) ->
     manifest = {
         "program": PROGRAM,
         "command": "robustness",
-        "configuration": resolved(config, leave_out=("out", "workers")),
+        "configuration": resolved(config, leave_out=("worlds", "out", "workers")),
+        "paths": {"worlds": [input_path(world) for world in config.worlds]},
         "versions": versions(),
         "onsets": [asdict(onset) for onset in found],
         "failures": failures,
         "files": sorted(path.name for path in config.out.iterdir() if path.name != MANIFEST),
     }
     write_json(config.out / MANIFEST, manifest)
-    title = f"{len(worlds) - len(failures)} worlds, {config.repetitions} sets of {config.closed} doors each"
-    return RobustnessResult(config.out, title, found, failures)
+    return Report(
+        folder=config.out,
+        title=f"{len(worlds) - len(failures)} worlds, {config.repetitions} sets of {config.closed} doors each",
+        rows=_rows(found),
+        failures=failures,
+        figures={"onsets": manifest["onsets"]},
+    )
+
+
+def _rows(onsets: Sequence[Onset]) -> list[tuple[str, ...]]:
+    """The table for people: where every factor starts to hurt."""
+    rows: list[tuple[str, ...]] = [
+        ("factor", "suffers from", "IoU there", "first to give way", "its share", "coverage from")
+    ]
+    for onset in onsets:
+        if onset.level is None or onset.difference is None or onset.stage is None or onset.share is None:
+            own = ("none", "", "", "")
+        else:
+            own = (f"{onset.level:g}", f"{onset.difference.mean:+.3f}", onset.stage, f"{onset.share.mean:.3f}")
+        coverage = "none" if onset.coverage_level is None else f"{onset.coverage_level:g}"
+        rows.append((onset.factor, *own, coverage))
+    return rows
 
 
 def _worlds(given: Sequence[str]) -> dict[str, str]:

@@ -1,6 +1,7 @@
 """The command line: what a user types, what comes back, and what is left on disk."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from closedrooms.cli.commands import COMMANDS, main
+from closedrooms.cli.commands import main
+from closedrooms.cli.table import COMMANDS
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.rosmap import read_map, write_map
 
@@ -26,26 +28,6 @@ def one_line(capsys: pytest.CaptureFixture[str]) -> str:
     assert len(lines) == 1, error
     assert "Traceback" not in error
     return lines[0]
-
-
-@pytest.fixture
-def corridor(tmp_path: Path) -> Path:
-    """A corridor with a known room on each side of an unknown one, and the door of that one."""
-    cells = np.full((200, 400), UNKNOWN, dtype=np.int8)
-
-    def room(x0: int, y0: int, x1: int, y1: int) -> None:
-        cells[y0 - 2 : y1 + 2, x0 - 2 : x1 + 2] = OCCUPIED
-        cells[y0:y1, x0:x1] = FREE
-
-    room(20, 62, 120, 140)
-    room(224, 62, 330, 140)
-    room(20, 20, 330, 60)
-    cells[58:64, 60:78] = FREE
-    cells[58:64, 260:278] = FREE
-    write_map(tmp_path / "map", OccupancyGrid(GridFrame(0.05, -2.0, -3.0, 200, 400), cells))
-    door = {"type": "Feature", "properties": {"id": "d1"}, "geometry": {"type": "Point", "coordinates": [6.6, 0.0]}}
-    (tmp_path / "doors.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [door]}))
-    return tmp_path
 
 
 def test_predict_completes_a_map(corridor: Path) -> None:
@@ -234,17 +216,30 @@ def test_wrong_usage_is_status_2(words: tuple[str, ...]) -> None:
     assert call(*words) == 2
 
 
-def test_the_module_runs_as_the_program_does() -> None:
-    words = [sys.executable, "-m", "closedrooms.cli.commands", "teleport"]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
+@pytest.mark.parametrize("module", ["closedrooms.cli", "closedrooms.cli.commands"])
+def test_the_module_runs_as_the_program_does(module: str, tmp_path: Path) -> None:
+    words = [sys.executable, "-m", module, "teleport"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 2
     assert "unknown command 'teleport'" in done.stderr
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert call(command, "--help") == 0
-    assert "usage" in capsys.readouterr().out.lower()
+@pytest.mark.parametrize("command", [command.name for command in COMMANDS])
+@pytest.mark.parametrize("help_option", ["-h", "--help", "--help-all"])
+def test_every_command_explains_itself(command: str, help_option: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(*command.split(), help_option) == 0
+    assert f"usage: closedrooms {command}" in capsys.readouterr().out
+
+
+def test_help_shows_what_people_set_and_help_all_everything(capsys: pytest.CaptureFixture[str]) -> None:
+    shown = {}
+    for option in ("--help", "--help-all"):
+        assert call("run", option) == 0
+        shown[option] = set(re.findall(r"(?<!\S)--[a-z][a-z.-]+(?=[ ,])", capsys.readouterr().out))
+    assert 15 <= len({name for name in shown["--help"] if not name.startswith("--no-")}) <= 25
+    assert len(shown["--help-all"]) > 100
+    assert "--predictor.door-reach" in shown["--help-all"]
+    assert not any("." in name for name in shown["--help"] if not name.endswith("."))
 
 
 def test_lists_twenty_worlds_one_a_line_name_first(capsys: pytest.CaptureFixture[str]) -> None:

@@ -149,7 +149,7 @@ def test_a_truth_that_does_not_fit_the_map_is_said_and_the_others_are_evaluated(
     result = evaluate(config)
     assert list(result.failures) == ["bad"]
     assert message in result.failures["bad"]
-    assert result.summary[0]["samples"] == 1
+    assert result.figures["summary"][0]["samples"] == 1
 
 
 def test_a_defect_that_one_map_brings_out_is_said_and_the_other_methods_go_on(
@@ -168,7 +168,7 @@ def test_a_defect_that_one_map_brings_out_is_said_and_the_other_methods_go_on(
     assert list(result.failures) == ["geometric one"]
     assert "internal error" in result.failures["geometric one"]
     assert "ZeroDivisionError" in result.failures["geometric one"]
-    assert {row["method"] for row in result.summary} == {"paper"}
+    assert {row["method"] for row in result.figures["summary"]} == {"paper"}
 
 
 def test_two_samples_of_one_name_and_a_dataset_without_any_are_refused(tmp_path: Path) -> None:

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.remarks import Remark
-from closedrooms.pipeline.report import RunResult, drive_rows, figure, markdown
+from closedrooms.core.report import Report
+from closedrooms.pipeline.report import drive_rows, figure, markdown, run_report
 
 LENGTH = {"length_m": 10.0}
 METRICS: dict[str, Any] = {
@@ -23,9 +24,15 @@ METRICS: dict[str, Any] = {
 }
 
 
-def result(**changes: Any) -> RunResult:
-    known: dict[str, Any] = {"metrics": METRICS, "closed": ("d01", "d02"), "seen": ("d01",)} | changes
-    return RunResult(Path("out"), "w, seed 0", **known)
+def result(metrics: dict[str, Any] = METRICS, *, failures: dict[str, str] | None = None, **more: Any) -> Report:
+    manifest = {
+        "metrics": metrics,
+        "closed": ["d01", "d02"],
+        "doors": {"seen": ["d01"], "failures": failures or {}},
+        "exploration": {},
+        "durations": {"predict": 1.0},
+    }
+    return run_report(Path("out"), "w, seed 0", manifest, **more)
 
 
 def test_a_door_that_was_not_seen_is_in_the_table_and_the_mean_says_of_how_many_rooms() -> None:
@@ -51,20 +58,21 @@ def test_what_ended_early_is_a_failure_and_stands_first() -> None:
     stopped = result(stopped={"exploration": "limit, not done after 10 s"})
     assert stopped.failures == {"exploration": "limit, not done after 10 s"}
     assert stopped.table()[1] == ("exploration ended early", "limit, not done after 10 s")
-    assert result().failures == {}
+    assert not result().partial
 
 
 def test_a_remark_is_told_and_is_a_failure_only_where_something_was_lost() -> None:
     told = Remark(action="dropped", what="rooms", why="too narrow", names=("r1",))
     lost = Remark(action="dropped", what="doors", why="no room", names=("d9",), loss=True)
-    both = result(remarks=(told, lost), unpredicted={"d01": "in free space"})
+    both = result(remarks=(told, lost), failures={"d01": "in free space"})
     assert [text for head, text in both.table() if head == "remark"] == [str(lost), str(told)]
-    assert both.failures == {"d01": "in free space", "doors": str(lost)}
+    assert both.failures == {"d01": "in free space"}
+    assert both.partial
     assert dict(both.table())["not predicted: d01"] == "in free space"
 
 
 def test_a_recording_gets_the_table_without_times() -> None:
-    text = markdown(result(durations={"predict": 1.0}))
+    text = markdown(result())
     assert text.startswith("# w, seed 0\n\n| figure | value |")
     assert "time" not in text
     json.dumps(METRICS, allow_nan=False)

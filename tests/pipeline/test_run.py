@@ -12,9 +12,9 @@ from closedrooms.core.geojson import read_doors, read_features, read_rooms
 from closedrooms.core.rosmap import read_map
 from closedrooms.core.tum import read_trajectory
 from closedrooms.mapping.logs.recorded_run import read_run
-from closedrooms.pipeline.config import RunConfig, sim_config
+from closedrooms.pipeline.config import RunConfig
 from closedrooms.pipeline.run import choose_closed
-from closedrooms.sim.config import NOISE_LEVELS, LidarConfig, NoiseConfig, SimConfig
+from closedrooms.sim.config import NOISE_LEVELS, SimConfig
 from closedrooms.worlds.library import DEFAULT_WORLD, load_world
 
 FILES = {
@@ -27,12 +27,10 @@ def test_runs_the_default_world_of_the_library() -> None:
     assert RunConfig().world == DEFAULT_WORLD
 
 
-def test_names_set_noise_and_lidar_and_single_numbers_win() -> None:
-    assert sim_config(RunConfig(noise="high")).noise == NOISE_LEVELS["high"]
-    own = NoiseConfig(range_sd=0.2)
-    assert sim_config(RunConfig(noise="high", sim=SimConfig(noise=own))).noise == own
-    assert sim_config(RunConfig(lidar="sick-lms111")).lidar.beams == 541
-    assert sim_config(RunConfig(lidar="sick-lms111", sim=SimConfig(lidar=LidarConfig(beams=90)))).lidar.beams == 90
+def test_names_set_noise_and_lidar_where_the_numbers_are_not_given() -> None:
+    assert RunConfig(noise="high").sim.noise == NOISE_LEVELS["high"]
+    assert RunConfig(lidar="sick-lms111").sim.lidar.beams == 541
+    assert RunConfig(noise="high", sim=SimConfig()).sim.noise == NOISE_LEVELS["medium"]
 
 
 def test_the_seed_draws_the_rooms_to_close() -> None:
