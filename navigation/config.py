@@ -88,11 +88,11 @@ class NavigationConfig:
     time_limit: float = 7200.0
     """Simulated time after which a run ends with the status ``limit`` [s]."""
 
-    wall_limit: float = 1200.0
+    wall_limit: float = 720.0
     """The same in real time [s]; a run that ends by it may end elsewhere the next time."""
 
-    most_cells: int = 20_000_000
-    """Cells of the map from which on a run ends with the status ``limit``: 50,000 m2 at 0.05 m, more than a campus."""
+    most_cells: int = 40_000_000
+    """Cells of the map from which on a run ends with the status ``limit``: 100,000 m2 at 0.05 m."""
 
     def __post_init__(self) -> None:
         for name in (

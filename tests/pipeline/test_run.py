@@ -92,3 +92,16 @@ def test_a_run_without_closed_doors_says_so_and_completes(tmp_path: Path, capsys
     assert "no door was closed" in capsys.readouterr().out
     assert json.loads((tmp_path / "out" / "run.json").read_text())["metrics"]["room_iou_mean"] is None
     assert not (tmp_path / "out" / "run.rrd").exists()
+
+
+@pytest.mark.slow
+def test_a_run_that_ends_early_is_written_whole_and_leads_to_exit_status_3(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["run", "office-01", "--no-record", "--navigation.time-limit", "10", "--out", str(tmp_path / "out")]
+    assert main(words) == 3
+    assert "exploration ended early" in capsys.readouterr().out
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert record["exploration"]["status"] == "limit"
+    assert "10 simulated seconds" in record["exploration"]["reason"]
+    assert {path.name for path in (tmp_path / "out").iterdir()} == FILES
