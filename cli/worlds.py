@@ -18,10 +18,10 @@ def act(config: ListWorlds | ShowWorld | GenerateWorld | ConvertWorld) -> Iterab
         case ListWorlds():
             return list_worlds()
         case ShowWorld():
-            show_world(config.world, config.out, level=config.level)
+            show_world(config.world, config.out, level=config.level, force=config.force)
         case GenerateWorld():
-            generate_world(config.kind, config.seed, config.out, furniture=config.furniture)
+            generate_world(config.kind, config.seed, config.out, furniture=config.furniture, force=config.force)
         case ConvertWorld():
-            convert_world(config.source, config.destination, config.to, level=config.level)
+            convert_world(config.source, config.destination, config.to, level=config.level, force=config.force)
             return [f"written to {config.destination}"]
     return [f"written to {config.out}"]

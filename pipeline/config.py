@@ -115,6 +115,9 @@ class PredictConfig:
     record: bool = False
     """Write the recording ``run.rrd`` for the rerun viewer."""
 
+    allow_outside: bool = False
+    """Open the picture that the map's ``image:`` names also outside the folder of the YAML."""
+
     predictor: Annotated[PredictorConfig, tyro.conf.Suppress] = field(default_factory=PredictorConfig)
     """All settings, for use as a library; the three above are laid over it."""
 
@@ -152,6 +155,9 @@ class CoverConfig:
     start: tuple[float, float] | None = None
     """Where the robot is, x and y in the map frame [m]: of several parts that are not connected, its own is covered;
     without it, the largest (``--coverage.parts all`` covers every one)."""
+
+    allow_outside: bool = False
+    """Open the picture that the map's ``image:`` names also outside the folder of the YAML."""
 
     coverage: CoverageConfig = field(default_factory=CoverageConfig)
     """Graph and tour."""
@@ -198,6 +204,9 @@ class ShowWorld:
     level: str | None = None
     """Which level of a file with several."""
 
+    force: bool = False
+    """Replace a picture that is there already."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class GenerateWorld:
@@ -215,6 +224,9 @@ class GenerateWorld:
     furniture: bool = False
     """Put furniture into the rooms."""
 
+    force: bool = False
+    """Replace a file that is there already."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ConvertWorld:
@@ -231,6 +243,9 @@ class ConvertWorld:
 
     level: str | None = None
     """Which level of a file with several."""
+
+    force: bool = False
+    """Replace files that is there already."""
 
 
 WORLD_ACTIONS: dict[str, tuple[str, type[ListWorlds | ShowWorld | GenerateWorld | ConvertWorld]]] = {

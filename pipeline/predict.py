@@ -10,8 +10,9 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
 from closedrooms.core.geojson import read_doors, write_doors, write_rooms
 from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.remarks import Remark, remark_rows
 from closedrooms.core.room import Room
-from closedrooms.core.rosmap import read_map, write_map
+from closedrooms.core.rosmap import read_ros_map, write_map
 from closedrooms.navigation.observer import NoObserver, Observer
 from closedrooms.pipeline.config import PredictConfig, predictor_config
 from closedrooms.pipeline.manifest import resolved, versions
@@ -30,6 +31,7 @@ class PredictResult:
         rooms: Predicted rooms.
         failures: Why a door could not be predicted, by door id.
         durations: Seconds by stage.
+        remarks: What was dropped, repaired or guessed on reading.
     """
 
     folder: Path
@@ -37,6 +39,7 @@ class PredictResult:
     rooms: tuple[Room, ...]
     failures: dict[str, str] = field(default_factory=dict)
     durations: dict[str, float] = field(default_factory=dict)
+    remarks: tuple[Remark, ...] = ()
 
     def table(self) -> list[tuple[str, ...]]:
         """Rows for people; the first is the head."""
@@ -50,6 +53,7 @@ class PredictResult:
             for room in self.rooms
         ]
         rows += [(door, f"not predicted: {reason}", "") for door, reason in self.failures.items()]
+        rows += [(kind, remark, "") for kind, remark in remark_rows(self.remarks)]
         rows.append(("time", "prediction", f"{self.durations['predict']:.2f} s"))
         return rows
 
@@ -69,11 +73,15 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> P
         OutputError: The folder cannot be written, or holds something that is not ours.
     """
     progress, watch = progress or Silent(), Stopwatch()
-    check_output_folder(config.out)
+    check_output_folder(config.out, "predict")
     with watch.stage("read"):
         progress.stage("read")
-        grid, doors = read_map(config.map), read_doors(config.doors)
+        read = read_ros_map(config.map, allow_outside=config.allow_outside)
+        remarks = list(read.remarks)
+        given = read_doors(config.doors, remarks=remarks)
+        grid, doors = read.grid, read.doors_on_grid(given)
     manifest: dict[str, Any] = {
+        "command": "predict",
         "configuration": resolved(config, leave_out=("map", "doors", "out")),
         "paths": {"map": str(config.map), "doors": str(config.doors)},
         "versions": versions(),
@@ -91,17 +99,19 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> P
         with watch.stage("write"):
             progress.stage("write")
             observed = grid.on(prediction.grid.frame)
-            write_map(folder / "map", observed)
-            write_map(folder / "predicted", prediction.grid)
-            write_doors(folder / "doors.geojson", doors)
-            write_rooms(folder / "rooms.geojson", prediction.rooms)
+            rooms = tuple(read.rooms_on_map(prediction.rooms))
+            write_map(folder / "map", observed, map_T_grid=read.map_T_grid)
+            write_map(folder / "predicted", prediction.grid, map_T_grid=read.map_T_grid)
+            write_doors(folder / "doors.geojson", given)
+            write_rooms(folder / "rooms.geojson", rooms)
             from closedrooms.visualization.summary import draw_summary
 
             draw_summary(folder / "summary.png", observed, prediction, doors)
         manifest["doors"] = {"given": [door.id for door in doors], "failures": prediction.failures}
+        manifest["remarks"] = [remark.as_json() for remark in remarks]
         manifest["durations"] = watch.seconds()
     title = f"{config.map.name}: {len(prediction.rooms)} of {len(doors)} doors predicted"
-    return PredictResult(config.out, title, prediction.rooms, prediction.failures, manifest["durations"])
+    return PredictResult(config.out, title, rooms, prediction.failures, manifest["durations"], tuple(remarks))
 
 
 @contextlib.contextmanager

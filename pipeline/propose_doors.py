@@ -1,15 +1,16 @@
 """``closedrooms doors``: proposes closed doors on anybody's map, from the map alone."""
 
-import json
-import tempfile
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.errors import ClosedroomsError, OutputError
-from closedrooms.core.files import read_json
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files import check_new_files
 from closedrooms.core.geojson import Feature, write_features
-from closedrooms.core.rosmap import read_map
+from closedrooms.core.remarks import Remark, remark_rows
+from closedrooms.core.rosmap import RosMap, read_ros_map
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.propose_doors_config import DoorsConfig
 from closedrooms.pipeline.stopwatch import Stopwatch
@@ -25,6 +26,7 @@ class DoorsResult:
         title: Head of the table.
         proposals: The doors, by id, the best first.
         failures: Nothing: a map without a door is a result.
+        remarks: What was repaired or guessed on reading.
         durations: Seconds by stage.
     """
 
@@ -33,6 +35,7 @@ class DoorsResult:
     proposals: dict[str, DoorProposal]
     failures: dict[str, str] = field(default_factory=dict)
     durations: dict[str, float] = field(default_factory=dict)
+    remarks: tuple[Remark, ...] = ()
 
     def table(self) -> list[tuple[str, ...]]:
         """Rows for people; the first is the head."""
@@ -42,6 +45,7 @@ class DoorsResult:
             rows.append(
                 (name, f"{door.score:.2f}", f"{door.width:.2f} m", f"{door.recess:.2f} m", f"({x:.2f}, {y:.2f}) m")
             )
+        rows += [(kind, remark, "", "", "") for kind, remark in remark_rows(self.remarks)]
         rows.append(("time", f"{self.durations['propose']:.2f} s", "", "", ""))
         return rows
 
@@ -54,30 +58,41 @@ def doors_map(config: DoorsConfig, *, progress: Progress | None = None) -> Doors
         progress: Told what is done.
 
     Raises:
-        InvalidInputError: The map cannot be read.
-        OutputError: The file cannot be written, or holds something else than proposals.
+        InvalidInputError: The map cannot be read, or is smaller than 2 x 2 cells.
+        OutputError: A file cannot be written, is the map, or is there already and ``force`` is not set.
     """
     progress, watch = progress or Silent(), Stopwatch()
-    check_replaceable(config.out)
+    outputs = [config.out] if config.picture is None else [config.out, config.picture]
+    check_new_files(outputs, force=config.force, sources=[config.map])
     with watch.stage("read"):
         progress.stage("read")
-        grid = read_map(config.map)
+        read = read_ros_map(config.map, allow_outside=config.allow_outside)
+    if min(read.grid.frame.shape) < 2:
+        rows, cols = read.grid.frame.shape
+        raise InvalidInputError(f"a map of {cols} x {rows} cells", expected="at least 2 x 2", where=config.map)
     with watch.stage("propose"):
         progress.stage("propose")
-        found = propose_doors(grid, config.proposals)
-    proposals = {f"d{number:02d}": proposal for number, proposal in enumerate(found)}
+        found = propose_doors(read.grid, config.proposals)
+    names = [f"d{number:02d}" for number in range(len(found))]
+    proposals = {name: _on_map(read, proposal) for name, proposal in zip(names, found, strict=True)}
     progress.stage("write")
     if config.picture is not None:
-        import numpy as np
-
         from closedrooms.visualization.summary import draw_map
 
-        doors = [ClosedDoor(name, door.midpoint, door.segment, door.width) for name, door in proposals.items()]
-        draw_map(config.picture, grid, doors, np.zeros((0, 3)))
-    write_features(config.out, [_feature(name, proposal) for name, proposal in proposals.items()])
+        doors = [ClosedDoor(n, p.midpoint, p.segment, p.width) for n, p in zip(names, found, strict=True)]
+        draw_map(config.picture, read.grid, doors, np.zeros((0, 3)))
+    write_features(config.out, [_feature(name, door) for name, door in proposals.items()])
     plural = "" if len(found) == 1 else "s"
     title = f"{config.map.name}: {len(found)} closed door{plural} proposed"
-    return DoorsResult(config.out, title, proposals, durations=watch.seconds())
+    return DoorsResult(config.out, title, proposals, durations=watch.seconds(), remarks=read.remarks)
+
+
+def _on_map(read: RosMap, door: DoorProposal) -> DoorProposal:
+    """A proposal of the grid's frame in the map frame."""
+    if not read.turned:
+        return door
+    (x0, y0), (x1, y1) = read.map_T_grid.transform(np.array(door.segment)).tolist()
+    return replace(door, segment=((x0, y0), (x1, y1)))
 
 
 def _feature(name: str, door: DoorProposal) -> Feature:
@@ -85,36 +100,3 @@ def _feature(name: str, door: DoorProposal) -> Feature:
 
     properties = {"id": name, "state": "closed", "width": round(door.width, 4), "score": round(door.score, 4)}
     return LineString(door.segment), {**properties, "recess": round(door.recess, 4)}
-
-
-def check_replaceable(path: Path) -> None:
-    """Fail early when the file could not be written at the end, or holds anything but proposals.
-
-    Proposals are told by their ``score``: a list of doors that somebody made, or that a run saw, has none and is kept.
-
-    Raises:
-        OutputError: A folder, a file that is not ours, or a folder that is missing or cannot be written.
-    """
-    try:
-        if path.is_dir():
-            raise OutputError(f"the output is a folder; expected a file: {path}")
-        if path.exists() and not _proposals(path):
-            raise OutputError(
-                f"the output holds something that closedrooms doors did not write; expected a new file: {path}"
-            )
-        with tempfile.TemporaryFile(dir=path.parent):
-            pass
-    except OSError as error:
-        raise OutputError(f"cannot write ({error.strerror}): {path}") from error
-
-
-def _proposals(path: Path) -> bool:
-    """Whether a file is a FeatureCollection of doors that all have a score."""
-    try:
-        data = read_json(path, what="doors")
-        return data["type"] == "FeatureCollection" and all(
-            feature["geometry"]["type"] == "LineString" and {"id", "state", "score"} <= feature["properties"].keys()
-            for feature in data["features"]
-        )
-    except (ClosedroomsError, json.JSONDecodeError, KeyError, TypeError, AttributeError):
-        return False

@@ -13,6 +13,7 @@ from typing import Any
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError, reason
 from closedrooms.core.files import MANIFEST, PROGRAM, write_json
+from closedrooms.core.incoming import read_json
 from closedrooms.experiments.evaluation.claimed_folder import claim
 from closedrooms.experiments.evaluation.tours import code_digest
 from closedrooms.experiments.robustness.config import RobustnessConfig
@@ -206,7 +207,7 @@ def _finished(config: RobustnessConfig, world: str, wanted: Sequence[Case]) -> l
     """What is there of one world, levels in order."""
     rows: list[Row] = []
     for case in wanted:
-        kept = json.loads((_folder(config, world, case.name) / RESULT).read_text())["rows"]
+        kept = read_json(_folder(config, world, case.name) / RESULT, what="a finished level")["rows"]
         head = {"factor": case.factor, "number": case.number, "level": case.level}
         rows += [head | row for row in kept]
     return rows
@@ -216,10 +217,10 @@ def _kept(folder: Path, key: str, setting: Setting) -> bool:
     """Whether a level is finished; what another configuration or other code left is not, and goes."""
     path = folder / RESULT
     try:
-        kept = json.loads(path.read_text())
+        kept = read_json(path, what="a finished level")
         if kept["key"] == key and kept["setting"] == asdict(setting):
             return True
-    except (OSError, ValueError, KeyError, TypeError):
+    except (InvalidInputError, KeyError, TypeError):
         pass
     path.unlink(missing_ok=True)
     return False
