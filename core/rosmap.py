@@ -152,15 +152,32 @@ def read_ros_map(path: Path, *, allow_outside: bool = False) -> RosMap:
     if other:
         why = f"{fields['image']} is not there or outside, the file of its name beside the YAML was read"
         remarks.append(Remark(action="guessed", what="picture", why=why, names=(image.name,)))
-    pixels, opaque = read_picture(image)
     table = _raw() if mode == "raw" else _meanings(fields, mode, path)
+    # A turned grid keeps its own axes, with its corner as their origin.
+    corner, map_T_grid = ((x, y), IDENTITY) if yaw == 0.0 else ((0.0, 0.0), Pose2(x, y, yaw))
+    return RosMap(_grid(image, table, resolution, *corner), map_T_grid, tuple(remarks))
+
+
+def read_bare_picture(path: Path, *, resolution: float) -> OccupancyGrid:
+    """Read the picture of a map that has no YAML, with the thresholds that :func:`write_map` uses.
+
+    Args:
+        path: The picture.
+        resolution: Metres a pixel; the lower left corner lies at the origin.
+
+    Raises:
+        InvalidInputError: See :func:`closedrooms.core.map_picture.read_picture`.
+    """
+    return _grid(path, _meanings({}, "trinary", path), resolution, 0.0, 0.0)
+
+
+def _grid(picture: Path, table: CellArray, resolution: float, x: float, y: float) -> OccupancyGrid:
+    """The grid that a picture holds when ``table`` gives the cell of each grey value."""
+    pixels, opaque = read_picture(picture)
     cells: CellArray = table[pixels[::-1]]
     if opaque is not None:
         cells[~opaque[::-1]] = UNKNOWN
-    # A turned grid keeps its own axes, with its corner as their origin.
-    corner, map_T_grid = ((x, y), IDENTITY) if yaw == 0.0 else ((0.0, 0.0), Pose2(x, y, yaw))
-    frame = GridFrame(resolution, *corner, *pixels.shape)
-    return RosMap(OccupancyGrid(frame, handed_over(cells)), map_T_grid, tuple(remarks))
+    return OccupancyGrid(GridFrame(resolution, x, y, *pixels.shape), handed_over(cells))
 
 
 def _read_fields(path: Path) -> dict[str, Any]:
