@@ -38,6 +38,7 @@ def write_bytes(path: Path, data: bytes) -> None:
     Raises:
         OutputError: The folder is missing, read-only or full.
     """
+    _check_name(path)
     with clear_errors(path):
         _clear_parts(path)
         temporary = path.with_name(f".{short_name(path.name)}.{os.getpid()}.part")
@@ -75,6 +76,7 @@ def check_new_files(paths: Iterable[Path], *, force: bool = False, sources: Iter
     """
     sources = [source for source in sources if source.exists()]
     for path in paths:
+        _check_name(path)
         with clear_errors(path):
             if path.is_dir():
                 raise OutputError(f"the output is a folder; expected a file: {path}")
@@ -147,6 +149,7 @@ def check_output_folder(folder: Path, command: object = None) -> None:
         OutputError: It is a file, holds anything that the same command did not write or that was changed since, its
             parent cannot be written, or another process writes it.
     """
+    _check_name(folder)
     with clear_errors(folder):
         folder = _real(folder)
         _check_replaceable(folder, command)
@@ -313,6 +316,14 @@ def clear_errors(where: Path) -> Iterator[None]:
     """
     try:
         yield
-    except (OSError, UnicodeError) as error:
-        reason = getattr(error, "strerror", None) or "not a name that the file system takes"
-        raise OutputError(f"cannot write ({reason}): {getattr(error, 'filename', None) or where}") from error
+    except OSError as error:
+        raise OutputError(f"cannot write ({error.strerror or error}): {error.filename or where}") from error
+
+
+def _check_name(path: Path) -> None:
+    try:
+        os.fsencode(path)
+    except UnicodeError as error:
+        raise OutputError(f"cannot write (not a name that a file system takes): {path}") from error
+    if "\0" in str(path):
+        raise OutputError(f"cannot write (not a name that a file system takes): {path}")

@@ -76,11 +76,16 @@ def opened(path: Path, what: str) -> Iterator[io.BufferedReader]:
     with reading(path, what):
         # Without O_NONBLOCK the opening of a FIFO waits for somebody to write into it.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-        with os.fdopen(descriptor, "rb") as file:
+        try:
             mode = os.fstat(descriptor).st_mode
             if not stat.S_ISREG(mode):
                 kind = next((name for is_kind, name in KINDS.items() if is_kind(mode)), "no regular file")
                 raise InvalidInputError(kind, expected=f"{what} in a regular file", where=path)
+            file = os.fdopen(descriptor, "rb")
+        except BaseException:
+            os.close(descriptor)
+            raise
+        with file:
             yield file
 
 
