@@ -24,7 +24,7 @@ METADATA = "metadata.parquet"
 LOCK = ".lock"
 OURS = {DATASET_MANIFEST, CARD, SUMS, SURVEYS, LOCK, *SPLITS}
 # Names of what is being written: folders by tempfile, files by process number.
-UNFINISHED = re.compile(r"\..+\.([A-Za-z0-9_]{8}\.(part|old)|\d+\.part)")
+UNFINISHED = re.compile(r"\..+\.([A-Za-z0-9_]{8}\.(part|old)|\d+\.part|lock)")
 
 
 def claim(config: DatasetConfig, worlds: Sequence[World]) -> None:

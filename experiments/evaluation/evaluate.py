@@ -8,7 +8,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from closedrooms.core.files import MANIFEST, PROGRAM, write_json
+from closedrooms.core.files import MANIFEST, PROGRAM, only_writer, write_json
 from closedrooms.experiments.evaluation.claimed_folder import claim
 from closedrooms.experiments.evaluation.config import EvaluateConfig
 from closedrooms.experiments.evaluation.listing import SamplePath, find_samples
@@ -59,11 +59,17 @@ def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Eva
 
     Raises:
         InvalidInputError: No samples, or two with one name.
-        OutputError: The folder cannot be written, or holds something that is not ours.
+        OutputError: The folder cannot be written, holds something that is not ours, or another process writes it.
     """
     progress = progress or Silent()
     samples = find_samples(config.datasets)
     claim(config.out, "evaluate")
+    with only_writer(config.out):
+        return _evaluate(samples, config, progress)
+
+
+def _evaluate(samples: Sequence[SamplePath], config: EvaluateConfig, progress: Progress) -> EvaluationResult:
+    """Do what is not done yet, then write tables, pictures and manifest."""
     progress.stage("evaluate", len(samples))
     scores: list[Scores] = []
     failures: dict[str, str] = {}

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError, reason
-from closedrooms.core.files import MANIFEST, PROGRAM, write_json
+from closedrooms.core.files import MANIFEST, PROGRAM, only_writer, write_json
 from closedrooms.core.incoming import read_json
 from closedrooms.experiments.evaluation.claimed_folder import claim
 from closedrooms.experiments.evaluation.tours import code_digest
@@ -75,11 +75,17 @@ def robustness(config: RobustnessConfig, *, progress: Progress | None = None) ->
 
     Raises:
         InvalidInputError: A world that cannot be read, or two of one name.
-        OutputError: The folder cannot be written, or holds something that is not ours.
+        OutputError: The folder cannot be written, holds something that is not ours, or another process writes it.
     """
     progress = progress or Silent()
     worlds = _worlds(config.worlds)
     claim(config.out, "robustness")
+    with only_writer(config.out):
+        return _sweep(worlds, config, progress)
+
+
+def _sweep(worlds: dict[str, str], config: RobustnessConfig, progress: Progress) -> RobustnessResult:
+    """Do what is not done yet, then write figures and manifest."""
     wanted = cases(config)
     total = len(worlds) * len({case.name for case in wanted})
     progress.stage("sweep", total)
