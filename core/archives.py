@@ -18,8 +18,9 @@ MAX_UNPACKED = 2_000_000_000
 """Most bytes that are unpacked: scans of 720 beams as float32 at 10 Hz for 19 hours."""
 MAX_RATIO = 200
 """Most that anything large may shrink by: scans shrink 1.5 to 5 times, text logs 4 to 12 times, bombs 1000 times."""
-UNSUSPICIOUS = 20_000_000
-"""What unpacks to less is read whatever its ratio [bytes]."""
+UNSUSPICIOUS, UNSUSPICIOUS_LOG = 20_000_000, 2_000_000
+"""What unpacks to less is read whatever its ratio [bytes]: scans of a robot that stands still and sees no noise are all
+alike, lines of a log have stamps."""
 
 
 def read_arrays(path: Path, *, what: str, max_bytes: int = MAX_UNPACKED) -> dict[str, np.ndarray[Any, Any]]:
@@ -47,10 +48,12 @@ def read_arrays(path: Path, *, what: str, max_bytes: int = MAX_UNPACKED) -> dict
         return arrays
 
 
-def _check_size(unpacked: int, packed: int, path: Path, what: str, max_bytes: int) -> None:
+def _check_size(
+    unpacked: int, packed: int, path: Path, what: str, max_bytes: int, *, unsuspicious: int = UNSUSPICIOUS
+) -> None:
     if unpacked > max_bytes:
         raise InvalidInputError(f"an archive of {unpacked} bytes", expected=f"{what}, at most {max_bytes}", where=path)
-    if unpacked > UNSUSPICIOUS and unpacked > MAX_RATIO * max(packed, 1):
+    if unpacked > unsuspicious and unpacked > MAX_RATIO * max(packed, 1):
         raise InvalidInputError(
             f"an archive of {packed} bytes that unpacks to {unpacked}",
             expected=f"{what}, packed {MAX_RATIO} to 1 at most",
@@ -101,7 +104,8 @@ def log_lines(path: Path, *, gzipped: bool, what: str, longest: int, max_bytes: 
         try:
             while line := source.readline(longest):
                 unpacked += len(line)
-                _check_size(unpacked, file.tell() if gzipped else unpacked, path, what, max_bytes)
+                packed = file.tell() if gzipped else unpacked
+                _check_size(unpacked, packed, path, what, max_bytes, unsuspicious=UNSUSPICIOUS_LOG)
                 yield line
         except (EOFError, zlib.error, gzip.BadGzipFile) as error:
             damage = error

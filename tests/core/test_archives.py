@@ -76,8 +76,8 @@ def test_pickles_and_strange_members_are_refused(tmp_path: Path) -> None:
 
 
 def test_what_shrinks_too_much_or_is_too_large_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(archives, "UNSUSPICIOUS", 10_000)
-    bomb = npz(tmp_path / "a.npz", {"x.npy": npy(np.zeros(100_000))})
+    monkeypatch.setattr(archives, "UNSUSPICIOUS_LOG", 10_000)
+    bomb = npz(tmp_path / "a.npz", {"x.npy": npy(np.zeros(3_000_000))})
     with pytest.raises(InvalidInputError, match="unpacks to"):
         read_arrays(bomb, what="scans")
     with pytest.raises(InvalidInputError, match="at most 5000"):
