@@ -317,7 +317,7 @@ def clear_errors(where: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise OutputError(f"cannot write ({error.strerror or error}): {error.filename or where}") from error
+        raise OutputError(f"cannot write ({error.strerror or error}): {where}") from error
 
 
 def _check_name(path: Path) -> None:

@@ -3,7 +3,7 @@
 import os
 import re
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ MAX_CELLS = 400_000_000
 # Pictures above the first number of cells have at most the second number of cells a byte: PNG shrinks blank paper up to
 # 1000 times (8000 at one bit a pixel), maps of buildings 20 to 300 times.
 UNSUSPICIOUS_CELLS, MAX_CELLS_A_BYTE = 30_000_000, 1000
+FORMATS = ("PNG", "PPM", "BMP", "TIFF", "JPEG", "GIF", "WEBP")
 SCHEME = re.compile(r"(?i)(file|package|model|https?)://")
 
 
@@ -98,31 +99,32 @@ def read_picture(path: Path) -> tuple[npt.NDArray[np.uint8], BoolArray | None]:
 
     # Our own bound comes before decoding, and its message names the file.
     Image.MAX_IMAGE_PIXELS = None
-    with opened(path, WHAT) as file, reading(path, WHAT), _picture(file, path) as image:
-        width, height = image.size
-        size = os.fstat(file.fileno()).st_size
-        most = min(MAX_CELLS, max(size * MAX_CELLS_A_BYTE, UNSUSPICIOUS_CELLS))
-        if width * height > most:
-            raise InvalidInputError(
-                f"a picture of {width} x {height} in {size} bytes", expected=f"at most {most} cells", where=path
-            )
-        has_alpha = "A" in image.getbands() or "transparency" in image.info
-        if has_alpha:
-            rgba = np.asarray(image.convert("RGBA"))
-            return np.asarray(image.convert("L")), rgba[..., 3] > 0
-        if image.mode in {"I", "I;16", "I;16B", "I;16L"}:
-            return _sixteen_bits(image), None
-        return np.asarray(image if image.mode == "L" else image.convert("L")), None
+    with opened(path, WHAT) as file, reading(path, WHAT):
+        try:
+            # The other formats that Pillow knows start other programs (EPS) or hold no maps.
+            with Image.open(file, formats=FORMATS) as image:
+                _check_size(image.size, os.fstat(file.fileno()).st_size, path)
+                return _greys(image)
+        except (OSError, SyntaxError, EOFError) as error:
+            raise InvalidInputError("a picture that cannot be read", expected=WHAT, where=path) from error
 
 
-def _picture(file: BinaryIO, path: Path) -> Any:
-    from PIL import Image, UnidentifiedImageError
+def _check_size(size: tuple[int, int], file_bytes: int, path: Path) -> None:
+    width, height = size
+    most = min(MAX_CELLS, max(file_bytes * MAX_CELLS_A_BYTE, UNSUSPICIOUS_CELLS))
+    if width * height > most:
+        raise InvalidInputError(
+            f"a picture of {width} x {height}", expected=f"at most {most} cells in {file_bytes} bytes", where=path
+        )
 
-    try:
-        # The other formats that Pillow knows start other programs (EPS) or hold no maps.
-        return Image.open(file, formats=("PNG", "PPM", "BMP", "TIFF", "JPEG", "GIF", "WEBP"))
-    except UnidentifiedImageError as error:
-        raise InvalidInputError("a picture that cannot be read", expected=WHAT, where=path) from error
+
+def _greys(image: Any) -> tuple[npt.NDArray[np.uint8], BoolArray | None]:
+    if "A" in image.getbands() or "transparency" in image.info:
+        rgba = np.asarray(image.convert("RGBA"))
+        return np.asarray(image.convert("L")), rgba[..., 3] > 0
+    if image.mode in {"I", "I;16", "I;16B", "I;16L"}:
+        return _sixteen_bits(image), None
+    return np.asarray(image if image.mode == "L" else image.convert("L")), None
 
 
 def _sixteen_bits(image: Any) -> npt.NDArray[np.uint8]:
