@@ -18,7 +18,7 @@ def show_world(config: ShowWorld, *, progress: Progress) -> Iterable[str]:  # no
     """Draw a floor plan."""
     from closedrooms.pipeline.world_files import show_world as work
 
-    work(config.world, config.out, level=config.level)
+    work(config.world, config.out, level=config.level, force=config.force)
     return _written(config.out)
 
 
@@ -26,7 +26,7 @@ def generate_world(config: GenerateWorld, *, progress: Progress) -> Iterable[str
     """Generate a floor plan."""
     from closedrooms.pipeline.world_files import generate_world as work
 
-    work(config.kind, config.seed, config.out, furniture=config.furniture)
+    work(config.kind, config.seed, config.out, furniture=config.furniture, force=config.force)
     return _written(config.out)
 
 
@@ -34,7 +34,7 @@ def convert_world(config: ConvertWorld, *, progress: Progress) -> Iterable[str]:
     """Convert a floor plan to another format."""
     from closedrooms.pipeline.world_files import convert_world as work
 
-    work(config.source, config.destination, config.to, level=config.level)
+    work(config.source, config.destination, config.to, level=config.level, force=config.force)
     return _written(config.destination)
 
 

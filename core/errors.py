@@ -3,6 +3,11 @@
 import traceback
 from pathlib import Path
 
+from closedrooms.core.names import shown
+
+# A message stays readable when a file names two hundred ids or a value of a thousand digits [characters].
+LONGEST_WHAT, LONGEST_EXPECTED = 300, 2000
+
 
 class ClosedroomsError(Exception):
     """Base of every error that the command line shows as one line with exit status 1."""
@@ -11,20 +16,24 @@ class ClosedroomsError(Exception):
 class InvalidInputError(ClosedroomsError):
     """Something that came in is not what was expected.
 
-    The message reads ``what; expected ...: where``, the path last, on one line.
+    The message reads ``what; expected ...: where``, the path last, on one line. Texts of the file stand in it as a
+    terminal may show them (:func:`closedrooms.core.names.shown`).
     """
 
     def __init__(self, what: str, *, expected: str = "", where: str | Path = "") -> None:
-        message = " ".join(what.split())
+        message = shown(what, longest=LONGEST_WHAT)
         if expected:
-            message += f"; expected {' '.join(expected.split())}"
+            message += f"; expected {shown(expected, longest=LONGEST_EXPECTED)}"
         if where:
-            message += f": {where}"
+            message += f": {shown(where, longest=LONGEST_EXPECTED)}"
         super().__init__(message)
 
 
 class OutputError(ClosedroomsError):
     """The output folder cannot be written, or holds something that is not ours."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__(shown(what, longest=LONGEST_EXPECTED))
 
 
 def reason(error: Exception) -> str:

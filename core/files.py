@@ -1,28 +1,47 @@
-"""Whole files or none: atomic writes, and output folders that appear complete."""
+"""The one writer: whole files or none, folders that appear complete, and nothing of anybody else's touched.
+
+A folder is replaced only when every file in it, at every depth, is one that the same command wrote and that has not
+changed since: its ``run.json`` holds the checksums. Two processes never write one folder: a lock beside it says so.
+"""
 
 import contextlib
+import errno
+import fcntl
+import hashlib
 import json
 import os
+import re
 import shutil
+import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError
+from closedrooms.core.incoming import read_json as read_json  # noqa: PLC0414 (callers know it from here)
+from closedrooms.core.incoming import read_text as read_text  # noqa: PLC0414
+from closedrooms.core.names import short_name
 
 MANIFEST = "run.json"
 PROGRAM = "closedrooms"
+SUMS = "sha256"
+"""Key of the manifest: SHA-256 of every file by its path in the folder; of the manifest itself without its entry."""
+MAX_MANIFEST = 50_000_000
 
 
 def write_bytes(path: Path, data: bytes) -> None:
     """Write ``data`` under a temporary name beside ``path`` and move it into place.
 
+    What a killed process of ours left of this file is removed.
+
     Raises:
         OutputError: The folder is missing, read-only or full.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
+    _check_name(path)
+    with clear_errors(path):
+        _clear_parts(path)
+        temporary = path.with_name(f".{short_name(path.name)}.{os.getpid()}.part")
         try:
             with temporary.open("wb") as file:
                 file.write(data)
@@ -32,95 +51,144 @@ def write_bytes(path: Path, data: bytes) -> None:
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
-    except OSError as error:
-        raise OutputError(f"cannot write ({error.strerror}): {path}") from error
 
 
 def write_json(path: Path, value: Any) -> None:
     """Write ``value`` as readable JSON (UTF-8, sorted as given, one trailing newline), whole or not at all."""
-    write_bytes(path, (json.dumps(value, indent=2, allow_nan=False) + "\n").encode())
+    write_bytes(path, _json_text(value).encode())
 
 
-def read_json(path: Path, *, what: str, max_bytes: int = 200_000_000) -> Any:
-    """Parse an untrusted JSON file.
+def _json_text(value: Any) -> str:
+    return json.dumps(value, indent=2, allow_nan=False) + "\n"
+
+
+def check_new_files(paths: Iterable[Path], *, force: bool = False, sources: Iterable[Path] = ()) -> None:
+    """Fail early when single files could not be written at the end, or are there already.
 
     Args:
-        path: The file.
-        what: What it should be, for the message ("a floor plan").
-        max_bytes: Larger files are refused before they are read.
+        paths: Every file that a command is going to write.
+        force: Files that are there may be replaced (``--force``).
+        sources: Files that the command reads: never replaced.
 
     Raises:
-        InvalidInputError: Missing, unreadable, too large or not JSON.
+        OutputError: One is a folder, no regular file, or there without ``force``; a source; its folder is missing or
+            cannot be written.
     """
-    text = read_text(path, what=what, max_bytes=max_bytes)
+    sources = [source for source in sources if source.exists()]
+    for path in paths:
+        _check_name(path)
+        with clear_errors(path):
+            if path.is_dir():
+                raise OutputError(f"the output is a folder; expected a file: {path}")
+            if os.path.lexists(path):
+                if any(path.exists() and path.samefile(source) for source in sources):
+                    raise OutputError(f"the output is the file that is read; expected another one: {path}")
+                if not (path.is_symlink() or stat.S_ISREG(path.lstat().st_mode)):
+                    raise OutputError(f"the output is no regular file; expected a new one: {path}")
+                if not force:
+                    raise OutputError(f"the output is there already; expected a new file, or --force: {path}")
+            with tempfile.TemporaryFile(dir=path.parent):
+                pass
+
+
+def is_ours(folder: Path, command: object = None) -> bool:
+    """Whether every file in ``folder``, at every depth, was written by ``command`` and has not changed since.
+
+    Args:
+        folder: With a manifest.
+        command: As the manifest names it; ``None`` for parts of a dataset, whose manifests name none.
+    """
+    return _strange(folder, command) == ""
+
+
+def _strange(folder: Path, command: object) -> str:
+    """What in a folder the same command did not write, or was changed since; empty for nothing."""
     try:
-        return json.loads(text, parse_constant=_refuse_constant)
-    except (ValueError, RecursionError) as error:
-        raise InvalidInputError(f"broken JSON ({error})", expected=what, where=path) from error
+        manifest = read_json(folder / MANIFEST, what="a manifest", max_bytes=MAX_MANIFEST)
+        if manifest["program"] != PROGRAM or manifest.get("command") != command:
+            return MANIFEST
+        sums = dict(manifest.get(SUMS) or manifest["checksums"])
+        listed = {MANIFEST, *sums, *manifest["files"]}
+        for path in _walk(folder):
+            name = path.relative_to(folder).as_posix()
+            if name not in listed or not stat.S_ISREG(path.lstat().st_mode):
+                return name
+            # A file without a checksum is a recording of a sample: its bytes differ from run to run.
+            if name in sums and sums[name] != (_own_sum(manifest) if name == MANIFEST else _digest(path)):
+                return name
+            if name == MANIFEST and path.read_bytes() != _json_text(manifest).encode():
+                return name
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, InvalidInputError):
+        return f"no {MANIFEST} of ours"
+    return ""
 
 
-def _refuse_constant(name: str) -> float:
-    raise ValueError(f"{name} is no number of JSON")
+def _walk(folder: Path) -> Iterator[Path]:
+    """Everything in a folder but the folders, at every depth; an empty folder counts as a file of somebody else."""
+    for path in sorted(folder.iterdir()):
+        if path.is_dir() and not path.is_symlink() and any(path.iterdir()):
+            yield from _walk(path)
+        else:
+            yield path
 
 
-def read_text(path: Path, *, what: str, max_bytes: int = 200_000_000) -> str:
-    """Read an untrusted UTF-8 text file of bounded size.
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _own_sum(manifest: dict[str, Any]) -> str:
+    sums = {name: value for name, value in manifest[SUMS].items() if name != MANIFEST}
+    return hashlib.sha256(_json_text({**manifest, SUMS: sums}).encode()).hexdigest()
+
+
+def check_output_folder(folder: Path, command: object = None) -> None:
+    """Fail early when ``folder`` could not be written at the end: something not ours, no right to write, a writer.
 
     Raises:
-        InvalidInputError: Missing, a folder, unreadable, too large or not text.
+        OutputError: It is a file, holds anything that the same command did not write or that was changed since, its
+            parent cannot be written, or another process writes it.
     """
-    try:
-        size = path.stat().st_size
-        if size > max_bytes:
-            raise InvalidInputError(
-                f"a file of {size} bytes", expected=f"{what} of at most {max_bytes} bytes", where=path
-            )
-        return path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InvalidInputError(f"cannot read ({error.strerror})", expected=what, where=path) from error
-    except UnicodeDecodeError as error:
-        raise InvalidInputError("not a text file", expected=what, where=path) from error
-
-
-def is_ours(folder: Path) -> bool:
-    """Whether everything in ``folder`` was written by closedrooms: its manifest lists every entry."""
-    try:
-        manifest = json.loads((folder / MANIFEST).read_text())
-        listed = {MANIFEST, *manifest["files"]}
-        return manifest["program"] == PROGRAM and all(entry.name in listed for entry in folder.iterdir())
-    except (OSError, ValueError, KeyError, TypeError):
-        return False
-
-
-def check_output_folder(folder: Path) -> None:
-    """Fail early when ``folder`` could not be written at the end: something not ours, or no right to write.
-
-    Raises:
-        OutputError: It is a file, holds anything that we did not write, or its parent cannot be written.
-    """
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"the output is a file; expected a folder: {folder}")
-    with _clear_errors(folder):
-        if folder.exists() and any(folder.iterdir()) and not is_ours(folder):
-            raise OutputError(
-                f"the output folder holds files that closedrooms did not write; expected an empty one: {folder}"
-            )
+    _check_name(folder)
+    with clear_errors(folder):
+        folder = _real(folder)
+        _check_replaceable(folder, command)
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder.parent):
             pass
+    with only_writer(folder):
+        pass
+
+
+def _check_replaceable(folder: Path, command: object) -> None:
+    if os.path.lexists(folder) and not folder.is_dir():
+        raise OutputError(f"the output is a file; expected a folder: {folder}")
+    if folder.is_dir() and any(folder.iterdir()):
+        strange = _strange(folder, command)
+        if strange:
+            by = f"closedrooms {command}" if command else "closedrooms"
+            raise OutputError(
+                f"the output folder holds something that {by} did not write, or that was changed since ({strange}); "
+                f"expected an empty or new one: {folder}"
+            )
+
+
+def _real(folder: Path) -> Path:
+    """The folder itself where ``folder`` is a symbolic link to one, which stays as it is."""
+    return folder.resolve() if folder.is_symlink() and folder.exists() else folder
 
 
 @contextlib.contextmanager
 def output_folder(folder: Path, manifest: dict[str, Any]) -> Iterator[Path]:
     """A fresh folder to write into, that takes the place of ``folder`` when the block ends well.
 
-    The manifest ``run.json`` is completed on leaving with ``program`` and ``files``; the caller may still add to
-    the dictionary inside the block. A folder of ours is replaced whole. On any error, Ctrl-C included, ``folder``
-    is left as it was.
+    The manifest ``run.json`` is completed on leaving with ``program``, ``files`` and checksums; the caller may still
+    add to the dictionary inside the block. A folder of the same ``manifest["command"]`` is replaced whole. On any
+    error, Ctrl-C included, ``folder`` is left as it was. What killed processes left half-written beside it is removed.
 
     Args:
         folder: Where the result shall be.
-        manifest: Content of ``run.json``.
+        manifest: Content of ``run.json``; ``command`` names who may replace it.
 
     Yields:
         The temporary folder.
@@ -128,34 +196,134 @@ def output_folder(folder: Path, manifest: dict[str, Any]) -> Iterator[Path]:
     Raises:
         OutputError: See :func:`check_output_folder`; a full disk.
     """
-    check_output_folder(folder)
-    with _clear_errors(folder):
-        staging = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".part", dir=folder.parent))
-    try:
-        with _clear_errors(folder):
-            yield staging
-            manifest["program"] = PROGRAM
-            manifest["files"] = sorted(entry.name for entry in staging.iterdir())
-            write_json(staging / MANIFEST, manifest)
-            staging.chmod(0o755)
-            _swap(staging, folder)
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
+    command = manifest.get("command")
+    check_output_folder(folder, command)
+    folder = _real(folder)
+    with only_writer(folder):
+        with clear_errors(folder):
+            _clear_unfinished(folder)
+            prefix = f".{short_name(folder.name)}."
+            staging = Path(tempfile.mkdtemp(prefix=prefix, suffix=".part", dir=folder.parent))
+        try:
+            with clear_errors(folder):
+                yield staging
+                _finish(staging, manifest)
+                # Hours may have passed: what was put there in the meantime is not ours.
+                _check_replaceable(folder, command)
+                _swap(staging, folder)
+        finally:
+            shutil.rmtree(staging, ignore_errors=True)
+
+
+def _finish(staging: Path, manifest: dict[str, Any]) -> None:
+    names = [path.relative_to(staging).as_posix() for path in _walk(staging)]
+    manifest["program"] = PROGRAM
+    manifest["files"] = names
+    if "checksums" not in manifest:
+        manifest[SUMS] = {name: _digest(staging / name) for name in names}
+        # As it will be read again: tuples are lists then, keys are texts.
+        manifest[SUMS][MANIFEST] = _own_sum(json.loads(_json_text(manifest)))
+    write_json(staging / MANIFEST, manifest)
+    staging.chmod(0o755)
 
 
 def _swap(staging: Path, folder: Path) -> None:
     if folder.exists():
-        old = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".old", dir=folder.parent))
+        prefix = f".{short_name(folder.name)}."
+        old = Path(tempfile.mkdtemp(prefix=prefix, suffix=".old", dir=folder.parent))
         folder.replace(old)
-        staging.replace(folder)
+        try:
+            staging.replace(folder)
+        except BaseException:
+            old.replace(folder)
+            raise
         shutil.rmtree(old, ignore_errors=True)
     else:
         staging.replace(folder)
 
 
 @contextlib.contextmanager
-def _clear_errors(folder: Path) -> Iterator[None]:
+def only_writer(folder: Path) -> Iterator[None]:
+    """Hold the lock of an output folder; the kernel lets go of it when the process ends, however it ends.
+
+    Raises:
+        OutputError: Another process holds it, or the parent cannot be written.
+    """
+    path = folder.with_name(f".{short_name(folder.name)}.lock")
+    with clear_errors(folder):
+        lock = _locked(path, folder)
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+        os.close(lock)
+
+
+def _locked(path: Path, folder: Path) -> int:
+    """A descriptor that holds the lock of the file which now has this name."""
+    while True:
+        lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # The one before may have removed the file between our opening and our locking.
+            if path.exists() and os.fstat(lock).st_ino == path.stat().st_ino:
+                return lock
+        except OSError as error:
+            os.close(lock)
+            if error.errno in {errno.EWOULDBLOCK, errno.EACCES}:
+                raise OutputError(f"another closedrooms writes this folder; expected to be alone: {folder}") from error
+            if error.errno in {errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS}:  # a file system without locks
+                return os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            raise
+        os.close(lock)
+
+
+def _clear_unfinished(folder: Path) -> None:
+    """Remove what killed processes of ours left while they wrote ``folder``; we hold its lock, nobody writes it now."""
+    name = re.escape(short_name(folder.name))
+    unfinished = re.compile(rf"\.{name}\.[A-Za-z0-9_]{{8}}\.(part|old)")
+    for path in list(folder.parent.iterdir()):
+        if unfinished.fullmatch(path.name) and path.lstat().st_uid == os.getuid():
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def _clear_parts(path: Path) -> None:
+    """Remove what processes of ours that are gone left while they wrote the file ``path``."""
+    part = re.compile(rf"\.{re.escape(short_name(path.name))}\.(\d+)\.part")
+    for other in path.parent.glob(".*.part"):
+        match = part.fullmatch(other.name)
+        if match and not _alive(int(match[1])) and other.lstat().st_uid == os.getuid():
+            other.unlink(missing_ok=True)
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+@contextlib.contextmanager
+def clear_errors(where: Path) -> Iterator[None]:
+    """Turn errors of the file system into one line that says what cannot be written.
+
+    Raises:
+        OutputError: The file system refused.
+    """
     try:
         yield
     except OSError as error:
-        raise OutputError(f"cannot write ({error.strerror}): {error.filename or folder}") from error
+        raise OutputError(f"cannot write ({error.strerror or error}): {where}") from error
+
+
+def _check_name(path: Path) -> None:
+    try:
+        os.fsencode(path)
+    except UnicodeError as error:
+        raise OutputError(f"cannot write (not a name that a file system takes): {path}") from error
+    if "\0" in str(path):
+        raise OutputError(f"cannot write (not a name that a file system takes): {path}")

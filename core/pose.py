@@ -64,3 +64,6 @@ class Pose2:
     def as_tuple(self) -> tuple[float, float, float]:
         """``(x, y, theta)``."""
         return (self.x, self.y, self.theta)
+
+
+IDENTITY = Pose2()

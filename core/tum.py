@@ -8,7 +8,12 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import read_text, write_bytes
+from closedrooms.core.files import write_bytes
+from closedrooms.core.incoming import read_text
+from closedrooms.core.numbers import FARTHEST
+
+# Stamps may be nanoseconds since 1970; a quaternion has the length 1 (others write it a little off).
+LIMITS = (1e20, FARTHEST, FARTHEST, FARTHEST, 2.0, 2.0, 2.0, 2.0)
 
 
 def write_trajectory(path: Path, stamps: Sequence[float] | FloatArray, poses: FloatArray) -> None:
@@ -24,7 +29,7 @@ def read_trajectory(path: Path) -> tuple[FloatArray, FloatArray]:
     """Stamps [s], shape (n,), and poses ``(x, y, theta)``, shape (n, 3).
 
     Raises:
-        InvalidInputError: A line that does not hold eight finite numbers (named by its number).
+        InvalidInputError: A line that does not hold eight finite numbers within bounds (named by its number).
     """
     rows = []
     for number, line in enumerate(read_text(path, what="a TUM trajectory").splitlines(), start=1):
@@ -34,7 +39,7 @@ def read_trajectory(path: Path) -> tuple[FloatArray, FloatArray]:
             values = [float(v) for v in line.split()]
         except ValueError:
             values = []
-        if len(values) != 8 or not all(map(math.isfinite, values)):
+        if len(values) != 8 or not all(abs(v) <= limit for v, limit in zip(values, LIMITS, strict=True)):
             raise InvalidInputError(f"line {number}", expected="stamp x y z qx qy qz qw", where=path)
         t, x, y, _, _, _, qz, qw = values
         rows.append((t, x, y, 2.0 * math.atan2(qz, qw)))

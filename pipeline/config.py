@@ -107,6 +107,9 @@ class PredictConfig:
     record: bool = False
     """Write the recording ``run.rrd`` for the rerun viewer."""
 
+    allow_outside: bool = False
+    """Open the picture that the map's ``image:`` names also outside the folder of the YAML."""
+
     predictor: Annotated[MethodConfig | None, tyro.conf.Suppress] = None
     """Settings of the method, of its own class; its defaults when not given."""
 
@@ -139,6 +142,9 @@ class CoverConfig:
     start: tuple[float, float] | None = None
     """Where the robot is, x and y in the map frame [m]: of several parts that are not connected, its own is covered;
     without it, the largest (``--coverage.parts all`` covers every one)."""
+
+    allow_outside: bool = False
+    """Open the picture that the map's ``image:`` names also outside the folder of the YAML."""
 
     coverage: CoverageConfig = field(default_factory=CoverageConfig)
     """Graph and tour."""
@@ -185,6 +191,9 @@ class ShowWorld:
     level: str | None = None
     """Which level of a file with several."""
 
+    force: bool = False
+    """Replace a picture that is there already."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class GenerateWorld:
@@ -202,6 +211,9 @@ class GenerateWorld:
     furniture: bool = False
     """Put furniture into the rooms."""
 
+    force: bool = False
+    """Replace a file that is there already."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ConvertWorld:
@@ -218,3 +230,6 @@ class ConvertWorld:
 
     level: str | None = None
     """Which level of a file with several."""
+
+    force: bool = False
+    """Replace files that are there already."""

@@ -2,12 +2,13 @@
 
 from typing import Any
 
-from closedrooms.core.door import ClosedDoor
+import numpy as np
+
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
 from closedrooms.core.geojson import read_doors, write_doors, write_features
 from closedrooms.core.report import Report
-from closedrooms.core.rosmap import read_map, write_map
+from closedrooms.core.rosmap import RosMap, read_ros_map, write_map
 from closedrooms.coverage.tour import CoverageTour
 from closedrooms.coverage.tour_features import tour_features
 from closedrooms.coverage.tour_planner import plan_coverage
@@ -29,11 +30,14 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Repor
         OutputError: The folder cannot be written, or holds something that is not ours.
     """
     progress, watch = progress or Silent(), Stopwatch()
-    check_output_folder(config.out)
+    check_output_folder(config.out, "cover")
     with watch.stage("read"):
         progress.stage("read")
-        grid = read_map(config.map)
-        doors: list[ClosedDoor] = read_doors(config.doors) if config.doors else []
+        read = read_ros_map(config.map, allow_outside=config.allow_outside)
+        remarks = list(read.remarks)
+        given = read_doors(config.doors, remarks=remarks) if config.doors else []
+        grid, doors = read.grid, read.doors_on_grid(given)
+        start = None if config.start is None else _on_grid(read, config.start)
     manifest: dict[str, Any] = {
         "command": "cover",
         "configuration": resolved(config, leave_out=("map", "doors", "out")),
@@ -43,17 +47,18 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Repor
     with watch.stage("cover"):
         progress.stage("cover")
         try:
-            tour = plan_coverage(grid, doors, config.coverage, start=config.start)
+            tour = plan_coverage(grid, doors, config.coverage, start=start)
         except InvalidInputError as error:
             raise InvalidInputError(str(error), where=config.map) from error
     missed = {door.id: "no free space to reach it from" for door in doors if door.id not in tour.graph.door_vertices}
     missed |= dict.fromkeys(tour.unreached_doors, "no free space to reach it from")
     with output_folder(config.out, manifest) as folder:
         progress.stage("write")
-        write_map(folder / "map", grid)
+        write_map(folder / "map", grid, map_T_grid=read.map_T_grid)
         if config.doors:
-            write_doors(folder / "doors.geojson", doors)
-        write_features(folder / "tour.geojson", tour_features(tour, "closed"))
+            write_doors(folder / "doors.geojson", given)
+        features = [(read.on_map(geometry), properties) for geometry, properties in tour_features(tour, "closed")]
+        write_features(folder / "tour.geojson", features)
         from closedrooms.visualization.summary import draw_cover
 
         draw_cover(folder / "summary.png", grid, doors, tour)
@@ -67,12 +72,14 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Repor
             }
         }
         manifest["notes"] = list(tour.notes)
+        manifest["remarks"] = [remark.as_json() for remark in remarks]
         manifest["durations"] = watch.seconds()
     return Report(
         folder=config.out,
         title=f"{config.map.name}: coverage tour",
         rows=_rows(tour, missed, manifest["durations"]["cover"]),
         failures=missed,
+        remarks=remarks,
         figures=manifest["metrics"],
     )
 
@@ -89,3 +96,9 @@ def _rows(tour: CoverageTour, missed: dict[str, str], seconds: float) -> list[tu
         *((f"not visited: {door}", reason) for door, reason in missed.items()),
         ("time", f"{seconds:.2f} s"),
     ]
+
+
+def _on_grid(read: RosMap, point: tuple[float, float]) -> tuple[float, float]:
+    """A point of the map frame in the frame of the grid [m]."""
+    x, y = read.map_T_grid.inverse().transform(np.array(point)).tolist() if read.turned else point
+    return x, y

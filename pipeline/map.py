@@ -39,7 +39,7 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> Report:
         OutputError: The folder cannot be written, or holds something that is not ours.
     """
     progress, watch = progress or Silent(), Stopwatch()
-    check_output_folder(config.out)
+    check_output_folder(config.out, "map")
     with watch.stage("read"):
         progress.stage("read")
         run = read_run(config.log, scan_topic=config.scan_topic, odometry_topic=config.odometry_topic)

@@ -11,7 +11,7 @@ from closedrooms.core.geojson import read_doors, write_doors, write_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.report import Report
 from closedrooms.core.room import Room
-from closedrooms.core.rosmap import read_map, write_map
+from closedrooms.core.rosmap import read_ros_map, write_map
 from closedrooms.pipeline.config import PredictConfig
 from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
@@ -39,10 +39,13 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> R
         OutputError: The folder cannot be written, or holds something that is not ours.
     """
     progress, watch = progress or Silent(), Stopwatch()
-    check_output_folder(config.out)
+    check_output_folder(config.out, "predict")
     with watch.stage("read"):
         progress.stage("read")
-        grid, doors = read_map(config.map), read_doors(config.doors)
+        read = read_ros_map(config.map, allow_outside=config.allow_outside)
+        remarks = list(read.remarks)
+        given = read_doors(config.doors, remarks=remarks)
+        grid, doors = read.grid, read.doors_on_grid(given)
     manifest: dict[str, Any] = {
         "command": "predict",
         "configuration": resolved(config, leave_out=("map", "doors", "out")),
@@ -62,21 +65,24 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> R
         with watch.stage("write"):
             progress.stage("write")
             observed = grid.on(prediction.grid.frame)
-            write_map(folder / "map", observed)
-            write_map(folder / "predicted", prediction.grid)
-            write_doors(folder / "doors.geojson", doors)
-            write_rooms(folder / "rooms.geojson", prediction.rooms)
+            rooms = tuple(read.rooms_on_map(prediction.rooms))
+            write_map(folder / "map", observed, map_T_grid=read.map_T_grid)
+            write_map(folder / "predicted", prediction.grid, map_T_grid=read.map_T_grid)
+            write_doors(folder / "doors.geojson", given)
+            write_rooms(folder / "rooms.geojson", rooms)
             from closedrooms.visualization.summary import draw_summary
 
             draw_summary(folder / "summary.png", observed, prediction, doors)
         manifest["doors"] = {"given": [door.id for door in doors], "failures": prediction.failures}
+        manifest["remarks"] = [remark.as_json() for remark in remarks]
         manifest["durations"] = watch.seconds()
     return Report(
         folder=config.out,
         title=f"{config.map.name}: {len(prediction.rooms)} of {len(doors)} doors predicted",
         rows=_rows(prediction, manifest["durations"]["predict"]),
         failures=prediction.failures,
-        figures={"rooms": [_figures(room) for room in prediction.rooms]},
+        remarks=remarks,
+        figures={"rooms": [_figures(room) for room in rooms]},
     )
 
 

@@ -6,8 +6,12 @@ from collections.abc import Iterable, Sequence
 from types import TracebackType
 from typing import Protocol, Self
 
+from closedrooms.core.names import shown
+
 # Off a terminal, how often a long stage says how far it is [s].
 EVERY = 30.0
+# A table may name a thousand doors [characters].
+LONGEST_CELL = 10_000
 
 
 class Progress(Protocol):
@@ -86,7 +90,7 @@ class Terminal:
             SpinnerColumn(),
             TextColumn("{task.description:<12}"),
             BarColumn(bar_width=24),
-            TextColumn("{task.fields[note]}"),
+            TextColumn("{task.fields[note]}", markup=False),
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeRemainingColumn(),
@@ -119,10 +123,10 @@ class Terminal:
     def advance(self, done: float, note: str = "") -> None:
         """Move the bar of the current stage; elsewhere say now and then how far it is."""
         if self._live and self._task is not None:
-            self._progress.update(self._task, completed=done, note=note)  # type: ignore[arg-type]
+            self._progress.update(self._task, completed=done, note=shown(note))  # type: ignore[arg-type]
             return
         now = time.monotonic()
-        line = self._pace.line(done, note, now)
+        line = self._pace.line(done, shown(note), now)
         if now - self._pace.said >= self._every:
             self._pace.said = now
             self._tell(line)
@@ -134,15 +138,17 @@ class Terminal:
     def table(self, title: str, rows: Iterable[Sequence[str]]) -> None:
         """Print a table; the first row is its head."""
         from rich.table import Table
+        from rich.text import Text
 
         head, *body = [list(row) for row in rows]
-        table = Table(title=title, title_justify="left", header_style="bold")
+        table = Table(title=Text(shown(title)), title_justify="left", header_style="bold")
         for number, name in enumerate(head):
             table.add_column(name, justify="left" if number == 0 else "right", overflow="fold")
         for row in body:
-            table.add_row(*row)
+            # As text: rich reads brackets in a plain string as its markup.
+            table.add_row(*(Text(shown(cell, longest=LONGEST_CELL)) for cell in row))
         self._out.print(table)
 
     def say(self, line: str) -> None:
         """Print one plain line."""
-        self._out.print(line, markup=False, highlight=False, soft_wrap=True)
+        self._out.print(shown(line, longest=LONGEST_CELL), markup=False, highlight=False, soft_wrap=True)

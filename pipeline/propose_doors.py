@@ -1,16 +1,16 @@
 """``closedrooms doors``: proposes closed doors on anybody's map, from the map alone."""
 
-import json
-import tempfile
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.errors import ClosedroomsError, OutputError
-from closedrooms.core.files import read_json
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files import check_new_files
 from closedrooms.core.geojson import Feature, write_features
 from closedrooms.core.report import Report
-from closedrooms.core.rosmap import read_map
+from closedrooms.core.rosmap import RosMap, read_ros_map
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.propose_doors_config import DoorsConfig
 from closedrooms.pipeline.stopwatch import Stopwatch
@@ -25,32 +25,36 @@ def doors_map(config: DoorsConfig, *, progress: Progress | None = None) -> Repor
         progress: Told what is done.
 
     Raises:
-        InvalidInputError: The map cannot be read.
-        OutputError: The file cannot be written, or holds something else than proposals.
+        InvalidInputError: The map cannot be read, or is smaller than 2 x 2 cells.
+        OutputError: A file cannot be written, is the map, or is there already and ``force`` is not set.
     """
     progress, watch = progress or Silent(), Stopwatch()
-    check_replaceable(config.out)
+    outputs = [config.out] if config.picture is None else [config.out, config.picture]
+    check_new_files(outputs, force=config.force, sources=[config.map])
     with watch.stage("read"):
         progress.stage("read")
-        grid = read_map(config.map)
+        read = read_ros_map(config.map, allow_outside=config.allow_outside)
+    if min(read.grid.frame.shape) < 2:
+        rows, cols = read.grid.frame.shape
+        raise InvalidInputError(f"a map of {cols} x {rows} cells", expected="at least 2 x 2", where=config.map)
     with watch.stage("propose"):
         progress.stage("propose")
-        found = propose_doors(grid, config.proposals)
-    proposals = {f"d{number:02d}": proposal for number, proposal in enumerate(found)}
+        found = propose_doors(read.grid, config.proposals)
+    names = [f"d{number:02d}" for number in range(len(found))]
+    proposals = {name: _on_map(read, proposal) for name, proposal in zip(names, found, strict=True)}
     progress.stage("write")
     if config.picture is not None:
-        import numpy as np
-
         from closedrooms.visualization.summary import draw_map
 
-        doors = [ClosedDoor(name, door.midpoint, door.segment, door.width) for name, door in proposals.items()]
-        draw_map(config.picture, grid, doors, np.zeros((0, 3)))
-    write_features(config.out, [_feature(name, proposal) for name, proposal in proposals.items()])
+        doors = [ClosedDoor(n, p.midpoint, p.segment, p.width) for n, p in zip(names, found, strict=True)]
+        draw_map(config.picture, read.grid, doors, np.zeros((0, 3)))
+    write_features(config.out, [_feature(name, door) for name, door in proposals.items()])
     plural = "" if len(found) == 1 else "s"
     return Report(
         folder=config.out,
         title=f"{config.map.name}: {len(found)} closed door{plural} proposed",
         rows=_rows(proposals, watch.seconds()["propose"]),
+        remarks=read.remarks,
         figures={"doors": {name: _properties(name, door) for name, door in proposals.items()}},
     )
 
@@ -64,6 +68,14 @@ def _rows(proposals: dict[str, DoorProposal], seconds: float) -> list[tuple[str,
     return [*rows, ("time", f"{seconds:.2f} s", "", "", "")]
 
 
+def _on_map(read: RosMap, door: DoorProposal) -> DoorProposal:
+    """A proposal of the grid's frame in the map frame."""
+    if not read.turned:
+        return door
+    (x0, y0), (x1, y1) = read.map_T_grid.transform(np.array(door.segment)).tolist()
+    return replace(door, segment=((x0, y0), (x1, y1)))
+
+
 def _feature(name: str, door: DoorProposal) -> Feature:
     from shapely.geometry import LineString
 
@@ -74,36 +86,3 @@ def _properties(name: str, door: DoorProposal) -> dict[str, Any]:
     """What the file says of a proposal beside its segment."""
     properties = {"id": name, "state": "closed", "width": round(door.width, 4), "score": round(door.score, 4)}
     return {**properties, "recess": round(door.recess, 4)}
-
-
-def check_replaceable(path: Path) -> None:
-    """Fail early when the file could not be written at the end, or holds anything but proposals.
-
-    Proposals are told by their ``score``: a list of doors that somebody made, or that a run saw, has none and is kept.
-
-    Raises:
-        OutputError: A folder, a file that is not ours, or a folder that is missing or cannot be written.
-    """
-    try:
-        if path.is_dir():
-            raise OutputError(f"the output is a folder; expected a file: {path}")
-        if path.exists() and not _proposals(path):
-            raise OutputError(
-                f"the output holds something that closedrooms doors did not write; expected a new file: {path}"
-            )
-        with tempfile.TemporaryFile(dir=path.parent):
-            pass
-    except OSError as error:
-        raise OutputError(f"cannot write ({error.strerror}): {path}") from error
-
-
-def _proposals(path: Path) -> bool:
-    """Whether a file is a FeatureCollection of doors that all have a score."""
-    try:
-        data = read_json(path, what="doors")
-        return data["type"] == "FeatureCollection" and all(
-            feature["geometry"]["type"] == "LineString" and {"id", "state", "score"} <= feature["properties"].keys()
-            for feature in data["features"]
-        )
-    except (ClosedroomsError, json.JSONDecodeError, KeyError, TypeError, AttributeError):
-        return False

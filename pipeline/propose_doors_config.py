@@ -16,11 +16,16 @@ class DoorsConfig:
     """The map: a ROS map_server YAML."""
 
     out: Path
-    """File to write: GeoJSON that ``predict --doors`` reads. A file that is there is only replaced when all it holds
-    are proposals of an earlier call."""
+    """File to write: GeoJSON that ``predict --doors`` reads."""
 
     picture: Path | None = None
     """Also write a picture of the map with the proposals (PNG)."""
+
+    force: bool = False
+    """Replace files that is there already."""
+
+    allow_outside: bool = False
+    """Open the picture that the map's ``image:`` names also outside the folder of the YAML."""
 
     proposals: ProposalConfig = field(default_factory=ProposalConfig)
     """What a closed door looks like, and from which score it is proposed."""

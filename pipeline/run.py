@@ -10,6 +10,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
 from closedrooms.core.geojson import write_doors, write_features, write_rooms
 from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.names import file_name
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
 from closedrooms.core.report import Report
@@ -89,8 +90,8 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
         progress.stage("world")
         plan = load_world(config.world, level=config.level)
         closed = choose_closed(plan, config)
-        folder = config.out or Path("runs") / f"{plan.name}-{config.seed}"
-        check_output_folder(folder)
+        folder = config.out or Path("runs") / f"{file_name(plan.name)}-{config.seed}"
+        check_output_folder(folder, "run")
         check_size(plan, config.mapper.resolution, config.navigation)
     manifest: dict[str, Any] = {
         "command": "run",

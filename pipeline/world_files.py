@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from closedrooms.core.errors import InvalidInputError, OutputError
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files import check_new_files
 from closedrooms.worlds.library import DEFAULT_WORLD, PLANS, bundled_names, load_world, read_world
 from closedrooms.worlds.plan import FloorPlan
 
@@ -32,59 +33,72 @@ def list_worlds() -> list[str]:
     return lines
 
 
-def show_world(world: str, out_png: str | Path, *, level: str | None = None) -> FloorPlan:
+def show_world(world: str, out_png: str | Path, *, level: str | None = None, force: bool = False) -> FloorPlan:
     """Write a picture of a world; returns its plan.
 
     Raises:
         InvalidInputError: See :func:`closedrooms.worlds.library.load_world`.
-        OutputError: The picture cannot be written.
+        OutputError: The picture cannot be written, or is there already and ``force`` is not set.
     """
     from closedrooms.visualization.floor_plan import draw_plan
 
+    check_new_files([Path(out_png)], force=force, sources=[Path(world)])
     plan = load_world(world, level=level)
-    draw_plan(plan, _file(out_png))
+    try:
+        draw_plan(plan, Path(out_png))
+    except InvalidInputError as error:
+        raise InvalidInputError(str(error), where=world) from error
     return plan
 
 
-def generate_world(kind: str, seed: int, out_json: str | Path, *, furniture: bool = False) -> FloorPlan:
+def generate_world(
+    kind: str, seed: int, out_json: str | Path, *, furniture: bool = False, force: bool = False
+) -> FloorPlan:
     """Write a generated world as JSON; returns its plan.
 
     Raises:
         InvalidInputError: An unknown kind, a negative seed.
-        OutputError: The file cannot be written.
+        OutputError: The file cannot be written, or is there already and ``force`` is not set.
     """
     from closedrooms.worlds.formats.native import write_plan
     from closedrooms.worlds.generation.generator import generate
 
+    check_new_files([Path(out_json)], force=force)
     plan = generate(kind, seed, furniture=furniture)
-    write_plan(_file(out_json), plan)
+    write_plan(Path(out_json), plan)
     return plan
 
 
-def convert_world(src: str, dst: str | Path, to: str, *, level: str | None = None) -> FloorPlan:
+def convert_world(src: str, dst: str | Path, to: str, *, level: str | None = None, force: bool = False) -> FloorPlan:
     """Write a world of any known format in the format ``to``; returns its plan.
 
     Raises:
         InvalidInputError: See :func:`closedrooms.worlds.library.load_world`; an unknown format.
-        OutputError: The file cannot be written.
+        OutputError: A file cannot be written, is the source, or is there already and ``force`` is not set.
     """
     formats = exporters()
     if to not in formats:
         raise InvalidInputError(f"unknown format {to!r}", expected=f"one of {', '.join(formats)}")
+    check_new_files([Path(dst), *beside(Path(dst), to)], force=force, sources=[Path(src)])
     plan = read_world(src, level=level)
-    formats[to](_file(dst), plan)
+    formats[to](Path(dst), plan)
     return plan
 
 
-def _file(path: str | Path) -> Path:
-    """A path that may become a file.
+def beside(path: Path, to: str) -> list[Path]:
+    """The files that a format of several files writes; :data:`exporters` are given the first one's name."""
+    match to:
+        case "rosmap":
+            stem = map_stem(path)
+            return [stem.with_name(stem.name + ending) for ending in (".yaml", ".png", ".doors.geojson")]
+        case "stage":
+            return [path.with_suffix(ending) for ending in (".world", ".png")]
+    return []
 
-    Raises:
-        OutputError: It is a folder.
-    """
-    if Path(path).is_dir():
-        raise OutputError(f"the output is a folder; expected a file: {path}")
-    return Path(path)
+
+def map_stem(path: Path) -> Path:
+    """The name that the files of a ROS map share."""
+    return path.with_suffix("") if path.suffix in {".yaml", ".yml", ".png", ".pgm"} else path
 
 
 def exporters() -> dict[str, Callable[[Path, FloorPlan], None]]:
@@ -115,7 +129,7 @@ def write_ros_map(path: Path, plan: FloorPlan) -> None:
     col, row = math.floor(x_min / MAP_RESOLUTION) - 10, math.floor(y_min / MAP_RESOLUTION) - 10
     cols, rows = math.ceil(x_max / MAP_RESOLUTION) + 10 - col, math.ceil(y_max / MAP_RESOLUTION) + 10 - row
     frame = GridFrame(MAP_RESOLUTION, round(col * MAP_RESOLUTION, 9), round(row * MAP_RESOLUTION, 9), rows, cols)
-    stem = path.with_suffix("") if path.suffix in {".yaml", ".yml", ".png", ".pgm"} else path
+    stem = map_stem(path)
     write_map(stem, rasterise(plan, frame, Pose2()))
     doors = [ClosedDoor(door.id, door.midpoint, door.segment, door.width) for door in plan.doors]
     write_doors(stem.with_name(f"{stem.name}.doors.geojson"), doors)

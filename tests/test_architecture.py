@@ -122,3 +122,46 @@ def test_every_folder_of_code_is_in_the_wheel() -> None:
     for folder in MAY_IMPORT:
         for path in (ROOT / folder).rglob("*.py"):
             assert "closedrooms." + ".".join(path.relative_to(ROOT).parent.parts) in packages, path
+
+
+# What opens a file by itself. `core` has the one door for incoming files and the one writer.
+OPENERS = {
+    "open", "io.open", "os.open", "np.load", "np.loadtxt", "np.genfromtxt", "np.fromfile", "numpy.load", "Image.open",
+    "cv2.imread", "yaml.load", "yaml.safe_load", "json.load", "tomllib.load", "pickle.load", "gzip.open",
+    "zipfile.ZipFile", "tarfile.open", "ElementTree.parse", "ET.parse", "pq.read_table", "csv.reader",
+}  # fmt: skip
+OPENING_METHODS = {"read_text", "read_bytes", "open"}
+# Not incoming files: the null device, the lock of a dataset.
+ALLOWED = {
+    "cli/commands.py": {"os.open"},
+    "sim/physics_world.py": {"os.open"},
+    "experiments/dataset/layout.py": {"(folder / LOCK).open"},
+}
+
+
+def openings(source: str) -> set[str]:
+    """Calls that open or parse a file, as they stand in a source text."""
+    calls = (node.func for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call))
+    found = set()
+    for call in calls:
+        name = ast.unparse(call)
+        if name in OPENERS or (isinstance(call, ast.Attribute) and call.attr in OPENING_METHODS):
+            found.add(name)
+    return found
+
+
+def test_the_search_for_openings_finds_them() -> None:
+    assert openings("p.read_text(); Path('a').open(); json.load(f); read_json(p); f.read(); (a / b).read_bytes()") == {
+        "p.read_text", "Path('a').open", "json.load", "(a / b).read_bytes",
+    }  # fmt: skip
+
+
+def test_nothing_outside_core_opens_a_file_by_itself() -> None:
+    strange = {}
+    for folder in set(MAY_IMPORT) - {"core"}:
+        for path in (ROOT / folder).rglob("*.py"):
+            name = path.relative_to(ROOT).as_posix()
+            found = openings(path.read_text()) - ALLOWED.get(name, set())
+            if found:
+                strange[name] = sorted(found)
+    assert not strange, f"core.incoming opens files: {strange}"

@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.grid import GridFrame, OccupancyGrid
+from closedrooms.core.names import shown
 from closedrooms.visualization import colours
 from closedrooms.visualization.colours import Colour
 
@@ -111,7 +112,7 @@ class Canvas:
     def text(self, at: Sequence[float], text: str, *, size: int = 15, colour: Colour = colours.INK) -> None:
         """Write centred at a point; drawn above everything else."""
         u, v = (self._fixed(np.array([at], dtype=np.float64))[0] / 2**SHIFT).tolist()
-        self._texts.append((u, v, text, size, colour))
+        self._texts.append((u, v, "\n".join(map(shown, text.split("\n"))), size, colour))
 
     def finished(self) -> Pixels:
         """The panel with its texts."""

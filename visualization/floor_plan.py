@@ -10,6 +10,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.polygon import orient
 
 from closedrooms.core.files import write_bytes
+from closedrooms.core.names import plot_text
 from closedrooms.worlds.geometry import door_leaf, wall_area
 from closedrooms.worlds.plan import FloorPlan, PlanDoor
 from closedrooms.worlds.start_pose import start_pose
@@ -59,7 +60,8 @@ def draw_plan(plan: FloorPlan, path_png: str | Path, *, closed: Collection[str] 
     _write_labels(axes, plan)
     pose = start_pose(plan)
     axes.plot(pose.x, pose.y, marker=(3, 0, pose.theta * 57.29578 - 90.0), color=START, markersize=9)
-    figure.text(0.01, 0.965, f"{plan.name}   {x_max - x_min:.0f} x {y_max - y_min:.0f} m   {len(plan.rooms)} rooms, "
+    name = plot_text(plan.name)
+    figure.text(0.01, 0.965, f"{name}   {x_max - x_min:.0f} x {y_max - y_min:.0f} m   {len(plan.rooms)} rooms, "
                 f"{len(plan.doors)} doors", fontsize=10)  # fmt: skip
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})
@@ -85,7 +87,8 @@ def _fill(axes: Any, area: Polygon | MultiPolygon, colour: str, *, edgecolor: st
 def _draw_door(axes: Any, plan: FloorPlan, door: PlanDoor, *, closed: bool) -> None:
     if closed:
         _fill(axes, door_leaf(plan, door).buffer(0.06), CLOSED)
-        axes.annotate(door.id, door.midpoint, xytext=(4, 4), textcoords="offset points", fontsize=6, color=CLOSED)
+        name = plot_text(door.id)
+        axes.annotate(name, door.midpoint, xytext=(4, 4), textcoords="offset points", fontsize=6, color=CLOSED)
     elif door.kind == "hinged":
         _draw_swing(axes, plan, door)
     else:
@@ -118,5 +121,5 @@ def _write_labels(axes: Any, plan: FloorPlan) -> None:
     for room in plan.rooms:
         if room.polygon.area > 4.0:
             point = room.polygon.representative_point()
-            axes.text(point.x, point.y, f"{room.id}\n{room.label}", fontsize=4.5, ha="center", va="center",
-                      color="#555555")  # fmt: skip
+            label = f"{plot_text(room.id)}\n{plot_text(room.label)}"
+            axes.text(point.x, point.y, label, fontsize=4.5, ha="center", va="center", color="#555555")

@@ -13,6 +13,7 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.files import write_bytes
 from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.names import shown
 from closedrooms.core.room import Room
 from closedrooms.visualization import colours
 
@@ -227,7 +228,7 @@ def _write(path: Path, panels: Sequence[Panel]) -> None:
     draw = ImageDraw.Draw(image)
     for number, (title, pixels) in enumerate(panels):
         x, y = GAP + number % cols * step_x, GAP + number // cols * step_y
-        draw.text((x + 2, y + TITLE / 2), title, fill=colours.INK, font=font(22), anchor="lm")
+        draw.text((x + 2, y + TITLE / 2), shown(title), fill=colours.INK, font=font(22), anchor="lm")
         image.paste(Image.fromarray(pixels), (x, y + TITLE))
     data = io.BytesIO()
     image.save(data, format="PNG", compress_level=6)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.incoming import is_there, read_head, reading
 from closedrooms.worlds.door_hinges import without_entrances
 from closedrooms.worlds.plan import FloorPlan
 
@@ -66,13 +67,14 @@ def read_world(name_or_path: str, *, level: str | None = None) -> FloorPlan:
         _refuse_level(level, name_or_path)
         return read_plan(PLANS / f"{name_or_path}.json")
     path = Path(name_or_path)
-    if not path.exists():
+    if not is_there(path):
         names = ", ".join(bundled_names())
         raise InvalidInputError(f"unknown world {name_or_path!r}", expected=f"a floor plan file or one of {names}")
     importer = importer_of(path)
     if not importer.levels:
         _refuse_level(level, path)
-    return importer.read(path, level)
+    with reading(path, importer.what):
+        return importer.read(path, level)
 
 
 def _refuse_level(level: str | None, where: str | Path) -> None:
@@ -87,11 +89,7 @@ def importer_of(path: Path) -> Importer:
         InvalidInputError: It cannot be read, or no importer knows it.
     """
     formats = importers()
-    try:
-        with path.open("rb") as file:
-            head = file.read(HEAD_BYTES).decode("utf-8-sig", errors="replace")
-    except OSError as error:
-        raise InvalidInputError(f"cannot read ({error.strerror})", expected="a floor plan", where=path) from error
+    head = read_head(path, what="a floor plan", size=HEAD_BYTES).decode("utf-8-sig", errors="replace")
     for importer in formats:
         if importer.recognises(path, head):
             return importer
@@ -156,7 +154,7 @@ def _has_keys(*keys: str) -> Callable[[Path, str], bool]:
     def recognises(path: Path, head: str) -> bool:
         text = head
         if len(head) >= HEAD_BYTES // 2 and path.suffix.lower() in {".yaml", ".yml"}:
-            text = path.read_bytes()[:YAML_BYTES].decode("utf-8-sig", errors="replace")
+            text = read_head(path, what="a floor plan", size=YAML_BYTES).decode("utf-8-sig", errors="replace")
         return all(pattern.search(text) for pattern in patterns)
 
     return recognises

@@ -44,7 +44,7 @@ def start_pose(plan: FloorPlan) -> Pose2:
     largest connected part; the heading is along its longer side.
 
     Raises:
-        InvalidInputError: The plan has no room.
+        InvalidInputError: The plan has no room, or furniture fills the one to start in.
     """
     if plan.start is not None:
         return Pose2(*plan.start)
@@ -52,6 +52,8 @@ def start_pose(plan: FloorPlan) -> Pose2:
     interior = room_interior(plan, room.id)
     blocked = [thing.polygon for thing in plan.furniture if thing.polygon.intersects(interior)]
     free = shapely.difference(interior, shapely.union_all(blocked)) if blocked else interior
+    if free.area < CLEARANCE**2:
+        raise InvalidInputError(f"no free floor in room {room.id}", expected="a place to start from", where=plan.name)
     largest = _widest_part(free)
     circle = shapely.maximum_inscribed_circle(largest, tolerance=0.05)
     centre = shapely.get_coordinates(circle)[0]

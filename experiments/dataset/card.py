@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from closedrooms.core.names import markdown_text
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.variants import SPLITS, Variant, World
 from closedrooms.worlds.library import bundled_names
@@ -115,10 +116,11 @@ def _body(
 
 def _split_row(split: str, worlds: Sequence[World], made: Sequence[Variant]) -> str:
     names = [world.name for world in worlds if world.split == split]
-    return f"| {split} | {', '.join(names) or 'none'} | {sum(v.world.split == split for v in made)} |"
+    return f"| {split} | {markdown_text(', '.join(names)) or 'none'} | {sum(v.world.split == split for v in made)} |"
 
 
 def _failures(failed: Mapping[str, str]) -> list[str]:
     if not failed:
         return []
-    return ["", "## Missing samples", "", *(f"- `{name}`: {reason}" for name, reason in sorted(failed.items()))]
+    lines = [f"- {markdown_text(name)}: {markdown_text(reason)}" for name, reason in sorted(failed.items())]
+    return ["", "## Missing samples", "", *lines]

@@ -4,7 +4,8 @@ import hashlib
 from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import MANIFEST, read_json
+from closedrooms.core.files import MANIFEST
+from closedrooms.core.incoming import opened, read_json
 
 # Recordings of equal runs differ in their bytes (`rerun rrd compare` finds them equal).
 NOT_REPEATABLE = {"run.rrd"}
@@ -17,8 +18,12 @@ def checksums(folder: Path) -> dict[str, str]:
 
 
 def digest(path: Path) -> str:
-    """Hexadecimal SHA-256 of a file."""
-    with path.open("rb") as file:
+    """Hexadecimal SHA-256 of a file.
+
+    Raises:
+        InvalidInputError: It cannot be read.
+    """
+    with opened(path, "a file of a dataset") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

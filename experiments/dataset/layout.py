@@ -1,7 +1,6 @@
 """What stands at the root of a dataset, and the table in front of each split."""
 
 import contextlib
-import hashlib
 import io
 import json
 import re
@@ -25,7 +24,7 @@ METADATA = "metadata.parquet"
 LOCK = ".lock"
 OURS = {DATASET_MANIFEST, CARD, SUMS, SURVEYS, LOCK, *SPLITS}
 # Names of what is being written: folders by tempfile, files by process number.
-UNFINISHED = re.compile(r"\..+\.([A-Za-z0-9_]{8}\.(part|old)|\d+\.part)")
+UNFINISHED = re.compile(r"\..+\.([A-Za-z0-9_]{8}\.(part|old)|\d+\.part|lock)")
 
 
 def claim(config: DatasetConfig, worlds: Sequence[World]) -> None:
@@ -200,4 +199,4 @@ def write_sums(folder: Path, abouts: Mapping[str, Mapping[str, Any]]) -> None:
 
 def fingerprint(folder: Path) -> str:
     """SHA-256 of ``SHA256SUMS``: one line that says whether two datasets are equal."""
-    return hashlib.sha256((folder / SUMS).read_bytes()).hexdigest()
+    return digest(folder / SUMS)

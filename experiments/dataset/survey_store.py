@@ -4,8 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from closedrooms.core.archives import read_arrays
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import MANIFEST, output_folder, read_json
 from closedrooms.core.tum import read_trajectory, write_trajectory
@@ -53,8 +52,9 @@ def read_survey(folder: Path, plan: FloorPlan, config: DatasetConfig, seed: int)
         InvalidInputError: A file is missing or broken.
     """
     recorded = read_scans(folder / "scans.npz")
-    with np.load(folder / "scans.npz", allow_pickle=False) as archive:
-        poses = np.array(archive["estimate"])
+    poses = read_arrays(folder / "scans.npz", what="a survey's scans").get("estimate")
+    if poses is None:
+        raise InvalidInputError("no array estimate", expected="a survey's scans", where=folder / "scans.npz")
     lidar = config.sim.lidar
     scans = tuple(replace(scan, range_min=lidar.range_min) for scan in recorded.scans)
     keyframes = RecordedRun(scans, recorded.odometry, recorded.reference)

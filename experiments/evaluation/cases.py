@@ -11,6 +11,7 @@ from shapely.geometry import Polygon
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.geojson import read_rooms
 from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.names import plot_text
 from closedrooms.experiments.evaluation.curves import save_figure
 from closedrooms.experiments.evaluation.listing import SamplePath
 from closedrooms.experiments.evaluation.sample import predict_with
@@ -53,7 +54,7 @@ def draw_worst(path: Path, scores: Sequence[Scores], samples: Mapping[str, Sampl
         except InvalidInputError:
             continue
         _show_case(place, sample, rooms)
-        place.set_title(f"{score['sample']}\n{method}: {np.mean(score['matched']):.2f}", fontsize=8)
+        place.set_title(f"{plot_text(score['sample'])}\n{method}: {np.mean(score['matched']):.2f}", fontsize=8)
     figure.suptitle("worst cases: true free space hidden from the map (orange), predicted rooms (blue outline)")
     save_figure(figure, path)
     return True
@@ -100,7 +101,7 @@ def draw_extremes(
     figure, axes = _figure(len(read), 3, 5.0, 3.6)
     for line, (score, sample, prediction) in zip(axes, read, strict=True):
         titles = (
-            f"{score['sample']}: {score['closed_doors']} doors closed, {score['hidden_share']:.0%} hidden",
+            f"{plot_text(score['sample'])}: {score['closed_doors']} doors closed, {score['hidden_share']:.0%} hidden",
             f"predicted ({score['method']}): mean IoU {np.mean(MEASURES['matched'](score)):.2f}",
             "truth",
         )

@@ -1,10 +1,10 @@
 """An output folder that a command fills bit by bit and goes on with."""
 
-import json
 from pathlib import Path
 
-from closedrooms.core.errors import OutputError
+from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files import MANIFEST, PROGRAM, write_json
+from closedrooms.core.incoming import read_json
 
 
 def claim(folder: Path, command: str) -> None:
@@ -22,8 +22,8 @@ def claim(folder: Path, command: str) -> None:
         raise OutputError(f"the output is a file; expected a folder: {folder}")
     if folder.is_dir() and any(folder.iterdir()):
         try:
-            ours = json.loads(manifest.read_text())["command"] == command
-        except (OSError, ValueError, KeyError, TypeError):
+            ours = read_json(manifest, what="a manifest")["command"] == command
+        except (InvalidInputError, KeyError, TypeError):
             ours = False
         if not ours:
             raise OutputError(f"the output folder holds files of something else; expected an empty one: {folder}")

@@ -6,7 +6,7 @@ from functools import partial
 from statistics import median
 from typing import Any
 
-from closedrooms.core.files import MANIFEST, PROGRAM, write_json
+from closedrooms.core.files import MANIFEST, PROGRAM, only_writer, write_json
 from closedrooms.core.report import Report
 from closedrooms.experiments.evaluation.claimed_folder import claim
 from closedrooms.experiments.evaluation.config import EvaluateConfig
@@ -28,11 +28,17 @@ def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Rep
 
     Raises:
         InvalidInputError: No samples, or two with one name.
-        OutputError: The folder cannot be written, or holds something that is not ours.
+        OutputError: The folder cannot be written, holds something that is not ours, or another process writes it.
     """
     progress = progress or Silent()
     samples = find_samples(config.datasets)
     claim(config.out, "evaluate")
+    with only_writer(config.out):
+        return _evaluate(samples, config, progress)
+
+
+def _evaluate(samples: Sequence[SamplePath], config: EvaluateConfig, progress: Progress) -> Report:
+    """Do what is not done yet, then write tables, pictures and manifest."""
     progress.stage("evaluate", len(samples))
     scores: list[Scores] = []
     failures: dict[str, str] = {}

@@ -6,10 +6,13 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import MANIFEST, read_text
+from closedrooms.core.files import MANIFEST
+from closedrooms.core.incoming import read_text
+from closedrooms.core.numbers import repr_of
 
 FILES = ("map.yaml", "doors.geojson", "truth.yaml")
 DATASET_MANIFEST = "manifest.json"
+MAX_REPETITION = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -105,7 +108,13 @@ def _entry(dataset: Path, entry: Any, number: int, digests: dict[str, str]) -> S
         problem = f"failed when the dataset was made: {entry.get('reason') or 'no reason given'}"
     elif not folder.is_dir():
         problem = f"listed in {DATASET_MANIFEST} but missing"
-    repetition = entry.get("repetition")
+    repetition = entry.get("repetition", -1)
+    if isinstance(repetition, bool) or not isinstance(repetition, int) or not -1 <= repetition <= MAX_REPETITION:
+        raise InvalidInputError(
+            f"sample {number} with the repetition {repr_of(repetition)}",
+            expected=f"a whole number up to {MAX_REPETITION}",
+            where=dataset / DATASET_MANIFEST,
+        )
     return SamplePath(
         name,
         folder,
@@ -113,7 +122,7 @@ def _entry(dataset: Path, entry: Any, number: int, digests: dict[str, str]) -> S
         listed=True,
         digest=digests.get(f"{name}/{MANIFEST}", ""),
         world=str(entry.get("world") or ""),
-        repetition=repetition if isinstance(repetition, int) else -1,
+        repetition=repetition,
     )
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.files import write_bytes
+from closedrooms.core.incoming import read_bytes
+from closedrooms.core.names import xml_text
 
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; margin: 2em auto; max-width: 1180px; padding: 0 1em; color: #222; }
@@ -52,21 +54,21 @@ def write_page(path: Path, title: str, sections: Sequence[Section]) -> None:
     head = [
         "<!doctype html>",
         '<html lang="en"><head><meta charset="utf-8">',
-        f'<title>{escape(title)}</title><link rel="icon" href="data:,">',
+        f'<title>{_text(title)}</title><link rel="icon" href="data:,">',
         f"<style>{STYLE}</style></head><body>",
-        f"<h1>{escape(title)}</h1>",
+        f"<h1>{_text(title)}</h1>",
     ]
     body = [line for section in sections for line in _section(section)]
     write_bytes(path, ("\n".join([*head, *body, "</body></html>"]) + "\n").encode())
 
 
 def _section(section: Section) -> list[str]:
-    lines = [f"<h2>{escape(section.heading)}</h2>"]
+    lines = [f"<h2>{_text(section.heading)}</h2>"]
     if section.text:
-        lines.append(f"<p>{escape(section.text)}</p>")
+        lines.append(f"<p>{_text(section.text)}</p>")
     if section.picture is not None:
-        data = base64.b64encode(section.picture.read_bytes()).decode()
-        lines.append(f'<img alt="{escape(section.heading)}" src="data:image/png;base64,{data}">')
+        data = base64.b64encode(read_bytes(section.picture, what="a picture")).decode()
+        lines.append(f'<img alt="{_text(section.heading)}" src="data:image/png;base64,{data}">')
     for rows in section.tables:
         head, *body = rows
         lines.append('<div class="table"><table>')
@@ -79,4 +81,8 @@ def _section(section: Section) -> list[str]:
 def _cell(value: Any) -> str:
     if value is None:
         return ""
-    return escape(f"{value:.4g}" if isinstance(value, float) else str(value))
+    return _text(f"{value:.4g}" if isinstance(value, float) else value)
+
+
+def _text(value: object) -> str:
+    return escape(xml_text(value))

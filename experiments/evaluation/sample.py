@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray
-from closedrooms.core.errors import OutputError, reason
+from closedrooms.core.errors import InvalidInputError, OutputError, reason
 from closedrooms.core.files import write_json
 from closedrooms.core.geojson import write_rooms
 from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.incoming import read_json
+from closedrooms.experiments.dataset.checksums import digest
 from closedrooms.experiments.evaluation.listing import SamplePath
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
 from closedrooms.experiments.evaluation.scores import (
@@ -122,10 +124,10 @@ def _make(folder: Path) -> None:
 
 def _content(folder: Path) -> str:
     """Digest of the files of a sample."""
-    digest = hashlib.sha256()
+    content = hashlib.sha256()
     for path in sorted(path for path in folder.glob("*") if path.suffix in INPUTS and path.is_file()):
-        digest.update(path.name.encode() + hashlib.sha256(path.read_bytes()).digest())
-    return digest.hexdigest()
+        content.update(path.name.encode() + digest(path).encode())
+    return content.hexdigest()
 
 
 def _fingerprint(content: str, method: str, *, tours: bool) -> str:
@@ -143,8 +145,8 @@ def _code() -> str:
 
 def _kept(path: Path, key: str) -> Scores | None:
     try:
-        scores: Scores = json.loads(path.read_text())
-    except (OSError, ValueError):
+        scores: Scores = read_json(path, what="the scores of a sample")
+    except InvalidInputError:
         return None
     return scores if isinstance(scores, dict) and scores.get("key") == key else None
 

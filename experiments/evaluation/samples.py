@@ -1,6 +1,7 @@
 """Samples on disk: a map, its closed doors and the truth, in one folder each."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import MANIFEST, read_json
 from closedrooms.core.geojson import read_doors, read_rooms
 from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.numbers import repr_of
 from closedrooms.core.room import Room
 from closedrooms.core.rosmap import read_map
 from closedrooms.experiments.dataset.checksums import check, digest
@@ -18,6 +20,8 @@ from closedrooms.predictor.structure.known_window import MAX_CELLS
 
 # Unknown cells kept around what is known when a sample is cropped [m].
 MARGIN = 3.0
+# Largest number of rooms, doors or repetitions that a manifest may name.
+MAX_COUNT = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,9 +92,9 @@ def read_sample(sample: SamplePath) -> Sample:
         rooms,
         cropped[2] if authors is not None else None,
         sample.world or about.get("world") or sample.name.rpartition("/")[0] or sample.name,
-        sample.repetition if sample.repetition >= 0 else repetition if isinstance(repetition, int) else 0,
+        sample.repetition if sample.repetition >= 0 else repetition or 0,
         len(closed) if isinstance(closed, list) else len(doors),
-        seen if isinstance(seen, int) else None,
+        seen,
     )
 
 
@@ -107,11 +111,24 @@ def _read_about(sample: SamplePath) -> dict[str, Any]:
     if sample.listed or "checksums" in data:
         check(sample.folder)
     metrics = data.get("metrics")
-    seen = metrics.get("rooms_seen") if isinstance(metrics, dict) else None
+    seen = _count(metrics.get("rooms_seen") if isinstance(metrics, dict) else None, "rooms_seen", path)
     world = data.get("world")
     return {
         "world": world if isinstance(world, str) else None,
         "closed": data.get("closed"),
-        "repetition": data.get("repetition"),
+        "repetition": _count(data.get("repetition"), "repetition", path),
         "rooms_seen": seen,
     }
+
+
+def _count(value: Any, name: str, path: Path) -> int | None:
+    """A whole number of a manifest, ``None`` where there is none.
+
+    Raises:
+        InvalidInputError: Something else, or larger than any count.
+    """
+    if value is not None and (isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MAX_COUNT):
+        raise InvalidInputError(
+            f"{name} {repr_of(value)}", expected=f"a whole number from 0 to {MAX_COUNT}", where=path
+        )
+    return value

@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.door import ClosedDoor
+from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import write_json
 from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.incoming import read_json
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.tour import CoverageTour
+from closedrooms.experiments.dataset.checksums import digest
 from closedrooms.pipeline.manifest import versions
 
 # The robot starts at the origin of the map.
@@ -55,10 +58,10 @@ def kept_tour(out: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor] = ()) 
     """
     path = out / CACHE / f"{_key(cropped(grid), doors)}.json"
     try:
-        kept: Tour = json.loads(path.read_text())
+        kept: Tour = read_json(path, what="a kept tour")
         if isinstance(kept["length_m"], float):
             return kept
-    except (OSError, ValueError, KeyError, TypeError):
+    except (InvalidInputError, KeyError, TypeError):
         pass
     path.parent.mkdir(parents=True, exist_ok=True)
     figures = tour_figures(plan_tour(grid, doors))
@@ -100,7 +103,7 @@ def tour_code() -> str:
 
 def code_digest(files: Sequence[Path]) -> str:
     """Digest of the names and contents of some files."""
-    digest = hashlib.sha256()
+    content = hashlib.sha256()
     for path in sorted(files):
-        digest.update(path.name.encode() + hashlib.sha256(path.read_bytes()).digest())
-    return digest.hexdigest()
+        content.update(path.name.encode() + digest(path).encode())
+    return content.hexdigest()

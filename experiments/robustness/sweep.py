@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError, reason
-from closedrooms.core.files import MANIFEST, PROGRAM, write_json
+from closedrooms.core.files import MANIFEST, PROGRAM, only_writer, write_json
+from closedrooms.core.incoming import read_json
 from closedrooms.core.report import Report
 from closedrooms.experiments.evaluation.claimed_folder import claim
 from closedrooms.experiments.evaluation.tours import code_digest
@@ -44,11 +45,17 @@ def robustness(config: RobustnessConfig, *, progress: Progress | None = None) ->
 
     Raises:
         InvalidInputError: A world that cannot be read, or two of one name.
-        OutputError: The folder cannot be written, or holds something that is not ours.
+        OutputError: The folder cannot be written, holds something that is not ours, or another process writes it.
     """
     progress = progress or Silent()
     worlds = _worlds(config.worlds)
     claim(config.out, "robustness")
+    with only_writer(config.out):
+        return _sweep(worlds, config, progress)
+
+
+def _sweep(worlds: dict[str, str], config: RobustnessConfig, progress: Progress) -> Report:
+    """Do what is not done yet, then write figures and manifest."""
     wanted = cases(config)
     total = len(worlds) * len({case.name for case in wanted})
     progress.stage("sweep", total)
@@ -197,7 +204,7 @@ def _finished(config: RobustnessConfig, world: str, wanted: Sequence[Case]) -> l
     """What is there of one world, levels in order."""
     rows: list[Row] = []
     for case in wanted:
-        kept = json.loads((_folder(config, world, case.name) / RESULT).read_text())["rows"]
+        kept = read_json(_folder(config, world, case.name) / RESULT, what="a finished level")["rows"]
         head = {"factor": case.factor, "number": case.number, "level": case.level}
         rows += [head | row for row in kept]
     return rows
@@ -207,10 +214,10 @@ def _kept(folder: Path, key: str, setting: Setting) -> bool:
     """Whether a level is finished; what another configuration or other code left is not, and goes."""
     path = folder / RESULT
     try:
-        kept = json.loads(path.read_text())
+        kept = read_json(path, what="a finished level")
         if kept["key"] == key and kept["setting"] == asdict(setting):
             return True
-    except (OSError, ValueError, KeyError, TypeError):
+    except (InvalidInputError, KeyError, TypeError):
         pass
     path.unlink(missing_ok=True)
     return False

@@ -1,8 +1,6 @@
 """CARMEN logs of real robots (FLASER, ROBOTLASER1, ODOM), plain or gzipped."""
 
-import gzip
 import math
-import zlib
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from closedrooms.core.archives import TruncatedError, log_lines
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
@@ -19,8 +18,6 @@ from closedrooms.mapping.logs.recorded_run import RecordedRun, forward
 MAX_BEAMS = 20_000
 MAX_LINE = 1_000_000
 """Bytes; a scan of MAX_BEAMS fits."""
-MAX_BYTES = 4_000_000_000
-"""Size after unpacking beyond which a log is refused: a gzip bomb, not a drive."""
 DEFAULT_RANGE = 80.0
 """Longest range of the SICK LMS that most of these logs come from [m]."""
 NO_RETURN_COUNT = 10
@@ -68,7 +65,7 @@ def read_carmen(path: Path, *, gzipped: bool) -> RecordedRun:
         gzipped: Whether to unpack it; a truncated archive is read as far as it goes.
 
     Raises:
-        InvalidInputError: Unreadable, not text, or unpacking to more than ``MAX_BYTES``.
+        InvalidInputError: Unreadable, not text, or unpacking to too much (:mod:`closedrooms.core.archives`).
     """
     skipped: Counter[str] = Counter()
     scans: list[_Scan] = []
@@ -93,18 +90,11 @@ def read_carmen(path: Path, *, gzipped: bool) -> RecordedRun:
 
 
 def _lines(path: Path, gzipped: bool, skipped: Counter[str]) -> Iterator[str]:
-    read = 0
     try:
-        with gzip.open(path) if gzipped else path.open("rb") as file:
-            while line := file.readline(MAX_LINE):
-                read += len(line)
-                if read > MAX_BYTES:
-                    raise InvalidInputError("a log that unpacks without end", expected="a CARMEN log", where=path)
-                yield line.decode("ascii", errors="replace")
-    except (EOFError, zlib.error, gzip.BadGzipFile):
+        for line in log_lines(path, gzipped=gzipped, what="a CARMEN log", longest=MAX_LINE):
+            yield line.decode("ascii", errors="replace")
+    except TruncatedError:
         skipped["truncated archives"] += 1
-    except OSError as error:
-        raise InvalidInputError(f"cannot read ({error.strerror})", expected="a CARMEN log", where=path) from error
 
 
 def _pose(words: list[str]) -> Pose2:

@@ -1,12 +1,12 @@
 """Scans in NumPy archives: our own ``scans.npz``, and the MRPT export of the Malaga data set."""
 
 import math
-import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from closedrooms.core.archives import read_arrays
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import write_bytes
@@ -14,8 +14,6 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.logs.recorded_run import RecordedRun, forward
 
-MAX_BYTES = 4_000_000_000
-"""Unpacked size beyond which an archive is refused before memory is taken."""
 EXPECTED = "scans.npz with stamps, ranges, odometry, angle_min, angle_increment, range_max"
 TICKS = 1e-7
 """Windows file-time ticks of MRPT's stamps [s]."""
@@ -60,7 +58,7 @@ def read_scans(path: Path) -> RecordedRun:
     Raises:
         InvalidInputError: Broken, too large, with pickles, or with arrays missing or of other shapes.
     """
-    arrays = _arrays(path)
+    arrays: dict[str, Any] = read_arrays(path, what=EXPECTED)
     try:
         if "odometry" in arrays:
             return _ours(arrays, path)
@@ -69,18 +67,6 @@ def read_scans(path: Path) -> RecordedRun:
     except (ValueError, TypeError, IndexError, OverflowError) as error:
         raise InvalidInputError(f"arrays that do not fit ({error})", expected=EXPECTED, where=path) from error
     raise InvalidInputError(f"arrays {', '.join(sorted(arrays))}", expected=EXPECTED, where=path)
-
-
-def _arrays(path: Path) -> dict[str, Any]:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-        if size > MAX_BYTES:
-            raise InvalidInputError(f"an archive of {size} bytes", expected=f"at most {MAX_BYTES}", where=path)
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, zipfile.BadZipFile, EOFError, KeyError, NotImplementedError) as error:
-        raise InvalidInputError(f"a broken archive ({error})", expected=EXPECTED, where=path) from error
 
 
 def _ours(arrays: dict[str, Any], path: Path) -> RecordedRun:

@@ -7,6 +7,8 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray, frozen
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.incoming import is_file, is_folder, read_head, reading
+from closedrooms.core.numbers import FARTHEST
 from closedrooms.core.scan import LaserScan
 
 GZIP, ZIP, SQLITE = b"\x1f\x8b", b"PK\x03\x04", b"SQLite format 3"
@@ -30,9 +32,18 @@ class RecordedRun:
     skipped: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "odometry", frozen(self.odometry))
+        object.__setattr__(self, "odometry", _poses(self.odometry, "odometry"))
         if self.reference is not None:
-            object.__setattr__(self, "reference", frozen(self.reference))
+            object.__setattr__(self, "reference", _poses(self.reference, "reference poses"))
+
+
+def _poses(poses: FloatArray, what: str) -> FloatArray:
+    """Poses as they are kept, shape (n, 3), none of them where no robot is."""
+    poses = frozen(poses)
+    # NaN compares as false.
+    if not bool((np.abs(poses) <= FARTHEST).all()):
+        raise InvalidInputError(f"{what} that are not finite or too far away", expected=f"at most {FARTHEST:g} m")
+    return poses
 
 
 def read_run(path: Path, *, scan_topic: str | None = None, odometry_topic: str | None = None) -> RecordedRun:
@@ -46,14 +57,24 @@ def read_run(path: Path, *, scan_topic: str | None = None, odometry_topic: str |
     Raises:
         InvalidInputError: Missing, unreadable, of no known kind, or without a single scan that can be used.
     """
-    if path.is_dir():
-        head = SQLITE if (path / "metadata.yaml").exists() else b""
+    if is_folder(path):
+        head = SQLITE if is_file(path / "metadata.yaml") else b""
     else:
+        head = read_head(path, what="a recorded run", size=16)
+    with reading(path, "a recorded run"):
         try:
-            with path.open("rb") as file:
-                head = file.read(16)
-        except OSError as error:
-            raise InvalidInputError(f"cannot read ({error.strerror})", expected="a recorded run", where=path) from error
+            run = _read_kind(path, head, scan_topic, odometry_topic)
+        except InvalidInputError as error:
+            # Scans and poses check themselves, and do not know their file.
+            raise error if str(path) in str(error) else InvalidInputError(str(error), where=path) from error
+    if not run.scans:
+        found = "".join(f", {count} {what}" for what, count in run.skipped.items())
+        raise InvalidInputError(f"no scan with odometry{found}", expected="laser scans and odometry", where=path)
+    return run
+
+
+def _read_kind(path: Path, head: bytes, scan_topic: str | None, odometry_topic: str | None) -> RecordedRun:
+    """Read a run with the reader that its first bytes name."""
     if head.startswith((ROSBAG, MCAP, SQLITE)):
         from closedrooms.mapping.logs.rosbag import read_bag
 
@@ -62,15 +83,12 @@ def read_run(path: Path, *, scan_topic: str | None = None, odometry_topic: str |
         from closedrooms.mapping.logs.npz import read_scans
 
         run = read_scans(path)
-    elif path.is_dir():
+    elif is_folder(path):
         raise InvalidInputError("a folder", expected="a log file, or a rosbag 2 folder with metadata.yaml", where=path)
     else:
         from closedrooms.mapping.logs.carmen import read_carmen
 
         run = read_carmen(path, gzipped=head.startswith(GZIP))
-    if not run.scans:
-        found = "".join(f", {count} {what}" for what, count in run.skipped.items())
-        raise InvalidInputError(f"no scan with odometry{found}", expected="laser scans and odometry", where=path)
     return run
 
 

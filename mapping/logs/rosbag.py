@@ -11,6 +11,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.incoming import check_regular, is_folder, reading
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.logs.recorded_run import RecordedRun, forward
@@ -64,20 +65,17 @@ def read_bag(path: Path, *, scan_topic: str | None, odometry_topic: str | None) 
         raise InvalidInputError(
             "bags need the optional package rosbags", expected="pip install 'closedrooms[bags]'", where=path
         ) from error
-    try:
-        # Bags of ROS 2 before Iron do not carry the definitions of their messages.
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            topics = [
-                _topic(reader.connections, SCAN, scan_topic, path),
-                _topic(reader.connections, ODOMETRY, odometry_topic, path),
-                "/tf_static",
-            ]
-            wanted = [c for c in reader.connections if c.topic in topics]
-            messages = _read(reader, wanted)
-    except InvalidInputError:
-        raise
-    except Exception as error:  # rosbags raises many kinds for broken files, none with a common base
-        raise InvalidInputError(f"a bag that cannot be read ({error})", expected="a rosbag", where=path) from error
+    for file in path.iterdir() if is_folder(path) else [path]:
+        check_regular(file, "a rosbag")
+    # Bags of ROS 2 before Iron do not carry the definitions of their messages.
+    with reading(path, "a rosbag"), AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        topics = [
+            _topic(reader.connections, SCAN, scan_topic, path),
+            _topic(reader.connections, ODOMETRY, odometry_topic, path),
+            "/tf_static",
+        ]
+        wanted = [c for c in reader.connections if c.topic in topics]
+        messages = _read(reader, wanted)
     return _resolved(messages)
 
 

@@ -1,21 +1,24 @@
+import errno
 import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from closedrooms.core.errors import OutputError
-from closedrooms.core.files import is_ours, output_folder, write_bytes
+from closedrooms.core.files import check_new_files, is_ours, output_folder, write_bytes
 
 
 def test_an_output_folder_appears_whole_and_lists_its_files(tmp_path: Path) -> None:
     with output_folder(tmp_path / "out", {"seed": 3}) as folder:
         write_bytes(folder / "a.txt", b"a")
         assert not (tmp_path / "out").exists()
-    assert json.loads((tmp_path / "out" / "run.json").read_text()) == {
-        "seed": 3,
-        "program": "closedrooms",
-        "files": ["a.txt"],
-    }
+    manifest = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert manifest.pop("sha256").keys() == {"a.txt", "run.json"}
+    assert manifest == {"seed": 3, "program": "closedrooms", "files": ["a.txt"]}
     assert is_ours(tmp_path / "out")
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
@@ -68,3 +71,219 @@ def test_a_file_that_cannot_be_written_is_one_line_and_leaves_nothing(tmp_path: 
     with pytest.raises(OutputError, match="cannot write"):
         write_bytes(tmp_path / "taken", b"")
     assert [p.name for p in tmp_path.iterdir()] == ["taken"]
+
+
+def make(out: Path, command: str | None = "predict", **files: bytes) -> None:
+    with output_folder(out, {"command": command, "values": (1, {2: "three"})}) as folder:
+        for name, content in (files or {"a": b"a"}).items():
+            path = folder / name.replace("__", "/")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_bytes(path, content)
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_the_same_command_replaces_its_folder_at_every_depth(tmp_path: Path) -> None:
+    make(tmp_path / "out", a=b"a", deep__er__b=b"b")
+    make(tmp_path / "out", c=b"c")
+    assert tree(tmp_path / "out").keys() == {"c", "run.json"}
+
+
+def changed(out: Path) -> None:
+    (out / "deep" / "b").write_bytes(b"B")
+
+
+def added(out: Path) -> None:
+    (out / "deep" / "mine.txt").write_text("mine")
+
+
+def added_empty(out: Path) -> None:
+    (out / "deep" / "empty").mkdir()
+
+
+def linked(out: Path) -> None:
+    (out / "deep" / "b").rename(out.parent / "elsewhere")
+    (out / "deep" / "b").symlink_to(out.parent / "elsewhere")
+
+
+def noted(out: Path) -> None:
+    manifest = json.loads((out / "run.json").read_text())
+    (out / "run.json").write_text(json.dumps(manifest | {"note": "mine"}, indent=2) + "\n")
+
+
+def reformatted(out: Path) -> None:
+    (out / "run.json").write_text(json.dumps(json.loads((out / "run.json").read_text())))
+
+
+def taken_over(out: Path) -> None:
+    (out / "run.json").write_text('{"program": "closedrooms", "files": ["a", "deep/b"], "command": "predict"}')
+
+
+def broken(out: Path) -> None:
+    (out / "run.json").write_text("{" * 1000)
+
+
+def lost(out: Path) -> None:
+    (out / "run.json").unlink()
+
+
+@pytest.mark.parametrize("touch", [changed, added, added_empty, linked, noted, reformatted, taken_over, broken, lost])
+def test_a_folder_that_somebody_touched_is_kept(tmp_path: Path, touch: Callable[[Path], None]) -> None:
+    out = tmp_path / "out"
+    make(out, a=b"a", deep__b=b"b")
+    touch(out)
+    before = tree(tmp_path)
+    with pytest.raises(OutputError, match="did not write, or that was changed"):
+        make(out)
+    assert tree(tmp_path) == before
+
+
+def test_another_command_does_not_replace_it(tmp_path: Path) -> None:
+    make(tmp_path / "out", "evaluate")
+    with pytest.raises(OutputError, match="closedrooms predict did not write"):
+        make(tmp_path / "out", "predict")
+    make(tmp_path / "out", "evaluate")
+
+
+def test_what_was_put_there_while_we_worked_is_kept(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    make(out)
+
+    def work() -> None:
+        with output_folder(out, {"command": "predict"}) as folder:
+            write_bytes(folder / "b", b"b")
+            (out / "mine.txt").write_text("mine")
+
+    with pytest.raises(OutputError, match="did not write"):
+        work()
+    assert tree(out).keys() == {"a", "mine.txt", "run.json"}
+    assert [p.name for p in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_link_to_a_folder_stays_a_link(tmp_path: Path) -> None:
+    (tmp_path / "far").mkdir()
+    (tmp_path / "out").symlink_to(tmp_path / "far")
+    for _ in range(2):
+        make(tmp_path / "out")
+    assert (tmp_path / "out").is_symlink()
+    assert tree(tmp_path / "far").keys() == {"a", "run.json"}
+    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
+    with pytest.raises(OutputError, match="a file"):
+        make(tmp_path / "nowhere")
+
+
+def test_the_second_writer_of_a_folder_says_so_and_stops(tmp_path: Path) -> None:
+    def second() -> None:
+        with output_folder(tmp_path / "out", {}):
+            make(tmp_path / "out")
+
+    with pytest.raises(OutputError, match="another closedrooms writes"):
+        second()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_two_folders_side_by_side_are_written_at_once(tmp_path: Path) -> None:
+    with output_folder(tmp_path / "one", {}), output_folder(tmp_path / "two", {}):
+        pass
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["one", "two"]
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from closedrooms.core.files import output_folder, write_bytes
+with output_folder(Path(sys.argv[1]), {"command": "predict"}) as folder:
+    write_bytes(folder / "a", b"half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_what_a_killed_process_left_is_removed_by_the_next_and_nothing_else(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, "-c", KILLED, str(tmp_path / "out")], check=False)
+    assert any(p.name.endswith(".part") for p in tmp_path.iterdir())
+    others = (".out.mine.part", ".outer.abcdefgh.part", ".out.abcdefgh.keep", "out.abcdefgh.part")
+    for name in others:
+        (tmp_path / name).mkdir()
+    make(tmp_path / "out")
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(["out", *others])
+
+
+def test_what_a_killed_process_left_of_a_file_is_removed(tmp_path: Path) -> None:
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    (tmp_path / f".a.{gone.pid}.part").write_bytes(b"half")
+    (tmp_path / ".a.1.part").write_bytes(b"of a process that lives")
+    write_bytes(tmp_path / "a", b"whole")
+    assert sorted(p.name for p in tmp_path.iterdir()) == [".a.1.part", "a"]
+
+
+@pytest.mark.parametrize("name", ["x" * 200, "x" * 255, "ä" * 120])
+def test_long_names_are_written_where_the_system_takes_them(tmp_path: Path, name: str) -> None:
+    make(tmp_path / name)
+    make(tmp_path / name)
+    write_bytes(tmp_path / name / name, b"x")
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("name", ["x" * 256, "a\0b", "\ud800"])
+def test_names_that_no_system_takes_are_one_line(tmp_path: Path, name: str) -> None:
+    with pytest.raises(OutputError, match="cannot write"):
+        make(tmp_path / name)
+    with pytest.raises(OutputError):
+        write_bytes(tmp_path / name, b"")
+    with pytest.raises(OutputError):
+        check_new_files([tmp_path / name])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_at_any_write_leaves_everything_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    make(tmp_path / "out", a=b"old")
+    before = tree(tmp_path)
+    real = os.fsync
+
+    def full(descriptor: int) -> None:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        real(descriptor)
+
+    monkeypatch.setattr(os, "fsync", full)
+    for writes in range(3):
+        left = writes
+        with pytest.raises(OutputError, match="No space left"):
+            make(tmp_path / "out", a=b"new", b=b"new")
+        assert tree(tmp_path) == before
+    left = 3
+    make(tmp_path / "out", a=b"new", b=b"new")
+
+
+@pytest.mark.skipif(os.getuid() == 0, reason="root writes everywhere")
+def test_a_closed_folder_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "closed").mkdir(mode=0o000)
+    with pytest.raises(OutputError, match="Permission denied"):
+        make(tmp_path / "closed" / "out")
+
+
+def test_single_files_are_new_unless_told_and_never_the_source(tmp_path: Path) -> None:
+    source, other = tmp_path / "source", tmp_path / "other"
+    source.write_text("s")
+    other.write_text("o")
+    (tmp_path / "hard").hardlink_to(source)
+    (tmp_path / "soft").symlink_to(source)
+    check_new_files([tmp_path / "new"], sources=[source, tmp_path / "missing"])
+    check_new_files([other], force=True, sources=[source])
+    with pytest.raises(OutputError, match="--force"):
+        check_new_files([tmp_path / "new", other], sources=[source])
+    for same in (source, tmp_path / "hard", tmp_path / "soft"):
+        with pytest.raises(OutputError, match="is read"):
+            check_new_files([same], force=True, sources=[source])
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OutputError, match="no regular file"):
+        check_new_files([tmp_path / "pipe"], force=True)
+    with pytest.raises(OutputError, match="a folder"):
+        check_new_files([tmp_path], force=True)
+    with pytest.raises(OutputError, match="cannot write"):
+        check_new_files([tmp_path / "no" / "where"], force=True)

@@ -9,6 +9,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.geojson import read_doors, read_rooms, write_doors, write_rooms
 from closedrooms.core.pose import Pose2
+from closedrooms.core.remarks import Remark
 from closedrooms.core.room import Room
 
 
@@ -69,7 +70,8 @@ def test_a_bow_tie_is_repaired(tmp_path: Path) -> None:
     [
         (point(0, float("nan")), "JSON"),
         (point("a", "b"), "geometry"),
-        (point(10**400, 1), "geometry"),
+        (point(10**400, 1), "401 digits"),
+        (point(1e300, 1), "geometry"),
         ({"type": "Feature", "properties": {}, "geometry": None}, "geometry"),
         (
             {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, 1], [0, 0]]]}},
@@ -77,9 +79,13 @@ def test_a_bow_tie_is_repaired(tmp_path: Path) -> None:
         ),
         ({"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": []}}, "empty"),
         (
-            {"type": "Feature", "properties": {}, "geometry": {"type": "MultiPoint", "coordinates": [[0, 0]]}},
-            "MultiPoint",
+            {"type": "Feature", "geometry": {"type": "GeometryCollection", "geometries": []}},
+            "geometry",
         ),
+        (point([1], [2]), "geometry"),
+        (point(0, 0, id=True), "id"),
+        (point(0, 0, id="x" * 1001), "id"),
+        (point(0, 0, width=1e9), "width"),
         (point(0, 0) | {"properties": ["a"]}, "properties"),
         (point(0, 0, id={"a": 1}), "id"),
         (point(0, 0, width=-1), "width"),
@@ -100,20 +106,19 @@ def test_rejects_two_doors_of_one_id_and_other_json(tmp_path: Path) -> None:
     (tmp_path / "x").write_text("[1, 2]")
     with pytest.raises(InvalidInputError, match="FeatureCollection"):
         read_doors(tmp_path / "x")
-    for alone in (point(0, 0), point(0, 0)["geometry"]):
-        (tmp_path / "x").write_text(json.dumps(alone))
-        with pytest.raises(InvalidInputError, match=f"no FeatureCollection but '{alone['type']}'"):
-            read_doors(tmp_path / "x")
+    (tmp_path / "x").write_text('{"type": "Topology"}')
+    with pytest.raises(InvalidInputError, match="no FeatureCollection but 'Topology'"):
+        read_doors(tmp_path / "x")
     (tmp_path / "x").write_text("{")
     with pytest.raises(InvalidInputError, match="broken JSON"):
         read_doors(tmp_path / "x")
 
 
-def test_a_door_as_far_off_as_a_number_can_say_is_read(tmp_path: Path) -> None:
-    ends = [[1.7e308, 1.7e308], [1.6e308, 1.7e308]]
+def test_a_door_at_the_bound_of_coordinates_is_read(tmp_path: Path) -> None:
+    ends = [[9.9e7, 9.9e7], [9.9e7 - 1.0, 9.9e7]]
     line = {"type": "Feature", "properties": {}, "geometry": {"type": "LineString", "coordinates": ends}}
     (door,) = read_doors(collection(tmp_path / "d", line))
-    assert door.midpoint == pytest.approx((1.65e308, 1.7e308))
+    assert door.midpoint == pytest.approx((9.9e7 - 0.5, 9.9e7))
 
 
 @pytest.mark.parametrize("wrong", [{"midpoint": (float("nan"), 0.0)}, {"segment": ((0.0, 0.0), (float("inf"), 1.0))}])
@@ -127,3 +132,53 @@ def test_a_moved_door_keeps_its_width() -> None:
     assert door.midpoint == pytest.approx((0.0, 1.0))
     assert door.segment is not None
     assert door.segment[1] == pytest.approx((0.0, 1.5))
+
+
+@pytest.mark.parametrize("alone", [point(1, 2), point(1, 2)["geometry"]])
+def test_a_bare_feature_or_geometry_is_a_collection_of_one(tmp_path: Path, alone: dict[str, Any]) -> None:
+    (tmp_path / "d").write_text(json.dumps(alone))
+    assert [door.midpoint for door in read_doors(tmp_path / "d")] == [(1.0, 2.0)]
+
+
+def multi(form: str, coordinates: list[Any], **properties: Any) -> dict[str, Any]:
+    return {"type": "Feature", "properties": properties, "geometry": {"type": form, "coordinates": coordinates}}
+
+
+def test_multi_forms_are_read_part_by_part_and_what_was_named_here_is_told(tmp_path: Path) -> None:
+    told: list[Remark] = []
+    features = [
+        multi("MultiPoint", [[0, 0]], id="one"),
+        multi("MultiLineString", [[[0, 5], [1, 5]]], id="line"),
+        multi("MultiLineString", [[[0, 7], [0.5, 7]], [[0.5, 7], [1, 7]]], id="pieces"),
+        multi("MultiPoint", [[3, 0], [5, 0]], id="two"),
+    ]
+    doors = read_doors(collection(tmp_path / "d", *features), remarks=told)
+    assert [door.id for door in doors] == ["one", "line", "pieces", "two", "two-2"]
+    assert [door.midpoint for door in doors] == [(0, 0), (0.5, 5), (0.5, 7), (3, 0), (5, 0)]
+    assert doors[2].width == pytest.approx(1.0)
+    assert [str(remark) for remark in told] == ["guessed 1 id (two-2): one feature holds several doors"]
+
+
+def test_the_id_of_a_feature_counts_where_its_properties_have_none(tmp_path: Path) -> None:
+    features = [point(0, 0) | {"id": 7}, point(1, 0, id=3.0), point(2, 0, id="") | {"id": "north"}]
+    features.append(point(3, 0) | {"id": 0})
+    assert [door.id for door in read_doors(collection(tmp_path / "d", *features))] == ["7", "3", "d02", "0"]
+
+
+def test_null_geometries_and_open_doors_in_any_case_are_left_out_and_counted(tmp_path: Path) -> None:
+    told: list[Remark] = []
+    nothing = {"type": "Feature", "properties": {"id": "x"}, "geometry": None}
+    features = [nothing, point(0, 0, id="a", state="OPEN"), point(1, 0, id="b", state="Closed"), nothing]
+    doors = read_doors(collection(tmp_path / "d", *features), remarks=told)
+    assert [door.id for door in doors] == ["b"]
+    assert [(remark.action, remark.what, remark.count, remark.loss) for remark in told] == [
+        ("dropped", "features", 2, False),
+        ("dropped", "door", 1, False),
+    ]
+
+
+@pytest.mark.parametrize("wrong", [{"kind": []}, {"doors": [{}]}, {"doors": "d00"}, {"score": "high"}])
+def test_a_room_with_wrong_properties_is_one_clear_line(tmp_path: Path, wrong: dict[str, Any]) -> None:
+    path = collection(tmp_path / "r", multi("Polygon", [[[0, 0], [1, 0], [1, 1], [0, 0]]], **wrong))
+    with pytest.raises(InvalidInputError, match="room 0"):
+        read_rooms(path)

@@ -46,11 +46,15 @@ def test_proposes_the_door_that_predict_then_reads(map_yaml: Path) -> None:
     assert room["properties"]["doors"] == ["d00"]
 
 
-def test_the_same_map_gives_the_same_bytes_and_replaces_its_own_file(map_yaml: Path) -> None:
+def test_the_same_map_gives_the_same_bytes_and_replaces_a_file_only_when_told(map_yaml: Path) -> None:
     out, picture = map_yaml.parent / "proposed.geojson", map_yaml.parent / "doors.png"
     assert main(["doors", str(map_yaml), "--out", str(out), "--picture", str(picture)]) == 0
     first = out.read_bytes()
-    assert main(["doors", str(map_yaml), "--out", str(out)]) == 0
+    assert main(["doors", str(map_yaml), "--out", str(out)]) == 1
+    other = map_yaml.parent / "other.geojson"
+    assert main(["doors", str(map_yaml), "--out", str(other), "--picture", str(picture)]) == 1
+    assert not other.exists()
+    assert main(["doors", str(map_yaml), "--out", str(out), "--force"]) == 0
     assert out.read_bytes() == first
     assert picture.read_bytes().startswith(b"\x89PNG")
 
@@ -76,7 +80,7 @@ def test_doors_made_by_hand_are_not_replaced(map_yaml: Path, capsys: pytest.Capt
     out.write_text(json.dumps({"type": "FeatureCollection", "features": [door]}))
     before = out.read_text()
     assert main(["doors", str(map_yaml), "--out", str(out)]) == 1
-    assert "did not write" in one_line(capsys)
+    assert "--force" in one_line(capsys)
     assert out.read_text() == before
 
 

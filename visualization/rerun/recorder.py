@@ -13,6 +13,7 @@ import rerun as rr
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.names import markdown_text
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.core.scan import LaserScan
@@ -112,7 +113,7 @@ class Recorder:
         self._palette = colours.room_colours(closed)
         self._stream.at(0.0, Stage.BUILDING)
         doors, rooms = len(plan.doors), len(plan.rooms)
-        self._say("Building", f"{plan.name}: {rooms} rooms, {doors} doors, {len(closed)} of them closed")
+        self._say("Building", f"{markdown_text(plan.name)}: {rooms} rooms, {doors} doors, {len(closed)} of them closed")
         self._arrange(truth_bounds(plan, map_T_world))
         self._building = RecordedBuilding(self._stream, plan, map_T_world, closed)
         self._draw_robot("building/robot", colours.TRUTH)
@@ -222,7 +223,8 @@ class Recorder:
         if prediction.trace is not None:
             draw_trace(self._stream, prediction.trace, self._palette)
         self._stream.at(stage=Stage.ROOMS)
-        failed = "".join(f"\n- {door}: {why}" for door, why in prediction.failures.items())
+        failures = {markdown_text(door): markdown_text(why) for door, why in prediction.failures.items()}
+        failed = "".join(f"\n- {door}: {why}" for door, why in failures.items())
         self._say("Rooms", f"{len(prediction.rooms)} rooms predicted, {len(prediction.failures)} failed{failed}")
         draw_rooms(self._stream, "rooms/predicted", prediction.grid, prediction.rooms, self._palette)
         self.table(_rooms_table(prediction))
@@ -332,6 +334,7 @@ def _rooms_table(prediction: "Prediction") -> str:
         for room in prediction.rooms
     ]
     rows += [[door, f"not predicted: {why}", "", ""] for door, why in prediction.failures.items()]
+    rows = [[markdown_text(cell) for cell in row] for row in rows]
     head = [["doors", "room", "area", "search"], ["---"] * 4]
     return "\n".join(["# Prediction", "", *("| " + " | ".join(row) + " |" for row in [*head, *rows])])
 

@@ -11,7 +11,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import read_json
+from closedrooms.core.incoming import read_json
 from closedrooms.worlds.door_hinges import hung
 from closedrooms.worlds.formats.room_outlines import repaired
 from closedrooms.worlds.geometry import areal

@@ -1,7 +1,6 @@
 """Floor plans as JSON, the project's own format."""
 
 import json
-import math
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +8,10 @@ from shapely.geometry import Polygon
 
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import read_json, write_bytes
+from closedrooms.core.files import write_bytes
+from closedrooms.core.incoming import read_json
+from closedrooms.core.names import is_name, is_path
+from closedrooms.core.numbers import is_number, repr_of
 from closedrooms.worlds.plan import FloorPlan, Furniture, Opening, PlanDoor, PlanRoom, Wall
 from closedrooms.worlds.validation import validate
 
@@ -17,6 +19,8 @@ FORMAT, VERSION = "closedrooms-plan", 1
 WHAT = "a floor plan (JSON)"
 # A plan with more elements than this is refused before shapes are built.
 MAX_ELEMENTS = 100_000
+# Longest name of a plan [characters].
+MAX_NAME = 200
 
 
 def write_plan(path: str | Path, plan: FloorPlan) -> None:
@@ -101,7 +105,7 @@ def plan_from(data: Any, path: Path) -> FloorPlan:
         raise InvalidInputError(f"a plan in {data['units']!r}", expected="metres ('m')", where=path)
     reader = _Reader(path)
     plan = FloorPlan(
-        name=str(data.get("name") or path.stem),
+        name=_plan_name(data.get("name") or path.stem, path),
         rooms=tuple(
             PlanRoom(reader.name(r), str(r.get("label", "room")), reader.polygon(r)) for r in reader.rows(data, "rooms")
         ),
@@ -118,6 +122,17 @@ def plan_from(data: Any, path: Path) -> FloorPlan:
     )
     validate(plan, str(path))
     return plan
+
+
+def _plan_name(value: Any, path: Path) -> str:
+    """The name of a plan; files and folders are named after it."""
+    if not is_name(value, longest=MAX_NAME) or is_path(value):
+        raise InvalidInputError(
+            f"a plan named {repr_of(value)}",
+            expected=f"a name of at most {MAX_NAME} letters, no path",
+            where=path,
+        )
+    return value
 
 
 class _Reader:
@@ -141,40 +156,40 @@ class _Reader:
 
     def name(self, row: dict[str, Any]) -> str:
         value = row.get("id")
-        if not isinstance(value, str) or not value:
-            raise self._error(f"an element with the id {value!r}", "a text")
+        if not is_name(value):
+            raise self._error(f"an element with the id {repr_of(value)}", "a short text")
         self._element = f"{self._element.split(' ')[0]} {value}"
         return value
 
     def door(self, row: dict[str, Any]) -> PlanDoor:
         name = self.name(row)
         kind, hinge, into = row.get("kind", "hinged"), row.get("hinge", 0), row.get("opens_into")
-        if kind not in {"hinged", "double", "sliding"}:
-            raise self._error(f"kind {kind!r}", "hinged, double or sliding")
+        if kind not in ("hinged", "double", "sliding"):
+            raise self._error(f"kind {repr_of(kind)}", "hinged, double or sliding")
         if hinge not in (0, 1) or isinstance(hinge, bool):
-            raise self._error(f"hinge {hinge!r}", "0 or 1, an end of the segment")
+            raise self._error(f"hinge {repr_of(hinge)}", "0 or 1, an end of the segment")
         if into is not None and not isinstance(into, str):
-            raise self._error(f"opens_into {into!r}", "a room id or null")
+            raise self._error(f"opens_into {repr_of(into)}", "a room id or null")
         return PlanDoor(name, self.segment(row), self.sides(row), kind, hinge, into)
 
     def sides(self, row: dict[str, Any]) -> tuple[str | None, str | None]:
         value = row.get("rooms")
         if not isinstance(value, list) or len(value) != 2 or not all(v is None or isinstance(v, str) for v in value):
-            raise self._error(f"rooms {value!r}", "two room ids (null is outside)")
+            raise self._error(f"rooms {repr_of(value)}", "two room ids (null is outside)")
         return (value[0], value[1])
 
     def number(self, row: dict[str, Any], key: str) -> float:
         value = row.get(key)
-        if not _is_number(value):
-            raise self._error(f"{key} {value!r}", "a number in metres")
-        return float(value)  # type: ignore[arg-type]
+        if not is_number(value):
+            raise self._error(f"{key} {repr_of(value)}", "a number in metres")
+        return float(value)
 
     def start(self, value: Any) -> tuple[float, float, float] | None:
         self._element = "start"
         if value is None:
             return None
-        if not isinstance(value, list) or len(value) != 3 or not all(map(_is_number, value)):
-            raise self._error(f"{value!r}", "[x, y, heading] in metres and radians")
+        if not isinstance(value, list) or len(value) != 3 or not all(map(is_number, value)):
+            raise self._error(f"{repr_of(value)}", "[x, y, heading] in metres and radians")
         return (float(value[0]), float(value[1]), float(value[2]))
 
     def segment(self, row: dict[str, Any]) -> Segment:
@@ -195,14 +210,10 @@ class _Reader:
             raise self._error(f"no {key}", "a list of points [x, y]")
         points = []
         for point in value:
-            if not isinstance(point, list) or len(point) != 2 or not all(map(_is_number, point)):
-                raise self._error(f"{key} point {point!r}", "[x, y] in metres")
+            if not isinstance(point, list) or len(point) != 2 or not all(map(is_number, point)):
+                raise self._error(f"{key} point {repr_of(point)}", "[x, y] in metres")
             points.append((float(point[0]), float(point[1])))
         return points
 
     def _error(self, what: str, expected: str) -> InvalidInputError:
         return InvalidInputError(f"{self._element}: {what}", expected=expected, where=self._path)
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

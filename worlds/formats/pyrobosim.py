@@ -12,8 +12,8 @@ from shapely.geometry import LineString, Polygon
 
 from closedrooms.core.door import Point
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.yaml_text import parse_yaml
 from closedrooms.worlds.formats.portals import Portal, plan_of_portals
-from closedrooms.worlds.formats.yaml_text import parse_yaml
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
 from closedrooms.worlds.validation import validate

@@ -15,8 +15,8 @@ from shapely.strtree import STRtree
 
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.yaml_text import parse_yaml
 from closedrooms.worlds.door_hinges import hung
-from closedrooms.worlds.formats.yaml_text import parse_yaml
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import DoorKind, FloorPlan, PlanDoor, PlanRoom, Wall
 from closedrooms.worlds.validation import validate

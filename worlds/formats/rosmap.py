@@ -15,7 +15,8 @@ from closedrooms.core.door import ClosedDoor, Point, Segment
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.geojson import read_doors
 from closedrooms.core.grid import GridFrame, OccupancyGrid
-from closedrooms.core.rosmap import read_map
+from closedrooms.core.incoming import is_file
+from closedrooms.core.rosmap import RosMap, read_bare_picture, read_ros_map
 from closedrooms.worlds.door_hinges import hung
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom, Wall
 from closedrooms.worlds.validation import validate
@@ -39,7 +40,7 @@ MAX_CELLS = 60_000_000
 def read_raster(path: str | Path, doors_path: Path | None = None) -> FloorPlan:
     """Read a map as a plan in the map's own frame; what was guessed stands in ``meta["repairs"]``.
 
-    Rooms are the connected free areas once all doors are shut.
+    Rooms are the connected free areas once all doors are shut. Of a map with a yaw, the plan keeps the picture's axes.
 
     Args:
         path: The YAML of a ROS map, or a picture: with a YAML of its name beside it, else at 0.05 m a pixel.
@@ -50,14 +51,19 @@ def read_raster(path: str | Path, doors_path: Path | None = None) -> FloorPlan:
         InvalidInputError: A broken map or list, no free area, a door that does not stand between free areas.
     """
     path = Path(path)
-    grid = _grid(path)
+    read = _map(path)
+    grid = read.grid
     if grid.frame.rows * grid.frame.cols > MAX_CELLS:
         raise InvalidInputError(
             f"a map of {grid.frame.rows} x {grid.frame.cols} cells", expected=f"at most {MAX_CELLS}", where=path
         )
     listed = _doors_beside(path) if doors_path is None else doors_path
-    given = read_doors(listed) if listed is not None else []
+    remarks = list(read.remarks)
+    given = read.doors_on_grid(read_doors(listed, remarks=remarks)) if listed is not None else []
     repairs: list[str] = [] if listed is not None else ["no list of doors beside the map: a plan without doors"]
+    repairs += [str(remark) for remark in remarks]
+    if read.turned:
+        repairs.append("the plan keeps the axes of the picture, the map's origin has a yaw")
     segments = [_segment(door, grid) for door in given]
     rooms, labels = _rooms(grid, segments, repairs)
     if not rooms:
@@ -83,38 +89,20 @@ def read_raster(path: str | Path, doors_path: Path | None = None) -> FloorPlan:
     return plan
 
 
-def _grid(path: Path) -> OccupancyGrid:
+def _map(path: Path) -> RosMap:
+    """A map by its YAML, or a picture: with the YAML of its name beside it, else alone."""
     if path.suffix.lower() in {".yaml", ".yml"}:
-        return read_map(path)
+        return read_ros_map(path)
     for suffix in (".yaml", ".yml"):
         beside = path.with_suffix(suffix)
-        if beside.exists():
-            return read_map(beside)
-    return _picture(path)
-
-
-def _picture(path: Path) -> OccupancyGrid:
-    """A picture alone: dark is wall, bright is free, grey is unknown, 0.05 m a pixel from its lower left corner."""
-    import tempfile
-
-    import yaml
-
-    fields = {
-        "image": str(path.resolve()), "resolution": RESOLUTION, "origin": [0.0, 0.0, 0.0],
-        "occupied_thresh": 0.65, "free_thresh": 0.196, "negate": 0,
-    }  # fmt: skip
-    with tempfile.TemporaryDirectory() as folder:
-        description = Path(folder) / "map.yaml"
-        description.write_text(yaml.safe_dump(fields))
-        try:
-            return read_map(description)
-        except InvalidInputError as error:
-            raise InvalidInputError(str(error).split(";")[0], expected="a picture of a map", where=path) from error
+        if is_file(beside):
+            return read_ros_map(beside)
+    return RosMap(read_bare_picture(path, resolution=RESOLUTION))
 
 
 def _doors_beside(path: Path) -> Path | None:
     options = (path.with_name(f"{path.stem}.doors.geojson"), path.with_name("doors.geojson"))
-    return next((option for option in options if option.exists()), None)
+    return next((option for option in options if is_file(option)), None)
 
 
 def _segment(door: ClosedDoor, grid: OccupancyGrid) -> Segment:

@@ -1,0 +1,205 @@
+"""Bad input over all formats and commands: one line of ours or a result, in bounded time, and nothing left behind.
+
+Any exception that is not ours fails. ``cases.py`` beside this runs folders of such cases as processes.
+"""
+
+import importlib.util
+import json
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from closedrooms.cli.commands import main
+from closedrooms.core.errors import ClosedroomsError
+
+
+def _beside(name: str) -> ModuleType:
+    """A module of this folder: test folders are no packages."""
+    spec = importlib.util.spec_from_file_location(f"hostile_{name}", Path(__file__).with_name(f"{name}.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+inputs = _beside("inputs")
+FORMATS, MUTATIONS = inputs.FORMATS, inputs.MUTATIONS
+# In no format can these be read.
+REFUSED = {*inputs.PLACES, "empty", "zeros", "brackets", "tags"}
+# Every single answer comes within this time on a busy machine [s].
+PATIENCE = 20
+
+
+@contextmanager
+def patience() -> Iterator[None]:
+    def stop(*_: object) -> None:
+        # Not an error that a reader would turn into one of ours.
+        pytest.fail(f"no answer in {PATIENCE} s")
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.alarm(PATIENCE)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def refusal(kind: str, path: Path) -> str:
+    """What the reader of a format says of a file; empty when it reads it. Another exception fails the test."""
+    said = ""
+    with patience():
+        try:
+            FORMATS[kind].read(path)
+        except ClosedroomsError as error:
+            said = str(error)
+    assert not said or said.isprintable()
+    assert len(said) < 3000
+    return said
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_the_honest_file_is_read(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / FORMATS[kind].name
+    (tmp_path / "map.png").write_bytes(inputs.picture())
+    path.write_bytes(FORMATS[kind].content)
+    assert refusal(kind, path) == ""
+
+
+@pytest.mark.parametrize("mutation", MUTATIONS)
+@pytest.mark.parametrize("kind", FORMATS)
+def test_a_spoilt_file_is_read_or_refused_in_one_line(tmp_path: Path, kind: str, mutation: str) -> None:
+    path = tmp_path / FORMATS[kind].name
+    if kind == "map":
+        (tmp_path / "map.png").write_bytes(inputs.picture())
+    inputs.spoil(path, FORMATS[kind].content, mutation)
+    said = refusal(kind, path)
+    if mutation in REFUSED and (kind, mutation) != ("trajectory", "empty"):
+        assert path.name in said
+
+
+@pytest.mark.parametrize("kind", [kind for kind in FORMATS if FORMATS[kind].tree])
+def test_every_value_may_be_anything(tmp_path: Path, kind: str) -> None:
+    parse, write = FORMATS[kind].tree
+    path = tmp_path / FORMATS[kind].name
+    (tmp_path / "map.png").write_bytes(inputs.picture())
+    refused = 0
+    for place, value in inputs.spoilt_values(parse(FORMATS[kind].content)):
+        path.write_bytes(write(value))
+        try:
+            refused += bool(refusal(kind, path))
+        except Exception as error:
+            raise AssertionError(f"{place}: {type(error).__name__}: {error}") from error
+    assert refused > 0
+
+
+COMMANDS = {
+    "predict": ("map", ["predict", "map.yaml", "--doors", "doors.geojson", "--out", "out"]),
+    "predict-doors": ("doors", ["predict", "map.yaml", "--doors", "doors.geojson", "--out", "out"]),
+    "predict-picture": ("picture", ["predict", "map.yaml", "--doors", "doors.geojson", "--out", "out"]),
+    "cover": ("map", ["cover", "map.yaml", "--out", "out"]),
+    "doors": ("map", ["doors", "map.yaml", "--out", "out.geojson", "--picture", "out.png"]),
+    "map": ("scans", ["map", "scans.npz", "--no-record", "--out", "out"]),
+    "map-log": ("carmen-gz", ["map", "c.log.gz", "--no-record", "--out", "out"]),
+    "show": ("plan", ["worlds", "show", "plan.json", "--out", "out.png"]),
+    "convert-json": ("rmf", ["worlds", "convert", "b.yaml", "out.json", "--to", "json", "--level", "L1"]),
+    "convert-sdf": ("plan", ["worlds", "convert", "plan.json", "out.sdf", "--to", "sdf"]),
+    "convert-stage": ("pyrobosim", ["worlds", "convert", "w.yaml", "out.world", "--to", "stage"]),
+    "convert-rosmap": ("kth", ["worlds", "convert", "k.xml", "out", "--to", "rosmap"]),
+}
+# The readers have seen every mutation above; the commands see one of each kind of failure.
+SEEN = ("missing", "half", "noise", "huge-numbers", "brackets", "aliases", "fifo", "dangling", "exponents")
+
+
+def answer(
+    command: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> tuple[int, list[str], set[str]]:
+    """Exit status, lines of complaint and what is new in the folder; files that were there are unchanged."""
+    monkeypatch.chdir(folder)
+    before = {path: path.lstat() for path in folder.rglob("*")}
+    with patience():
+        status = main(COMMANDS[command][1])
+    said = capfd.readouterr()
+    for text in (said.out, said.err):
+        assert "\x1b" not in text
+        assert "Traceback" not in text
+    after = {path: path.lstat() for path in folder.rglob("*")}
+    for path, stat in before.items():
+        assert (after[path].st_mtime_ns, after[path].st_ino) == (stat.st_mtime_ns, stat.st_ino)
+    complaints = [line for line in said.err.splitlines() if not line.endswith(" ...")]
+    return status, complaints, {path.name for path in after.keys() - before.keys() if path.parent == folder}
+
+
+def honest(folder: Path) -> None:
+    for other in FORMATS.values():
+        (folder / other.name).write_bytes(other.content)
+
+
+@pytest.mark.parametrize("mutation", SEEN)
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_on_a_spoilt_file_says_one_line_and_leaves_nothing(
+    tmp_path: Path, command: str, mutation: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    honest(tmp_path)
+    kind = COMMANDS[command][0]
+    path = tmp_path / FORMATS[kind].name
+    path.unlink()
+    inputs.spoil(path, FORMATS[kind].content, mutation)
+    status, complaints, new = answer(command, tmp_path, monkeypatch, capfd)
+    assert status in {0, 1, 3}
+    assert len(complaints) <= 3
+    if status == 1:
+        assert new == set()
+        assert any(path.name in line for line in complaints)
+
+
+NAMES = [
+    "\x1b[2J\x1b[31mowned",
+    "$x_{$",
+    "[red]x[/red]",
+    "../../../x",
+    "<script>",
+    "|a|`b`",
+    "a\u202eb",
+    "x" * 900,
+    '"\\',
+]
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("command", ["predict", "show", "convert-sdf", "convert-rosmap-plan", "convert-stage-plan"])
+def test_names_reach_no_terminal_picture_or_file_raw(
+    tmp_path: Path, command: str, name: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    honest(tmp_path)
+    doors = json.loads(FORMATS["doors"].content)
+    doors["features"] = doors["features"][:1]
+    doors["features"][0]["properties"]["id"] = name
+    (tmp_path / "doors.geojson").write_text(json.dumps(doors))
+    plan = json.loads(FORMATS["plan"].content)
+    plan["rooms"][0]["label"] = plan["doors"][0]["id"] = plan["furniture"][0]["id"] = name
+    (tmp_path / "plan.json").write_text(json.dumps(plan))
+    monkeypatch.setitem(
+        COMMANDS, "convert-rosmap-plan", ("plan", ["worlds", "convert", "plan.json", "out", "--to", "rosmap"])
+    )
+    monkeypatch.setitem(
+        COMMANDS, "convert-stage-plan", ("plan", ["worlds", "convert", "plan.json", "out.world", "--to", "stage"])
+    )
+    status, complaints, new = answer(command, tmp_path, monkeypatch, capfd)
+    assert status in {0, 3}, complaints
+    assert all(path.startswith("out") for path in new)
+    if command == "convert-sdf":
+        from xml.dom import minidom
+
+        minidom.parse(str(tmp_path / "out.sdf"))
+    if command == "convert-stage-plan":
+        text = (tmp_path / "out.world").read_text()
+        assert all(line.count('"') % 2 == 0 for line in text.splitlines())
+        assert text.replace("\n", "").isprintable()
