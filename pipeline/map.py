@@ -3,16 +3,18 @@
 import contextlib
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from closedrooms.core.files import check_output_folder, output_folder
 from closedrooms.core.geojson import write_doors
 from closedrooms.core.pose import Pose2
+from closedrooms.core.remarks import Remark, remark_rows
 from closedrooms.core.rosmap import write_map
 from closedrooms.core.tum import write_trajectory
-from closedrooms.mapping.logs.recorded_run import RecordedRun, read_run
+from closedrooms.mapping.logs import RecordedRun, read_run
+from closedrooms.mapping.logs.clocks import find_gaps
 from closedrooms.mapping.map_builder import BuiltMap, build_map
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import align
@@ -32,20 +34,29 @@ class MapResult:
         folder: What was written.
         title: Head of the table.
         built: Map, trajectory, loops and errors.
-        skipped: Lines and scans that were left out or mended, counted by reason.
-        failures: Always empty: a log is mapped or refused.
+        remarks: What was dropped, repaired or guessed.
     """
 
     folder: Path
     title: str
     built: BuiltMap
-    skipped: dict[str, int]
-    failures: dict[str, str] = field(default_factory=dict)
+    remarks: tuple[Remark, ...]
+
+    @property
+    def failures(self) -> dict[str, str]:
+        """What is missing from the map that the log should have given."""
+        return {remark.what: str(remark) for remark in self.remarks if remark.loss}
 
     def table(self) -> list[tuple[str, str]]:
         """Rows for people; the first is the head."""
         built = self.built
-        names = {"odometry": "raw odometry", "online": "as estimated on the way", "final": "final"}
+        names = {
+            "odometry": "raw odometry",
+            "scans_alone": "scans alone",
+            "online": "as estimated on the way",
+            "final": "final",
+        }
+        gaps = find_gaps(built.stamps)
         return [
             ("figure", "value"),
             ("scans", f"{len(built.stamps)}"),
@@ -60,7 +71,8 @@ class MapResult:
                 for name, text in names.items()
                 if name in built.errors
             ],
-            *[(f"left out: {reason}", f"{count}") for reason, count in self.skipped.items()],
+            *([("gaps between scans", f"{len(gaps)}, up to {gaps[:, 1].max():.1f} s")] if len(gaps) else []),
+            *remark_rows(self.remarks),
         ]
 
 
@@ -79,7 +91,13 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> MapResult
     check_output_folder(config.out)
     with watch.stage("read"):
         progress.stage("read")
-        run = read_run(config.log, scan_topic=config.scan_topic, odometry_topic=config.odometry_topic)
+        run = read_run(
+            config.log,
+            scan_topic=config.scan_topic,
+            odometry_topic=config.odometry_topic,
+            mount=config.mount,
+            upside_down=config.upside_down,
+        )
     manifest: dict[str, Any] = {
         "configuration": resolved(config, leave_out=("log", "out")),
         "paths": {"log": str(config.log)},
@@ -103,19 +121,31 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> MapResult
         with watch.stage("write"):
             progress.stage("write")
             _write(folder, run, built)
-        manifest["metrics"] = _metrics(run, built)
+        remarks = _remarks(run, built)
+        manifest["metrics"] = _metrics(built)
+        manifest["remarks"] = [remark.as_json() for remark in remarks]
         manifest["durations"] = watch.seconds() | {"mapping alone": round(built.seconds, 3)}
-    return MapResult(config.out, f"{config.log.name}: {len(built.stamps)} scans", built, run.skipped)
+    return MapResult(config.out, f"{config.log.name}: {len(built.stamps)} scans", built, remarks)
 
 
-def _metrics(run: RecordedRun, built: BuiltMap) -> dict[str, Any]:
+def _remarks(run: RecordedRun, built: BuiltMap) -> tuple[Remark, ...]:
+    """What happened on reading and for want of odometry."""
+    if not built.lost:
+        return run.remarks
+    why = "they fit nowhere, and there is no odometry to go on; taken to go on as before"
+    lost = Remark(action="guessed", what="scans' poses", why=why, count=built.lost, loss=True)
+    return (*run.remarks, lost)
+
+
+def _metrics(built: BuiltMap) -> dict[str, Any]:
     errors = {name: {"ate_m": round(m, 5), "ate_rad": round(rad, 6)} for name, (m, rad) in built.errors.items()}
     return {
         "scans": len(built.stamps),
         "keyframes": built.keyframes,
         "loops": len(built.loops),
         "errors": errors,
-        "skipped": run.skipped,
+        "scans_lost": built.lost,
+        "gaps": [{"stamp": round(at, 3), "seconds": round(length, 3)} for at, length in find_gaps(built.stamps)],
     }
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
-from closedrooms.mapping.logs.recorded_run import read_run
+from closedrooms.mapping.logs import RecordedRun, read_run
 from closedrooms.mapping.map_builder import build_map
 
 SHARED = Path(__file__).parents[3].parent / "shared" / "data" / "logs"
@@ -21,6 +21,10 @@ def flaser(x: float, y: float = 0.0, theta: float = 0.0, *, stamp: float = 1.0, 
 
 def odom(x: float, y: float = 0.0, theta: float = 0.0, *, clock: float = 1.0) -> str:
     return f"ODOM {x} {y} {theta} 0 0 0 {clock} host {clock}"
+
+
+def told(run: RecordedRun) -> list[tuple[str, str, int]]:
+    return [(remark.action, remark.what, remark.count) for remark in run.remarks]
 
 
 def write(folder: Path, *lines: str, name: str = "run.log") -> Path:
@@ -38,7 +42,7 @@ def test_a_log_as_recorded_takes_the_odometry_of_its_scans(tmp_path: Path) -> No
     assert scan.angle_min == pytest.approx(-math.pi / 2)
     assert scan.angle_increment == pytest.approx(math.pi / 180)
     assert scan.stamp == pytest.approx(1.5)
-    assert run.skipped == {}
+    assert run.remarks == ()
 
 
 def test_corrected_poses_written_as_odometry_do_not_leak_into_it(tmp_path: Path) -> None:
@@ -62,7 +66,7 @@ def test_scans_before_the_first_odometry_of_a_corrected_log_are_skipped(tmp_path
     lines = [flaser(0.0), odom(0.0), flaser(5.0), odom(1.0), flaser(9.0)]
     run = read_run(write(tmp_path, *lines))
     assert len(run.scans) == 2
-    assert run.skipped["scans without odometry"] == 1
+    assert told(run) == [("dropped", "scans", 1)]
     assert run.odometry[:, 0] == pytest.approx([0.0, 1.0])
 
 
@@ -70,7 +74,8 @@ def test_malformed_lines_are_skipped_and_counted(tmp_path: Path) -> None:
     bad = ["FLASER 180 1 2 3", "FLASER x", "ODOM 1 2", "ODOM a b c 0 0 0 1 h 1", "FLASER 99999999 1", flaser(math.nan)]
     run = read_run(write(tmp_path, odom(0.0), flaser(0.0), *bad, "", "PARAM broken", flaser(0.3, stamp=2.0)))
     assert len(run.scans) == 2
-    assert run.skipped["malformed lines"] == len(bad)
+    assert told(run) == [("dropped", "FLASER lines", 4), ("dropped", "ODOM lines", 2)]
+    assert all(remark.loss for remark in run.remarks)
 
 
 def test_a_clock_that_runs_backwards_stands_still_instead(tmp_path: Path) -> None:
@@ -80,7 +85,7 @@ def test_a_clock_that_runs_backwards_stands_still_instead(tmp_path: Path) -> Non
         )
     )
     assert [s.stamp for s in run.scans] == pytest.approx([10.0, 11.0, 11.0, 12.0])
-    assert run.skipped["stamps running backwards"] == 1
+    assert told(run) == [("repaired", "stamps", 1)]
 
 
 def test_a_truncated_archive_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
@@ -91,7 +96,7 @@ def test_a_truncated_archive_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
     path.write_bytes(packed[: len(packed) // 2])
     run = read_run(path)
     assert 50 < len(run.scans) < 150
-    assert run.skipped["truncated archives"] == 1
+    assert ("dropped", "end of the log", 1) in told(run)
 
 
 def test_the_largest_range_is_no_return_when_it_repeats(tmp_path: Path) -> None:

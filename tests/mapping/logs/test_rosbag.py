@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.mapping.logs.recorded_run import read_run
+from closedrooms.mapping.logs import read_run
 
 rosbags = pytest.importorskip("rosbags", reason="the optional extra 'bags' is not installed")
 
@@ -75,7 +75,8 @@ def test_scans_take_the_odometry_of_their_time_and_their_mount(tmp_path: Path, s
     assert run.odometry == pytest.approx(np.array([[1.5, 0, 0.15], [2, 0, 0.2], [3.25, 0, 0.325]]))
     assert run.scans[0].robot_T_sensor == pytest.approx((0.3, 0.0, 0.0))
     assert run.scans[0].range_max == pytest.approx(10.0)
-    assert run.skipped == {"scans without odometry": 1}
+    (remark,) = run.remarks
+    assert (remark.action, remark.what, remark.count) == ("dropped", "scans", 1)
 
 
 def test_a_bare_mcap_file_is_read_by_its_content(tmp_path: Path) -> None:
