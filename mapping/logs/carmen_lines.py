@@ -216,9 +216,7 @@ def _even_step(view: float, beams: int, *, hint: float = 0.0) -> float:
         beams: Number of ranges.
         hint: The number of steps, where a header says it.
     """
-    gaps = beams - 1 if beams % 2 else beams
-    if hint in {float(beams), float(beams - 1)}:
-        gaps = int(hint)
+    gaps = beams - 1 if beams % 2 or hint == beams - 1 else beams
     return view / max(gaps, 1)
 
 

@@ -1,7 +1,7 @@
 """Read a recorded run of any supported kind, told apart by its content."""
 
 import re
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +58,7 @@ def _read(path: Path, options: BagOptions) -> RecordedRun:
         from closedrooms.mapping.logs.rosbag import read_bag
 
         return read_bag(path, options)
+    _refuse_options(options, path)
     if head.startswith(ZIP):
         from closedrooms.mapping.logs.npz import read_scans
 
@@ -67,6 +68,13 @@ def _read(path: Path, options: BagOptions) -> RecordedRun:
     from closedrooms.mapping.logs.carmen import read_carmen
 
     return _bridged(read_carmen(path, gzipped=head.startswith(GZIP)))
+
+
+def _refuse_options(options: BagOptions, path: Path) -> None:
+    """Options that only a bag reads must not go unheard."""
+    given = [f.name.replace("_", "-") for f in fields(options) if getattr(options, f.name) not in {None, False}]
+    if given:
+        raise InvalidInputError(f"--{', --'.join(given)} for a log that is no bag", expected="a rosbag", where=path)
 
 
 def _bag_file(path: Path) -> Path:
