@@ -1,8 +1,10 @@
 """Recorded runs in rosbag 1, rosbag 2 and MCAP files, through the optional ``rosbags``."""
 
+import contextlib
 import math
+import tempfile
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,18 +13,20 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.pose import Pose2, wrap_angle
+from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.logs.bag_options import BagOptions
+from closedrooms.mapping.logs.bag_scans import ECHOES, SCAN, ranges_of, scan_of
 from closedrooms.mapping.logs.clocks import Times, forward, scan_and_odometry_times
 from closedrooms.mapping.logs.odometry import bridge_jumps, jump_remarks, odometry_at
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.mapping.logs.transform_tree import Mount, TransformTree, clean_name, transform_matrix
 
-SCAN, ECHOES = "sensor_msgs/msg/LaserScan", "sensor_msgs/msg/MultiEchoLaserScan"
 ODOMETRY = "nav_msgs/msg/Odometry"
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+SUFFIXES = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite": ".db3"}
+"""What the files of a bag begin with, and how their names should end."""
 MAX_SCANS = 2_000_000
 
 
@@ -70,7 +74,7 @@ def read_bag(path: Path, options: BagOptions) -> RecordedRun:
         ) from error
     try:
         # Bags of ROS 2 before Iron do not carry the definitions of their messages.
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        with _named(path) as named, AnyReader([named], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             wanted, remarks = _chosen(reader.connections, options)
             messages = _read(reader, wanted)
         return _resolved(messages, options, remarks)
@@ -78,6 +82,23 @@ def read_bag(path: Path, options: BagOptions) -> RecordedRun:
         raise InvalidInputError(str(error), where=path) from error
     except Exception as error:  # rosbags raises many kinds for broken files, none with a common base
         raise InvalidInputError(f"a bag that cannot be read ({error})", expected="a rosbag", where=path) from error
+
+
+@contextlib.contextmanager
+def _named(path: Path) -> Iterator[Path]:
+    """The bag under a name that ends as rosbags expects it: it tells the kinds by their names."""
+    suffix = path.suffix
+    if path.is_file():
+        with path.open("rb") as file:
+            start = file.read(8)
+        suffix = next((suffix for magic, suffix in SUFFIXES.items() if start.startswith(magic)), suffix)
+    if suffix == path.suffix:
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        named = Path(folder) / f"bag{suffix}"
+        named.symlink_to(path.absolute())
+        yield named
 
 
 def _chosen(connections: Iterable[Any], options: BagOptions) -> tuple[list[Any], list[Remark]]:
@@ -211,8 +232,8 @@ def _run(
     for row, i in enumerate(np.flatnonzero(known).tolist()):
         message = messages.scans[i][0]
         try:
-            ranges, dropped = _ranges(message)
-            scan = _scan(message, ranges, mounts[clean_name(message.header.frame_id)])
+            ranges, dropped = ranges_of(message)
+            scan = scan_of(message, ranges, mounts[clean_name(message.header.frame_id)])
         except InvalidInputError:
             broken += 1
             continue
@@ -288,38 +309,3 @@ def _mounts(
             why = f"{frame} is not among the transforms; taken to be {found}"
             remarks.append(Remark(action="guessed", what="frame", why=why))
     return {frame: tree.mount(base or "", frame) for frame in frames}, remarks
-
-
-def _ranges(message: Any) -> tuple[FloatArray, int]:
-    """Ranges of one sweep, the first echo of each beam, and how many others there were."""
-    if message.__msgtype__ == SCAN:
-        return np.array(message.ranges, dtype=np.float64), 0
-    beams = [np.asarray(beam.echoes, dtype=np.float64) for beam in message.ranges]
-    first = [_first_echo(echoes, max(float(message.range_min), 0.0)) for echoes in beams]
-    return np.array(first, dtype=np.float64), sum(max(echoes.size - 1, 0) for echoes in beams)
-
-
-def _first_echo(echoes: FloatArray, shortest: float) -> float:
-    """The nearest that the sensor can measure; a beam without any says nothing (dust on the cover is nearer)."""
-    measured = echoes[np.isfinite(echoes) & (echoes >= shortest)]
-    if measured.size:
-        return float(measured.min())
-    return math.inf if (echoes == math.inf).any() else math.nan
-
-
-def _scan(message: Any, ranges: FloatArray, mount: Mount) -> LaserScan:
-    start, step = float(message.angle_min), float(message.angle_increment)
-    longest, shortest = float(message.range_max), max(float(message.range_min), 0.0)
-    if not (math.isfinite(start) and math.isfinite(step) and step != 0.0 and ranges.size):
-        raise InvalidInputError("a scan without angles", expected="finite angles")
-    if mount.upside_down:
-        start, step = -start, -step
-    if step < 0.0:
-        start, step, ranges = start + step * (ranges.size - 1), -step, ranges[::-1]
-    if abs(step * ranges.size - 2.0 * math.pi) < step / 2.0:
-        # All around, the sweep begins behind the robot: how the lidar is turned does not decide which beams are taken.
-        turned = round((wrap_angle(start + mount.pose.theta + math.pi + step / 2.0) - step / 2.0) / step)
-        start, ranges = wrap_angle(start - turned * step), np.roll(ranges, turned)
-    # Zero and what lies below range_min is no measurement (REP-117).
-    ranges = np.where(ranges < max(shortest, 1e-6), np.nan, ranges)
-    return LaserScan(ranges, start, step, longest, shortest, robot_T_sensor=mount.pose.as_tuple())

@@ -53,6 +53,12 @@ def test_a_bare_file_is_read_by_its_content_and_so_is_a_folder_without_metadata(
     assert len(read_run(folder).scans) == 11
 
 
+def test_a_bag_of_another_name_is_read_by_its_content(any_bag: Any, tmp_path: Path) -> None:
+    path = any_bag.drive().transform("base_link", "laser").write()
+    file = path if path.is_file() else next(entry for entry in path.iterdir() if entry.suffix != ".yaml")
+    assert len(read_run(file.rename(tmp_path / "drive.2026")).scans) == 11
+
+
 def test_several_scan_topics_have_to_be_named(new_bag: Bags) -> None:
     path = new_bag().drive().transform("base_link", "laser").scan(100.0, topic="/rear").write()
     with pytest.raises(InvalidInputError, match="/rear, /scan"):
