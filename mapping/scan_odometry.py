@@ -12,10 +12,17 @@ from closedrooms.mapping.correlative_matcher import Search, Window
 from closedrooms.mapping.gauss_newton_matcher import refine
 from closedrooms.mapping.likelihood_field import LikelihoodField
 
-SIGMAS = (0.15, 0.20)
-"""Standard deviations ([m], [rad]) of going on as before from one scan to the next: what acceleration leaves."""
-WINDOWS = (Window(0.30, 0.40), Window(0.90, math.pi))
-"""Searched one after the other until the scan fits: half a walking robot's second, then whatever can be found."""
+DISTANCE_RATE, ANGLE_RATE = 0.5, 0.3
+"""How fast ([m/s], [rad/s]) a robot strays from going on as before: half an indoor robot's speed."""
+LEAST_SIGMAS, MOST_SIGMAS = (0.15, 0.20), (1.5, 0.8)
+"""Bounds of the standard deviations ([m], [rad]) that follow: scans at 10 Hz, and scans a few seconds apart."""
+FADING = 0.7
+"""Share of the longest of the last steps that the next one may still take: many logs have a scan a metre."""
+WINDOW_SIGMAS = 2.0
+"""Half width of the first search in standard deviations."""
+MOST_DISTANCE, MOST_ANGLE = 1.2, 0.8
+"""Largest half width of the first search ([m], [rad]); where the scan does not fit there, all headings are searched."""
+FAR = Window(1.5, math.pi)
 FITS = 0.8
 """Share of the usual score from which a scan fits."""
 LEAST_SCORE = 0.25
@@ -42,7 +49,7 @@ class ScanOdometry:
         self._stale = 0
         self._pose, self._step = Pose2(), Pose2()
         self._stamp, self._duration = 0.0, 0.0
-        self._usual = 0.0
+        self._recent = self._usual = 0.0
         self.lost = 0
         """Scans that fitted nowhere."""
 
@@ -60,9 +67,11 @@ class ScanOdometry:
             self._stamp = stamp
             self._remember(points)
             return self._pose
-        guess = self._predicted(stamp - self._stamp)
-        pose = self._matched(points, guess)
-        self._step, self._duration = self._pose.inverse() @ pose, stamp - self._stamp
+        duration = stamp - self._stamp
+        unknown = max(duration, self._recent / DISTANCE_RATE)
+        pose = self._matched(points, self._predicted(duration), unknown)
+        self._step, self._duration = self._pose.inverse() @ pose, duration
+        self._recent = max(self._pose.distance(pose), FADING * self._recent)
         self._pose, self._stamp = pose, stamp
         latest = self._last[-1][0]
         if latest.distance(pose) > SPACING or abs(wrap_angle(latest.theta - pose.theta)) > TURN_SPACING:
@@ -74,14 +83,20 @@ class ScanOdometry:
         share = min(duration / self._duration, 1.0) if self._duration > 0.0 else 1.0
         return self._pose @ Pose2(*(share * value for value in self._step.as_tuple()))
 
-    def _matched(self, points: FloatArray, guess: Pose2) -> Pose2:
+    def _matched(self, points: FloatArray, guess: Pose2, duration: float) -> Pose2:
+        """The best pose around a guess that went on as before for ``duration`` [s]."""
         if len(points) < self._matcher.min_points:
             self.lost += 1
             return guess
+        distance, angle = (
+            min(max(rate * duration, least), most)
+            for rate, least, most in zip((DISTANCE_RATE, ANGLE_RATE), LEAST_SIGMAS, MOST_SIGMAS, strict=True)
+        )
+        near = Window(min(WINDOW_SIGMAS * distance, MOST_DISTANCE), min(WINDOW_SIGMAS * angle, MOST_ANGLE))
         best_score, best = 0.0, guess
-        for window in WINDOWS:
-            found = Search(self._field, points, guess, window, prior_sigmas=SIGMAS).best()
-            refined = self._refined(points, found.pose if found.score > 0.0 else guess)
+        for window in (near, FAR):
+            found = Search(self._field, points, guess, window, prior_sigmas=(distance, angle)).best()
+            refined = self._refined(points, found.pose if found.score > 0.0 else guess, distance, angle)
             if refined[0] > best_score:
                 best_score, best = refined
             if best_score >= FITS * self._usual:
@@ -92,9 +107,8 @@ class ScanOdometry:
         self._usual += MEMORY * (best_score - self._usual) if self._usual else best_score
         return best
 
-    def _refined(self, points: FloatArray, start: Pose2) -> tuple[float, Pose2]:
-        """Score and pose; along a featureless corridor the prediction decides."""
-        distance, angle = SIGMAS
+    def _refined(self, points: FloatArray, start: Pose2, distance: float, angle: float) -> tuple[float, Pose2]:
+        """Score and pose; along a featureless corridor the search, and with it the prediction, decides."""
         information = self._matcher.prior_weight * np.diag([distance**-2, distance**-2, angle**-2])
         match = refine(
             self._field,

@@ -1,6 +1,7 @@
 import gzip
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -359,3 +360,15 @@ def test_real_robots_are_mapped_within_the_required_error(name: str, limit: floa
     assert result.errors["final"][0] < limit
     assert result.errors["final"][1] < math.radians(1.0)
     assert result.errors["final"][0] < 0.1 * result.errors["odometry"][0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "limit"), [("freiburg-079", 0.15), ("aces", 0.3)])
+def test_real_robots_are_mapped_without_their_odometry(name: str, limit: float) -> None:
+    path = SHARED / f"{name}-corrected.log.gz"
+    if not path.exists():
+        pytest.skip(f"{path} is not there")
+    run = read_run(path)
+    result = build_map(replace(run, odometry=np.zeros_like(run.odometry), has_odometry=False))
+    assert result.errors["final"][0] < limit
+    assert result.lost == 0
