@@ -10,6 +10,7 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
+from closedrooms.core.remarks import Remark
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.mapping.mapper import Mapper
@@ -33,7 +34,7 @@ class BuiltMap:
         seconds: Wall-clock time of mapping alone [s].
         errors: ATE ``(m, rad)`` against the reference of ``odometry`` (``scans_alone``, where the run has none),
             ``online`` and ``final``; empty without one.
-        lost: Scans that could not be followed for want of odometry.
+        remarks: What was guessed on the way.
     """
 
     grid: OccupancyGrid
@@ -45,7 +46,7 @@ class BuiltMap:
     keyframes: int
     seconds: float
     errors: dict[str, tuple[float, float]]
-    lost: int = 0
+    remarks: tuple[Remark, ...] = ()
 
 
 def build_map(
@@ -102,5 +103,13 @@ def build_map(
         len(mapper.keyframes),
         seconds,
         errors,
-        0 if follower is None else follower.lost,
+        () if follower is None else _lost_remarks(follower.lost),
     )
+
+
+def _lost_remarks(count: int) -> tuple[Remark, ...]:
+    """Scans that a robot without odometry could not be followed by."""
+    if not count:
+        return ()
+    why = "they fit nowhere, and there is no odometry; taken to go on as before"
+    return (Remark(action="guessed", what="scans' poses", why=why, count=count, loss=True),)

@@ -121,20 +121,11 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> MapResult
         with watch.stage("write"):
             progress.stage("write")
             _write(folder, run, built)
-        remarks = _remarks(run, built)
+        remarks = (*run.remarks, *built.remarks)
         manifest["metrics"] = _metrics(built)
         manifest["remarks"] = [remark.as_json() for remark in remarks]
         manifest["durations"] = watch.seconds() | {"mapping alone": round(built.seconds, 3)}
     return MapResult(config.out, f"{config.log.name}: {len(built.stamps)} scans", built, remarks)
-
-
-def _remarks(run: RecordedRun, built: BuiltMap) -> tuple[Remark, ...]:
-    """What happened on reading and for want of odometry."""
-    if not built.lost:
-        return run.remarks
-    why = "they fit nowhere, and there is no odometry to go on; taken to go on as before"
-    lost = Remark(action="guessed", what="scans' poses", why=why, count=built.lost, loss=True)
-    return (*run.remarks, lost)
 
 
 def _metrics(built: BuiltMap) -> dict[str, Any]:
@@ -144,7 +135,6 @@ def _metrics(built: BuiltMap) -> dict[str, Any]:
         "keyframes": built.keyframes,
         "loops": len(built.loops),
         "errors": errors,
-        "scans_lost": built.lost,
         "gaps": [{"stamp": round(at, 3), "seconds": round(length, 3)} for at, length in find_gaps(built.stamps)],
     }
 

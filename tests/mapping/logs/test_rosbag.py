@@ -323,7 +323,7 @@ def right(i: int) -> float:
         (lambda i: 1.7e9 + 0.1 * i, right),
         (lambda i: 3700.0 + 0.1 * i, lambda i: 100.0 + 0.1 * i),
         (lambda i: 0.0 if i < 5 else right(i), right),
-        (lambda i: right(i) if i < 20 else right(i) - 50.0, right),
+        (lambda i: right(i) if i < 30 else right(i) - 50.0, right),
         (lambda i: 5.0 + 0.3 * i, right),
     ],
     ids=["zero scans", "zero odometry", "zero", "since boot", "unix", "an hour", "first zero", "restarted", "too fast"],
