@@ -20,8 +20,8 @@ import numpy as np
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
 from closedrooms.mapping.config import LoopConfig, MapperConfig
+from closedrooms.mapping.logs import RecordedRun, read_run
 from closedrooms.mapping.logs.npz import write_scans
-from closedrooms.mapping.logs.recorded_run import RecordedRun, read_run
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import ate
 from closedrooms.navigation.config import NavigationConfig

@@ -26,7 +26,7 @@ from closedrooms.mapping.config import LoopConfig, MapperConfig
 from closedrooms.mapping.gauss_newton_matcher import refine
 from closedrooms.mapping.likelihood_field import LikelihoodField
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
-from closedrooms.mapping.logs.recorded_run import RecordedRun, read_run
+from closedrooms.mapping.logs import RecordedRun, read_run
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.pose_graph import Edge, Solution, optimise
 from closedrooms.mapping.scan_preparation import sweeps

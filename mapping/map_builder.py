@@ -10,9 +10,11 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
+from closedrooms.core.remarks import Remark
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.mapping.mapper import Mapper
+from closedrooms.mapping.scan_odometry import ScanOdometry
 from closedrooms.mapping.scan_preparation import sweeps
 from closedrooms.mapping.trajectory import ate
 
@@ -30,7 +32,9 @@ class BuiltMap:
         loops: Positions of the two ends of each loop, shape (k, 2, 2) [m].
         keyframes: How many scans make the map.
         seconds: Wall-clock time of mapping alone [s].
-        errors: ATE ``(m, rad)`` against the reference of ``odometry``, ``online`` and ``final``; empty without one.
+        errors: ATE ``(m, rad)`` against the reference of ``odometry`` (``scans_alone``, where the run has none),
+            ``online`` and ``final``; empty without one.
+        remarks: What was guessed on the way.
     """
 
     grid: OccupancyGrid
@@ -42,6 +46,7 @@ class BuiltMap:
     keyframes: int
     seconds: float
     errors: dict[str, tuple[float, float]]
+    remarks: tuple[Remark, ...] = ()
 
 
 def build_map(
@@ -51,6 +56,8 @@ def build_map(
     watch: Callable[[int, Pose2, Mapper], None] | None = None,
 ) -> BuiltMap:
     """Map a recorded run, scan after scan, as if it happened now.
+
+    Where the run has no odometry, it is found by matching each scan with the last ones.
 
     Args:
         run: Scans with odometry; its reference is only compared with at the end.
@@ -64,9 +71,14 @@ def build_map(
     online = np.empty((len(run.scans), 3))
     seconds = 0.0
     made_ready = sweeps(run.scans, config)
-    for i, (scan, pose) in enumerate(zip(run.scans, run.odometry, strict=True)):
+    follower = None if run.has_odometry else ScanOdometry(config)
+    odometry = np.array(run.odometry)
+    for i, scan in enumerate(run.scans):
         start = time.perf_counter()
-        estimate = mapper.process(scan, Pose2(*pose), sweep=next(made_ready))
+        sweep = next(made_ready)
+        if follower is not None:
+            odometry[i] = follower.follow(sweep.points, scan.stamp).as_tuple()
+        estimate = mapper.process(scan, Pose2(*odometry[i]), sweep=sweep)
         seconds += time.perf_counter() - start
         online[i] = estimate.as_tuple()
         if watch is not None:
@@ -78,8 +90,26 @@ def build_map(
     stamps, trajectory = mapper.trajectory()
     errors = {}
     if run.reference is not None:
-        estimates = {"odometry": run.odometry, "online": online, "final": trajectory}
+        moved = "odometry" if run.has_odometry else "scans_alone"
+        estimates = {moved: odometry, "online": online, "final": trajectory}
         errors = {name: ate(poses, run.reference) for name, poses in estimates.items()}
     return BuiltMap(
-        grid, mapper.doors(), stamps, trajectory, online, mapper.loops, len(mapper.keyframes), seconds, errors
+        grid,
+        mapper.doors(),
+        stamps,
+        trajectory,
+        online,
+        mapper.loops,
+        len(mapper.keyframes),
+        seconds,
+        errors,
+        () if follower is None else _lost_remarks(follower.lost),
     )
+
+
+def _lost_remarks(count: int) -> tuple[Remark, ...]:
+    """Scans that a robot without odometry could not be followed by."""
+    if not count:
+        return ()
+    why = "they fit nowhere, and there is no odometry; taken to go on as before"
+    return (Remark(action="guessed", what="scans' poses", why=why, count=count, loss=True),)

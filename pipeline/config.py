@@ -167,7 +167,13 @@ class MapConfig:
     """Topic of the laser scans, where a bag holds several."""
 
     odometry_topic: str | None = None
-    """Topic of the odometry, where a bag holds several."""
+    """Topic of the odometry, where a bag holds several; or of the transforms that hold it."""
+
+    mount: tuple[float, float, float] | None = None
+    """Where the lidar sits on the robot: x, y [m] and yaw [rad]; of a bag, in place of its transforms."""
+
+    upside_down: bool = False
+    """The lidar hangs with its z axis down; of a bag, in place of its transforms."""
 
     mapper: MapperConfig = field(default_factory=MapperConfig)
     """The mapper."""

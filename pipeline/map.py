@@ -12,7 +12,8 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.report import Report
 from closedrooms.core.rosmap import write_map
 from closedrooms.core.tum import write_trajectory
-from closedrooms.mapping.logs.recorded_run import RecordedRun, read_run
+from closedrooms.mapping.logs import RecordedRun, read_run
+from closedrooms.mapping.logs.clocks import find_gaps
 from closedrooms.mapping.map_builder import BuiltMap, build_map
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import align
@@ -42,7 +43,13 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> Report:
     check_output_folder(config.out, "map")
     with watch.stage("read"):
         progress.stage("read")
-        run = read_run(config.log, scan_topic=config.scan_topic, odometry_topic=config.odometry_topic)
+        run = read_run(
+            config.log,
+            scan_topic=config.scan_topic,
+            odometry_topic=config.odometry_topic,
+            mount=config.mount,
+            upside_down=config.upside_down,
+        )
     manifest: dict[str, Any] = {
         "command": "map",
         "configuration": resolved(config, leave_out=("log", "out")),
@@ -67,24 +74,33 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> Report:
         with watch.stage("write"):
             progress.stage("write")
             _write(folder, run, built)
-        manifest["metrics"] = _metrics(run, built)
+        remarks = (*run.remarks, *built.remarks)
+        manifest["metrics"] = _metrics(built)
+        manifest["remarks"] = [remark.as_json() for remark in remarks]
         manifest["durations"] = watch.seconds() | {"mapping alone": round(built.seconds, 3)}
     return Report(
         folder=config.out,
         title=f"{config.log.name}: {len(built.stamps)} scans",
-        rows=_rows(run, built),
+        rows=_rows(built),
+        remarks=remarks,
         figures=manifest["metrics"],
     )
 
 
-def _rows(run: RecordedRun, built: BuiltMap) -> list[tuple[str, str]]:
+def _rows(built: BuiltMap) -> list[tuple[str, str]]:
     """The table for people."""
-    names = {"odometry": "raw odometry", "online": "as estimated on the way", "final": "final"}
+    names = {
+        "odometry": "raw odometry",
+        "scans_alone": "scans alone",
+        "online": "as estimated on the way",
+        "final": "final",
+    }
     errors = {
         text: f"{built.errors[name][0]:.3f} m, {math.degrees(built.errors[name][1]):.2f} deg"
         for name, text in names.items()
         if name in built.errors
     }
+    gaps = find_gaps(built.stamps)
     return [
         ("figure", "value"),
         ("scans", f"{len(built.stamps)}"),
@@ -92,18 +108,18 @@ def _rows(run: RecordedRun, built: BuiltMap) -> list[tuple[str, str]]:
         ("loops closed", f"{len(built.loops)}"),
         ("scans a second", f"{len(built.stamps) / max(built.seconds, 1e-9):.0f}"),
         *((f"error to the reference, {text}", error) for text, error in errors.items()),
-        *((f"left out: {reason}", f"{count}") for reason, count in run.skipped.items()),
+        *([("gaps between scans", f"{len(gaps)}, up to {gaps[:, 1].max():.1f} s")] if len(gaps) else []),
     ]
 
 
-def _metrics(run: RecordedRun, built: BuiltMap) -> dict[str, Any]:
+def _metrics(built: BuiltMap) -> dict[str, Any]:
     errors = {name: {"ate_m": round(m, 5), "ate_rad": round(rad, 6)} for name, (m, rad) in built.errors.items()}
     return {
         "scans": len(built.stamps),
         "keyframes": built.keyframes,
         "loops": len(built.loops),
         "errors": errors,
-        "skipped": run.skipped,
+        "gaps": [{"stamp": round(at, 3), "seconds": round(length, 3)} for at, length in find_gaps(built.stamps)],
     }
 
 

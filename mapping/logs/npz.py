@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 
 from closedrooms.core.archives import read_arrays
-from closedrooms.core.arrays import FloatArray
+from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import write_bytes
 from closedrooms.core.pose import Pose2
+from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.logs.recorded_run import RecordedRun, forward
+from closedrooms.mapping.logs.clocks import forward
+from closedrooms.mapping.logs.recorded_run import RecordedRun
 
 EXPECTED = "scans.npz with stamps, ranges, odometry, angle_min, angle_increment, range_max"
 TICKS = 1e-7
@@ -128,6 +130,12 @@ def _run(
         LaserScan(row, geometry[0], geometry[1], geometry[2], stamp=float(stamp), robot_T_sensor=mount)
         for row, stamp in zip(ranges, stamps, strict=True)
     )
-    skipped = {"scans without odometry": int((~usable).sum()), "stamps running backwards": backwards}
+    remarks = (*_unusable(~usable), *backwards)
     reference = None if reference is None else np.asarray(reference, dtype=np.float64)
-    return RecordedRun(scans, odometry, reference, {what: count for what, count in skipped.items() if count})
+    return RecordedRun(scans, odometry, reference, remarks)
+
+
+def _unusable(dropped: BoolArray) -> list[Remark]:
+    count = int(dropped.sum())
+    why = "a stamp or an odometry that is not finite"
+    return [Remark(action="dropped", what="scans", why=why, count=count, loss=True)] if count else []

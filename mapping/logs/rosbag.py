@@ -1,8 +1,10 @@
 """Recorded runs in rosbag 1, rosbag 2 and MCAP files, through the optional ``rosbags``."""
 
+import contextlib
 import math
+import tempfile
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,52 +13,58 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.incoming import check_regular, is_folder, reading
+from closedrooms.core.incoming import check_regular, is_file, is_folder, read_head, reading
 from closedrooms.core.pose import Pose2
+from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.logs.recorded_run import RecordedRun, forward
+from closedrooms.mapping.logs.bag_options import BagOptions
+from closedrooms.mapping.logs.bag_scans import ECHOES, SCAN, ranges_of, scan_of
+from closedrooms.mapping.logs.clocks import Times, forward, scan_and_odometry_times
+from closedrooms.mapping.logs.odometry import bridge_jumps, jump_remarks, odometry_at
+from closedrooms.mapping.logs.recorded_run import RecordedRun
+from closedrooms.mapping.logs.transform_tree import Mount, TransformTree, clean_name, transform_matrix
 
-SCAN, ODOMETRY, TRANSFORMS = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
-LATE = 0.5
-"""Time [s] from the nearest odometry beyond which a scan counts as without odometry."""
+ODOMETRY = "nav_msgs/msg/Odometry"
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+SUFFIXES = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite": ".db3"}
+"""What the files of a bag begin with, and how their names should end."""
 MAX_SCANS = 2_000_000
-MAX_CHAIN = 16
-"""Static transforms from the base to the lidar; more is a circle."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Mount:
-    """A static transform in the plane; ``flipped`` when its z axis points down (a lidar hung upside down)."""
-
-    parent: str
-    pose: Pose2
-    flipped: bool
 
 
 @dataclass(slots=True)
 class _Messages:
-    """What was read, in the order of the bag."""
+    """What was read, in the order of the bag; each with the time of its recording [s].
 
-    scans: list[Any] = field(default_factory=list)
-    odometry: list[tuple[float, float, float, float]] = field(default_factory=list)
-    mounts: dict[str, _Mount] = field(default_factory=dict)
+    Attributes:
+        scans: Messages of the scans.
+        odometry: ``header stamp, recording time, x, y, yaw`` of each.
+        base: Frame of the robot that the odometry moves.
+        tree: The transforms.
+        broken: Messages that could not be read, by what they should hold.
+        surplus: Scans beyond ``MAX_SCANS``.
+    """
+
+    scans: list[tuple[Any, float]] = field(default_factory=list)
+    odometry: list[tuple[float, float, float, float, float]] = field(default_factory=list)
     base: str = ""
-    skipped: Counter[str] = field(default_factory=Counter)
+    tree: TransformTree = field(default_factory=TransformTree)
+    broken: Counter[str] = field(default_factory=Counter)
+    surplus: int = 0
 
 
-def read_bag(path: Path, *, scan_topic: str | None, odometry_topic: str | None) -> RecordedRun:
+def read_bag(path: Path, options: BagOptions) -> RecordedRun:
     """Read laser scans, and the odometry interpolated at their times.
 
-    Where the lidar sits comes from ``/tf_static``, seen from the odometry's child frame; without it, it is taken to
-    sit in the middle of the robot.
+    Odometry comes from ``nav_msgs/Odometry``, else from the transforms, else there is none. Where the lidar sits comes
+    from the transforms between it and the frame that the odometry moves.
 
     Args:
         path: A ``.bag``, ``.mcap`` or ``.db3`` file, or a rosbag 2 folder.
-        scan_topic: Needed where a bag holds several of ``sensor_msgs/LaserScan``.
-        odometry_topic: Needed where it holds several of ``nav_msgs/Odometry``.
+        options: What to take where it holds several, and the mounting where it does not say.
 
     Raises:
-        InvalidInputError: ``rosbags`` is not installed, a broken bag, a topic missing or ambiguous.
+        InvalidInputError: ``rosbags`` is not installed, a broken bag, a topic missing or ambiguous, a mounting that is
+            unknown or not level.
     """
     try:
         from rosbags.highlevel import AnyReader
@@ -67,51 +75,116 @@ def read_bag(path: Path, *, scan_topic: str | None, odometry_topic: str | None) 
         ) from error
     for file in path.iterdir() if is_folder(path) else [path]:
         check_regular(file, "a rosbag")
-    # Bags of ROS 2 before Iron do not carry the definitions of their messages.
-    with reading(path, "a rosbag"), AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-        topics = [
-            _topic(reader.connections, SCAN, scan_topic, path),
-            _topic(reader.connections, ODOMETRY, odometry_topic, path),
-            "/tf_static",
-        ]
-        wanted = [c for c in reader.connections if c.topic in topics]
-        messages = _read(reader, wanted)
-    return _resolved(messages)
+    with reading(path, "a rosbag"), _named(path) as named:
+        # Bags of ROS 2 before Iron do not carry the definitions of their messages.
+        with AnyReader([named], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+            wanted, remarks = _chosen(reader.connections, options)
+            messages = _read(reader, wanted)
+        return _resolved(messages, options, remarks)
 
 
-def _topic(connections: Iterable[Any], kind: str, asked: str | None, path: Path) -> str:
-    found = sorted({c.topic for c in connections if c.msgtype == kind})
+@contextlib.contextmanager
+def _named(path: Path) -> Iterator[Path]:
+    """The bag under a name that ends as rosbags expects it: it tells the kinds by their names."""
+    suffix = path.suffix
+    if is_file(path):
+        start = read_head(path, what="a rosbag", size=8)
+        suffix = next((suffix for magic, suffix in SUFFIXES.items() if start.startswith(magic)), suffix)
+    if suffix == path.suffix:
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        named = Path(folder) / f"bag{suffix}"
+        named.symlink_to(path.absolute())
+        yield named
+
+
+def _chosen(connections: Iterable[Any], options: BagOptions) -> tuple[list[Any], list[Remark]]:
+    """Connections of one topic of scans, at most one of odometry, and all transforms."""
+    remarks = []
+    topics: dict[str, set[str]] = {}
+    for connection in connections:
+        if connection.msgcount:
+            topics.setdefault(connection.msgtype, set()).add(connection.topic)
+    scans, echoes = topics.get(SCAN, set()), topics.get(ECHOES, set())
+    if options.scan_topic is None and len(scans) == 1 and echoes:
+        why = f"{', '.join(sorted(scans))} is taken"
+        remarks.append(Remark(action="dropped", what="topics of scans", why=why, names=tuple(sorted(echoes))))
+        echoes = set()
+    scan = _topic(scans | echoes, options.scan_topic, "sensor_msgs/LaserScan or MultiEchoLaserScan", topics)
+    transforms = set().union(*(topics.get(kind, set()) for kind in TRANSFORMS))
+    odometry = topics.get(ODOMETRY, set())
+    asked = options.odometry_topic
+    taken = {scan, *transforms}
+    if asked not in transforms and (odometry or asked is not None):
+        taken.add(_topic(odometry, asked, "nav_msgs/Odometry", topics))
+    kinds = {SCAN, ECHOES, ODOMETRY, *TRANSFORMS}
+    return [c for c in connections if c.topic in taken and c.msgtype in kinds], remarks
+
+
+def _topic(found: set[str], asked: str | None, kind: str, topics: dict[str, set[str]]) -> str:
     if asked is not None and asked in found:
         return asked
     if asked is None and len(found) == 1:
-        return str(found[0])
-    what = f"no topic {asked}" if asked is not None else f"{len(found)} topics of {kind}"
-    raise InvalidInputError(what, expected=f"one of {', '.join(found)}" if found else f"a {kind}", where=path)
+        return next(iter(found))
+    if found:
+        what = f"no topic {asked}" if asked is not None else f"{len(found)} topics of {kind}"
+        raise InvalidInputError(what, expected=f"one of {', '.join(sorted(found))}")
+    holds = ", ".join(sorted(topics)) or "no messages"
+    what = f"no topic {asked} of {kind}" if asked is not None else f"no topic of {kind}"
+    raise InvalidInputError(f"{what}, but {holds}", expected="a bag of a planar lidar")
 
 
 def _read(reader: Any, connections: list[Any]) -> _Messages:
     messages = _Messages()
-    for connection, _, data in reader.messages(connections=connections):
+    for connection, recorded, data in reader.messages(connections=connections):
+        kind = connection.msgtype
         try:
-            message = reader.deserialize(data, connection.msgtype)
+            message = reader.deserialize(data, kind)
+            if kind in {SCAN, ECHOES}:
+                _take_scan(messages, message, 1e-9 * recorded)
+            elif kind == ODOMETRY:
+                _take_odometry(messages, message, 1e-9 * recorded)
+            else:
+                static = connection.topic.endswith("tf_static")
+                _take_transforms(messages, message, 1e-9 * recorded, static=static)
         except Exception:  # as above: one broken message does not spoil the bag
-            messages.skipped["broken messages"] += 1
-            continue
-        if connection.msgtype == SCAN:
-            if len(messages.scans) < MAX_SCANS:
-                messages.scans.append(message)
-        elif connection.msgtype == ODOMETRY:
-            pose = message.pose.pose
-            yaw, _ = _yaw(pose.orientation)
-            messages.odometry.append((_seconds(message), pose.position.x, pose.position.y, yaw))
-            messages.base = message.child_frame_id.lstrip("/")
-        elif connection.msgtype == TRANSFORMS:
-            for transform in message.transforms:
-                yaw, flipped = _yaw(transform.transform.rotation)
-                shift = transform.transform.translation
-                mount = _Mount(transform.header.frame_id.lstrip("/"), Pose2(shift.x, shift.y, yaw), flipped)
-                messages.mounts[transform.child_frame_id.lstrip("/")] = mount
+            messages.broken["scans" if kind in {SCAN, ECHOES} else "messages of motion"] += 1
     return messages
+
+
+def _take_scan(messages: _Messages, message: Any, recorded: float) -> None:
+    if len(messages.scans) >= MAX_SCANS:
+        messages.surplus += 1
+        return
+    messages.scans.append((message, recorded))
+
+
+def _take_odometry(messages: _Messages, message: Any, recorded: float) -> None:
+    pose = message.pose.pose
+    turned, at = pose.orientation, pose.position
+    matrix = transform_matrix((at.x, at.y, at.z), (turned.x, turned.y, turned.z, turned.w))
+    yaw = math.atan2(matrix[1, 0], matrix[0, 0])
+    messages.odometry.append((_seconds(message), recorded, at.x, at.y, yaw))
+    messages.base = clean_name(message.child_frame_id) or messages.base
+
+
+def _take_transforms(messages: _Messages, message: Any, recorded: float, *, static: bool) -> None:
+    for stamped in message.transforms:
+        shift, turn = stamped.transform.translation, stamped.transform.rotation
+        try:
+            matrix = transform_matrix((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w))
+        except InvalidInputError:
+            messages.broken["transforms"] += 1
+            continue
+        messages.tree.add(
+            stamped.header.frame_id,
+            stamped.child_frame_id,
+            matrix,
+            static=static,
+            stamp=_seconds(stamped),
+            recorded=recorded,
+        )
 
 
 def _seconds(message: Any) -> float:
@@ -119,85 +192,118 @@ def _seconds(message: Any) -> float:
     return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
 
 
-def _yaw(q: Any) -> tuple[float, bool]:
-    """Heading [rad] of a quaternion's x axis, and whether its z axis points down."""
-    x, y, z, w = q.x, q.y, q.z, q.w
-    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)), 1.0 - 2.0 * (x * x + y * y) < 0.0
+def _resolved(messages: _Messages, options: BagOptions, remarks: list[Remark]) -> RecordedRun:
+    remarks = [*remarks, *_reading_remarks(messages)]
+    if not messages.scans:
+        return RecordedRun((), np.empty((0, 3)), None, tuple(remarks))
+    frames = Counter(clean_name(message.header.frame_id) for message, _ in messages.scans)
+    lidar = frames.most_common(1)[0][0]
+    track, base, found = _motion(messages, lidar, options)
+    mounts, mount_remarks = _mounts(messages.tree, base, list(frames), options, measured=track is not None)
+    scan_times = Times(*np.array([(_seconds(message), at) for message, at in messages.scans]).T)
+    times = None if track is None else Times(track[:, 0], track[:, 1])
+    stamps, odometry_stamps, clock_remarks = scan_and_odometry_times(scan_times, times)
+    remarks += [*found, *mount_remarks, *clock_remarks]
+    if track is None:
+        poses, known = np.zeros((len(stamps), 3)), np.ones(len(stamps), dtype=np.bool_)
+    else:
+        order = np.argsort(odometry_stamps, kind="stable")
+        odometry_stamps, moved = odometry_stamps[order], track[order, 2:]
+        moved, jumps = bridge_jumps(odometry_stamps, moved)
+        poses, known, lost = odometry_at(np.column_stack((odometry_stamps, moved)), stamps)
+        remarks += [*jump_remarks(jumps), *lost]
+    return _run(messages, known, poses, stamps, mounts, remarks, has_odometry=track is not None)
 
 
-def _resolved(messages: _Messages) -> RecordedRun:
-    skipped = messages.skipped
-    odometry = np.array(messages.odometry, dtype=np.float64).reshape(-1, 4)
-    odometry = odometry[np.isfinite(odometry).all(axis=1)]
-    odometry = odometry[np.argsort(odometry[:, 0], kind="stable")]
-    scans, poses, stamps = [], [], []
-    for message in messages.scans:
-        stamp = _seconds(message)
-        pose = _interpolated(odometry, stamp)
-        if pose is None:
-            skipped["scans without odometry"] += 1
-            continue
+def _run(
+    messages: _Messages,
+    known: Any,
+    poses: FloatArray,
+    stamps: FloatArray,
+    mounts: dict[str, Mount],
+    remarks: list[Remark],
+    *,
+    has_odometry: bool,
+) -> RecordedRun:
+    """The scans that have odometry, put together."""
+    scans, rows, broken, echoes = [], [], 0, 0
+    for row, i in enumerate(np.flatnonzero(known).tolist()):
+        message = messages.scans[i][0]
         try:
-            scan = _scan(message, messages)
+            ranges, dropped = ranges_of(message)
+            scan = scan_of(message, ranges, mounts[clean_name(message.header.frame_id)])
         except InvalidInputError:
-            skipped["broken messages"] += 1
+            broken += 1
             continue
+        echoes += dropped
         scans.append(scan)
-        poses.append(pose)
-        stamps.append(stamp)
-    forwards, backwards = forward(np.array(stamps, dtype=np.float64))
-    skipped["stamps running backwards"] += backwards
+        rows.append(row)
+    if broken:
+        why = "no finite angles, no ranges, or no sense in their limits"
+        remarks.append(Remark(action="dropped", what="scans", why=why, count=broken, loss=True))
+    if echoes:
+        remarks.append(Remark(action="dropped", what="echoes", why="the first of each beam is mapped", count=echoes))
+    forwards, backwards = forward(stamps[np.flatnonzero(known)[rows]] if rows else np.zeros(0))
     swept = tuple(
         LaserScan(s.ranges, s.angle_min, s.angle_increment, s.range_max, s.range_min, float(stamp), s.robot_T_sensor)
         for s, stamp in zip(scans, forwards, strict=True)
     )
-    counts = {what: count for what, count in skipped.items() if count}
-    return RecordedRun(swept, np.array(poses, dtype=np.float64).reshape(-1, 3), None, counts)
+    return RecordedRun(swept, poses[rows].reshape(-1, 3), None, (*remarks, *backwards), has_odometry)
 
 
-def _interpolated(odometry: FloatArray, stamp: float) -> tuple[float, float, float] | None:
-    """Odometry at ``stamp``, ``None`` when none is near in time."""
-    after = int(np.searchsorted(odometry[:, 0], stamp))
-    near = [i for i in (after - 1, after) if 0 <= i < len(odometry)]
-    if not near or min(abs(odometry[i, 0] - stamp) for i in near) > LATE:
-        return None
-    if len(near) == 1:
-        x, y, theta = odometry[near[0], 1:]
-        return float(x), float(y), float(theta)
-    (t0, x0, y0, a0), (t1, x1, y1, a1) = odometry[near]
-    share = (stamp - t0) / (t1 - t0) if t1 > t0 else 0.0
-    turn = math.remainder(a1 - a0, 2.0 * math.pi)
-    return float(x0 + share * (x1 - x0)), float(y0 + share * (y1 - y0)), float(a0 + share * turn)
+def _reading_remarks(messages: _Messages) -> list[Remark]:
+    remarks = [
+        Remark(action="dropped", what=what, why="broken in the bag", count=count, loss=what == "scans")
+        for what, count in messages.broken.items()
+    ]
+    if messages.surplus:
+        why = f"more than {MAX_SCANS}"
+        remarks.append(Remark(action="dropped", what="scans", why=why, count=messages.surplus, loss=True))
+    return remarks
 
 
-def _scan(message: Any, messages: _Messages) -> LaserScan:
-    mount, flipped = _mount(message.header.frame_id.lstrip("/"), messages)
-    ranges = np.array(message.ranges, dtype=np.float64)
-    start, step = float(message.angle_min), float(message.angle_increment)
-    longest, shortest = float(message.range_max), max(float(message.range_min), 0.0)
-    if not (math.isfinite(start) and math.isfinite(step) and step != 0.0 and ranges.size):
-        raise InvalidInputError("a scan without angles", expected="finite angles")
-    if flipped:
-        start, ranges = -(start + step * (ranges.size - 1)), ranges[::-1]
-    # Zero and what lies below range_min is no measurement (REP-117).
-    ranges = np.where(ranges < max(shortest, 1e-6), np.nan, ranges)
-    return LaserScan(ranges, start, step, longest, shortest, robot_T_sensor=mount.as_tuple())
+def _motion(messages: _Messages, lidar: str, options: BagOptions) -> tuple[FloatArray | None, str | None, list[Remark]]:
+    """Odometry as ``header stamp, recording time, x, y, yaw``, the frame it moves, and what was guessed."""
+    odometry = np.array(messages.odometry, dtype=np.float64).reshape(-1, 5)
+    odometry = odometry[np.isfinite(odometry).all(axis=1)]
+    if len(odometry):
+        base = messages.base or messages.tree.base_of(lidar)
+        if messages.base or base is None:
+            return odometry, base, []
+        why = f"the odometry does not say what it moves; taken to be {base}"
+        return odometry, base, [Remark(action="guessed", what="frame of the robot", why=why)]
+    moving = messages.tree.odometry(lidar)
+    if moving is not None:
+        why = f"no nav_msgs/Odometry; taken from the transforms {moving.frame} to {moving.base}"
+        return moving.track, moving.base, [Remark(action="guessed", what="odometry", why=why)]
+    if options.odometry_topic is not None:
+        raise InvalidInputError(
+            f"no odometry on {options.odometry_topic}", expected="transforms from odom to the robot's base"
+        )
+    corrected = messages.tree.corrected
+    beside = f" (poses in {', '.join(corrected)} are no odometry)" if corrected else ""
+    why = f"no odometry in the bag{beside}; found by matching scans alone"
+    return None, messages.tree.base_of(lidar), [Remark(action="guessed", what="motion", why=why)]
 
 
-def _mount(frame: str, messages: _Messages) -> tuple[Pose2, bool]:
-    pose, flipped, name = Pose2(), False, frame
-    for _ in range(MAX_CHAIN):
-        if name == messages.base:
-            return pose, flipped
-        if name not in messages.mounts:
-            break
-        step = messages.mounts[name]
-        if step.flipped:
-            # Below a flipped frame, left is right.
-            pose = Pose2(pose.x, -pose.y, -pose.theta)
-            flipped = not flipped
-        pose = step.pose @ pose
-        name = step.parent
-    if frame != messages.base:
-        messages.skipped["scans of unknown mounting"] += 1
-    return Pose2(), False
+def _mounts(
+    tree: TransformTree, base: str | None, frames: list[str], options: BagOptions, *, measured: bool
+) -> tuple[dict[str, Mount], list[Remark]]:
+    """Where each frame of the scans sits on the robot.
+
+    Without odometry it does not matter for the map; the lidar is taken to be the robot where nobody says more.
+    """
+    if options.mount is not None or options.upside_down:
+        mount = Mount(Pose2(*(options.mount or (0.0, 0.0, 0.0))), options.upside_down)
+        return dict.fromkeys(frames, mount), []
+    if not measured and base is None:
+        why = "no transform to the lidar; it is taken to hang upright in the middle of the robot"
+        level = Mount(Pose2(), upside_down=False)
+        return dict.fromkeys(frames, level), [Remark(action="guessed", what="mounting", why=why)]
+    remarks = []
+    for frame in (*frames, base or ""):
+        found = tree.find(frame)
+        if frame and found is not None and found != clean_name(frame):
+            why = f"{frame} is not among the transforms; taken to be {found}"
+            remarks.append(Remark(action="guessed", what="frame", why=why))
+    return {frame: tree.mount(base or "", frame) for frame in frames}, remarks

@@ -11,7 +11,7 @@ from closedrooms.cli.commands import main
 from closedrooms.core.geojson import read_doors, read_features, read_rooms
 from closedrooms.core.rosmap import read_map
 from closedrooms.core.tum import read_trajectory
-from closedrooms.mapping.logs.recorded_run import read_run
+from closedrooms.mapping.logs import read_run
 from closedrooms.pipeline.config import RunConfig
 from closedrooms.pipeline.run import choose_closed
 from closedrooms.sim.config import NOISE_LEVELS, SimConfig

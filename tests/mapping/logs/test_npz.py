@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.mapping.logs import RecordedRun, read_run
 from closedrooms.mapping.logs.npz import write_scans
-from closedrooms.mapping.logs.recorded_run import RecordedRun, read_run
 from closedrooms.mapping.map_builder import build_map
 
 
@@ -42,10 +42,11 @@ def test_a_drive_written_and_read_again_is_the_same(tmp_path: Path, office: Any)
 
 def test_scans_without_odometry_are_skipped_and_counted(tmp_path: Path) -> None:
     odometry = np.zeros((3, 3))
-    odometry[1, 0] = np.nan
+    odometry[1:, 0] = np.nan, 0.1
     run = read_run(saved(tmp_path, odometry=odometry))
     assert len(run.scans) == 2
-    assert run.skipped == {"scans without odometry": 1}
+    (remark,) = run.remarks
+    assert (remark.action, remark.what, remark.count, remark.loss) == ("dropped", "scans", 1, True)
 
 
 @pytest.mark.parametrize(

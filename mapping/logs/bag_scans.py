@@ -1,0 +1,59 @@
+"""Laser scans of a bag as the robot sees them."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.pose import wrap_angle
+from closedrooms.core.scan import LaserScan
+from closedrooms.mapping.logs.transform_tree import Mount
+
+SCAN, ECHOES = "sensor_msgs/msg/LaserScan", "sensor_msgs/msg/MultiEchoLaserScan"
+
+
+def ranges_of(message: Any) -> tuple[FloatArray, int]:
+    """Ranges of one sweep, the first echo of each beam, and how many others there were."""
+    if message.__msgtype__ == SCAN:
+        return np.array(message.ranges, dtype=np.float64), 0
+    beams = [np.asarray(beam.echoes, dtype=np.float64) for beam in message.ranges]
+    first = [_first_echo(echoes, max(float(message.range_min), 0.0)) for echoes in beams]
+    return np.array(first, dtype=np.float64), sum(max(echoes.size - 1, 0) for echoes in beams)
+
+
+def _first_echo(echoes: FloatArray, shortest: float) -> float:
+    """The nearest that the sensor can measure; a beam without any says nothing (dust on the cover is nearer)."""
+    measured = echoes[np.isfinite(echoes) & (echoes >= shortest)]
+    if measured.size:
+        return float(measured.min())
+    return math.inf if (echoes == math.inf).any() else math.nan
+
+
+def scan_of(message: Any, ranges: FloatArray, mount: Mount) -> LaserScan:
+    """The sweep, counter-clockwise from above.
+
+    Args:
+        message: LaserScan or MultiEchoLaserScan.
+        ranges: Its ranges, shape (n,) [m].
+        mount: Where the lidar sits.
+
+    Raises:
+        InvalidInputError: Angles or limits of no sense, or no ranges.
+    """
+    start, step = float(message.angle_min), float(message.angle_increment)
+    longest, shortest = float(message.range_max), max(float(message.range_min), 0.0)
+    if not (math.isfinite(start) and math.isfinite(step) and step != 0.0 and ranges.size):
+        raise InvalidInputError("a scan without angles", expected="finite angles")
+    if mount.upside_down:
+        start, step = -start, -step
+    if step < 0.0:
+        start, step, ranges = start + step * (ranges.size - 1), -step, ranges[::-1]
+    if abs(step * ranges.size - 2.0 * math.pi) < step / 2.0:
+        # All around, the sweep begins behind the robot: how the lidar is turned does not decide which beams are taken.
+        turned = round((wrap_angle(start + mount.pose.theta + math.pi + step / 2.0) - step / 2.0) / step)
+        start, ranges = wrap_angle(start - turned * step), np.roll(ranges, turned)
+    # Zero and what lies below range_min is no measurement (REP-117).
+    ranges = np.where(ranges < max(shortest, 1e-6), np.nan, ranges)
+    return LaserScan(ranges, start, step, longest, shortest, robot_T_sensor=mount.pose.as_tuple())

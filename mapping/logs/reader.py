@@ -1,0 +1,119 @@
+"""Read a recorded run of any supported kind, told apart by its content."""
+
+import re
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.incoming import is_file, is_folder, read_head, reading
+from closedrooms.core.remarks import Remark
+from closedrooms.mapping.logs.bag_options import BagOptions
+from closedrooms.mapping.logs.odometry import bridge_jumps, jump_remarks
+from closedrooms.mapping.logs.recorded_run import RecordedRun
+
+GZIP, ZIP, SQLITE, MCAP = b"\x1f\x8b", b"PK\x03\x04", b"SQLite format 3", b"\x89MCAP0\r\n"
+OLD_BAG = re.compile(rb"#ROS(?:BAG|RECORD|LOG) V(\d+\.\d+)")
+ROSBAG = b"2.0"
+STORED = (".mcap", ".db3")
+"""Names of the files in a rosbag 2 folder."""
+SAME_POSE = 1e-6
+"""Odometry that never leaves its first pose by more [m and rad] was not measured."""
+
+
+def read_run(
+    path: Path,
+    *,
+    scan_topic: str | None = None,
+    odometry_topic: str | None = None,
+    mount: tuple[float, float, float] | None = None,
+    upside_down: bool = False,
+) -> RecordedRun:
+    """Read a recorded run of any supported kind, told apart by its content.
+
+    Args:
+        path: A CARMEN log (plain or gzipped), a ``scans.npz``, a rosbag 1, or an MCAP file or rosbag 2 folder.
+        scan_topic: Topic of the scans in a bag that holds several.
+        odometry_topic: Topic of the odometry in a bag that holds several, or of the transforms that hold it.
+        mount: Where the lidar of a bag sits on the robot, ``(x, y, yaw)`` [m, rad], in place of its transforms.
+        upside_down: Whether that lidar hangs with its z axis down.
+
+    Raises:
+        InvalidInputError: Missing, unreadable, of no known kind, or without a single scan that can be used.
+    """
+    options = BagOptions(scan_topic=scan_topic, odometry_topic=odometry_topic, mount=mount, upside_down=upside_down)
+    with reading(path, "a recorded run"):
+        try:
+            run = _read(_bag_file(path), options)
+        except InvalidInputError as error:
+            # Scans and poses check themselves, and do not know their file.
+            raise error if str(path) in str(error) else InvalidInputError(str(error), where=path) from error
+    if not run.scans:
+        found = "".join(f"; {remark}" for remark in run.remarks)
+        raise InvalidInputError(f"no scan that can be used{found}", expected="laser scans", where=path)
+    return _without_frozen_odometry(run)
+
+
+def _read(path: Path, options: BagOptions) -> RecordedRun:
+    head = _head(path)
+    version = OLD_BAG.match(head)
+    if version and version[1] != ROSBAG:
+        raise InvalidInputError(f"a ROS bag {version[1].decode()}", expected="ROS bag 2.0", where=path)
+    if version or head.startswith((MCAP, SQLITE)):
+        from closedrooms.mapping.logs.rosbag import read_bag
+
+        return read_bag(path, options)
+    _refuse_options(options, path)
+    if head.startswith(ZIP):
+        from closedrooms.mapping.logs.npz import read_scans
+
+        return _bridged(read_scans(path))
+    if is_folder(path):
+        raise InvalidInputError("a folder", expected="a log file, or a rosbag 2 folder with metadata.yaml", where=path)
+    from closedrooms.mapping.logs.carmen import read_carmen
+
+    return _bridged(read_carmen(path, gzipped=head.startswith(GZIP)))
+
+
+def _refuse_options(options: BagOptions, path: Path) -> None:
+    """Options that only a bag reads must not go unheard."""
+    given = [f.name.replace("_", "-") for f in fields(options) if getattr(options, f.name) not in {None, False}]
+    if given:
+        raise InvalidInputError(f"--{', --'.join(given)} for a log that is no bag", expected="a rosbag", where=path)
+
+
+def _bag_file(path: Path) -> Path:
+    """The bag itself, where a folder without ``metadata.yaml`` holds just one or its ``metadata.yaml`` was named."""
+    if path.name == "metadata.yaml" and is_file(path):
+        return path.parent
+    if is_folder(path) and not is_file(path / "metadata.yaml"):
+        stored = [entry for entry in sorted(path.iterdir()) if entry.suffix in STORED]
+        if len(stored) == 1:
+            return stored[0]
+    return path
+
+
+def _head(path: Path) -> bytes:
+    """What tells the kind of file."""
+    if is_folder(path):
+        return SQLITE if is_file(path / "metadata.yaml") else b""
+    return read_head(path, what="a recorded run", size=24)
+
+
+def _bridged(run: RecordedRun) -> RecordedRun:
+    """The run without jumps of its odometry."""
+    odometry, jumps = bridge_jumps(np.array([scan.stamp for scan in run.scans]), run.odometry)
+    if not jumps:
+        return run
+    return replace(run, odometry=odometry, remarks=(*run.remarks, *jump_remarks(jumps)))
+
+
+def _without_frozen_odometry(run: RecordedRun) -> RecordedRun:
+    """The run without an odometry that never moves: a robot that does would be taken to stand."""
+    if not run.has_odometry or len(run.scans) < 2:
+        return run
+    if float(np.abs(run.odometry - run.odometry[0]).max()) > SAME_POSE:
+        return run
+    remark = Remark(action="guessed", what="motion", why="the odometry never changes; found from the scans alone")
+    return replace(run, odometry=np.zeros((len(run.scans), 3)), has_odometry=False, remarks=(*run.remarks, remark))
