@@ -10,10 +10,10 @@ from typing import Annotated, Any, get_args, get_type_hints
 import tyro
 
 from closedrooms.cli.config_file import read_settings
-from closedrooms.cli.names import unknown
 from closedrooms.cli.settings import field_values
 from closedrooms.cli.usage import UsageError
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.nearest import unknown
 
 HELP, HELP_ALL = {"-h", "--help"}, "--help-all"
 # Of these a command takes one; the line's takes the place of another one in the file.
@@ -33,7 +33,7 @@ class SharedOptions:
     """Print the result as one JSON object."""
 
     verbose: Annotated[Switch, tyro.conf.arg(aliases=["-v"])] = False
-    """Tell every step, and where a defect of the program shows."""
+    """Tell every step and every failure."""
 
     quiet: Annotated[Switch, tyro.conf.arg(aliases=["-q"])] = False
     """Print nothing but errors."""

@@ -7,8 +7,8 @@ from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
-from closedrooms.cli.names import unknown
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.nearest import unknown
 
 Config = TypeVar("Config")
 

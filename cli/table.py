@@ -7,8 +7,8 @@ from typing import Annotated, Any, Union
 
 import tyro
 
-# Private to tyro, and the only way to say wrong usage in one line: pinned in constraints.txt, and where a kind of error
-# is not known here, tyro's own words are shown.
+# Private to tyro, and the only way to say wrong usage in one line. pyproject.toml bounds the version; a kind of error
+# that is not known here is told in tyro's own words.
 from tyro._errors import on_parse_error
 
 from closedrooms.cli.options import HELP, HELP_ALL, Command, option_names, options_class

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from closedrooms.cli.names import nearest, unknown
+from closedrooms.core.nearest import nearest, unknown
 
 # Options of old, and what takes their place.
 GONE = {

@@ -6,7 +6,6 @@ A package adds one with an entry point of the group ``closedrooms.methods`` that
     mine = "my_package:METHOD"
 """
 
-import difflib
 import importlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, Protocol
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.nearest import nearest
 from closedrooms.predictor.config import BestConfig, FacesConfig, PaperConfig, RoseConfig
 
 if TYPE_CHECKING:
@@ -148,8 +148,8 @@ def find_method(name: str) -> Method:
     try:
         return METHODS[name]
     except KeyError:
-        near = difflib.get_close_matches(name, list(METHODS), n=1)
-        meant = f" (did you mean {near[0]}?)" if near else ""
+        near = nearest(name, METHODS)
+        meant = f" (did you mean {near}?)" if near else ""
         raise InvalidInputError(f"unknown method {name!r}{meant}", expected=f"one of {', '.join(METHODS)}") from None
 
 

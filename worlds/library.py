@@ -7,6 +7,7 @@ from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.incoming import is_there, read_head, reading
+from closedrooms.core.nearest import nearest
 from closedrooms.worlds.door_hinges import without_entrances
 from closedrooms.worlds.plan import FloorPlan
 
@@ -69,7 +70,11 @@ def read_world(name_or_path: str, *, level: str | None = None) -> FloorPlan:
     path = Path(name_or_path)
     if not is_there(path):
         names = ", ".join(bundled_names())
-        raise InvalidInputError(f"unknown world {name_or_path!r}", expected=f"a floor plan file or one of {names}")
+        near = nearest(name_or_path, bundled_names())
+        meant = f" (did you mean {near}?)" if near else ""
+        raise InvalidInputError(
+            f"unknown world {name_or_path!r}{meant}", expected=f"a floor plan file or one of {names}"
+        )
     importer = importer_of(path)
     if not importer.levels:
         _refuse_level(level, path)

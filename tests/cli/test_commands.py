@@ -177,6 +177,7 @@ def test_an_output_folder_with_other_files_is_refused_and_kept(
     ("words", "part"),
     [
         (("run", "no-such-world"), "no-such-world"),
+        (("run", "ofice-01"), "unknown world 'ofice-01' (did you mean office-01?)"),
         (("run", "office-01", "--close", "99"), "99 rooms"),
         (("run", "office-01", "--close-doors", "zz"), "unknown door 'zz'"),
         (("run", "office-01", "--close", "-1"), "--close"),
@@ -248,6 +249,15 @@ def test_lists_twenty_worlds_one_a_line_name_first(capsys: pytest.CaptureFixture
     names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
     assert len(names) == len(set(names)) == 20
     assert "office-01" in names
+
+
+def test_the_top_level_help_imports_no_configuration() -> None:
+    script = (
+        "import sys; from closedrooms.cli.commands import main; main(['--help'])\n"
+        "ours = sorted(n for n in sys.modules if n.startswith('closedrooms') and n.endswith('config'))\n"
+        "assert not ours, ours\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=60)
 
 
 def test_help_imports_nothing_heavy() -> None:

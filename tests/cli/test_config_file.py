@@ -86,7 +86,7 @@ def test_inputs_on_the_line_win(corridor, call):
 
 
 @pytest.mark.slow
-def test_run_map_and_robustness_repeat_their_results(tmp_path, call):
+def test_run_and_map_repeat_their_results(tmp_path, call):
     words = ("--close", "2", "--noise", "high", "--lidar", "rplidar-a2", "--no-record", "--keep-scans")
     assert call("run", "office-01", *words, "--sim.noise.turn", "0.01", "--out", tmp_path / "a") == 0
     assert call("run", "--config", tmp_path / "a" / "run.json", "--out", tmp_path / "b") == 0
