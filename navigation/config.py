@@ -88,8 +88,8 @@ class NavigationConfig:
     time_limit: float = 7200.0
     """Simulated time after which a run ends with the status ``limit`` [s]."""
 
-    wall_limit: float = 720.0
-    """The same in real time [s]; a run that ends by it may end elsewhere the next time."""
+    cpu_limit: float = 720.0
+    """The same in processor time [s]; a run that ends by it may end elsewhere the next time."""
 
     most_cells: int = 40_000_000
     """Cells of the map from which on a run ends with the status ``limit``: 100,000 m2 at 0.05 m."""
@@ -101,7 +101,7 @@ class NavigationConfig:
             "frontier_resolution",
             "lookahead",
             "time_limit",
-            "wall_limit",
+            "cpu_limit",
             "most_cells",
         ):
             if not getattr(self, name) > 0:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Literal, Protocol
 
 import numpy as np
@@ -135,7 +135,7 @@ def run_loop(
         robot: Sensed and moved.
         mapper: Takes in every scan; decisions are made on its map and pose only.
         decider: Where to drive.
-        config: Limits of simulated time, real time and the map's size.
+        config: Limits of simulated time, processor time and the map's size.
         on_step: Told of every step.
         stop: Asked after every step whether the run ends.
 
@@ -183,7 +183,7 @@ class Limits:
         self._mapper = mapper
         self._cells = 0
         self._begun_at: float | None = None
-        self._begun = perf_counter()
+        self._begun = process_time()
 
     def grid(self) -> OccupancyGrid:
         """The map so far, and note of its size."""
@@ -200,8 +200,8 @@ class Limits:
             return Stop("limit", f"not done after {config.time_limit:g} simulated seconds (time_limit)")
         if self._cells > config.most_cells:
             return Stop("limit", f"the map has {self._cells} cells, more than {config.most_cells} (most_cells)")
-        if perf_counter() - self._begun >= config.wall_limit:
-            return Stop("limit", f"not done after {config.wall_limit:g} s of real time (wall_limit)")
+        if process_time() - self._begun >= config.cpu_limit:
+            return Stop("limit", f"not done after {config.cpu_limit:g} s of processor time (cpu_limit)")
         return None
 
 

@@ -179,11 +179,11 @@ def test_a_map_that_grows_too_large_ends_the_run_and_says_so() -> None:
     assert result.seconds < 5.0
 
 
-def test_real_time_ends_a_run_too() -> None:
+def test_processor_time_ends_a_run_too() -> None:
     world = CellWorld(building(), START)
-    result = explore(world, CellMapper(world.walls.shape), NavigationConfig(wall_limit=0.2))
+    result = explore(world, CellMapper(world.walls.shape), NavigationConfig(cpu_limit=0.1))
     assert result.status == "limit"
-    assert "real time" in result.reason
+    assert "processor time" in result.reason
 
 
 def test_whoever_knows_more_may_stop_the_run() -> None:
