@@ -224,9 +224,10 @@ def _worlds(words: Sequence[str]) -> int:
     config = _parse(config_type, f"worlds {words[0]}", words[1:], summary)
     from closedrooms.cli.worlds import act
 
-    for line in act(config):
+    lines, lost = act(config)
+    for line in lines:
         _say(line)
-    return DONE
+    return PARTLY_FAILED if lost else DONE
 
 
 def _evaluate(words: Sequence[str]) -> int:

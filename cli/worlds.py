@@ -1,12 +1,20 @@
-"""What ``closedrooms worlds`` does; each action returns the lines to print."""
+"""What ``closedrooms worlds`` does; each action returns the lines to print, and whether something was lost."""
 
 from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from closedrooms.pipeline.config import ConvertWorld, GenerateWorld, ListWorlds, ShowWorld
 
+if TYPE_CHECKING:
+    from closedrooms.worlds.plan import FloorPlan
 
-def act(config: ListWorlds | ShowWorld | GenerateWorld | ConvertWorld) -> Iterable[str]:
+
+def act(config: ListWorlds | ShowWorld | GenerateWorld | ConvertWorld) -> tuple[Iterable[str], bool]:
     """Carry out one action.
+
+    Returns:
+        Lines to print, and whether reading took away something that was asked for (exit status 3).
 
     Raises:
         InvalidInputError: A world that cannot be read or a format that is not known.
@@ -15,13 +23,16 @@ def act(config: ListWorlds | ShowWorld | GenerateWorld | ConvertWorld) -> Iterab
     from closedrooms.pipeline.world_files import convert_world, generate_world, list_worlds, show_world
 
     match config:
-        case ListWorlds():
-            return list_worlds()
         case ShowWorld():
-            show_world(config.world, config.out, level=config.level)
+            return _said(show_world(config.world, config.out, level=config.level), config.out)
         case GenerateWorld():
-            generate_world(config.kind, config.seed, config.out, furniture=config.furniture)
+            return _said(generate_world(config.kind, config.seed, config.out, furniture=config.furniture), config.out)
         case ConvertWorld():
-            convert_world(config.source, config.destination, config.to, level=config.level)
-            return [f"written to {config.destination}"]
-    return [f"written to {config.out}"]
+            plan = convert_world(config.source, config.destination, config.to, level=config.level)
+            return _said(plan, config.destination)
+    return list_worlds(), False
+
+
+def _said(plan: "FloorPlan", written: Path) -> tuple[Iterable[str], bool]:
+    ordered = sorted(plan.remarks, key=lambda remark: not remark.loss)
+    return [*map(str, ordered), f"written to {written}"], any(remark.loss for remark in ordered)

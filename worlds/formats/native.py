@@ -1,17 +1,22 @@
 """Floor plans as JSON, the project's own format."""
 
 import json
-import math
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from shapely.geometry import Polygon
 
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import read_json, write_bytes
+from closedrooms.core.remarks import Remark
+from closedrooms.worlds.formats.settlement import Source, settle
 from closedrooms.worlds.plan import FloorPlan, Furniture, Opening, PlanDoor, PlanRoom, Wall
-from closedrooms.worlds.validation import validate
+
+# Numbers beyond this are mistakes; an integer may be too large for a float.
+LARGEST = 1e12
+Passage = TypeVar("Passage", PlanDoor, Opening)
 
 FORMAT, VERSION = "closedrooms-plan", 1
 WHAT = "a floor plan (JSON)"
@@ -80,11 +85,11 @@ def _rings(polygon: Polygon) -> list[Any]:
 
 
 def read_plan(path: str | Path) -> FloorPlan:
-    """Read and validate an untrusted plan.
+    """Read and validate an untrusted plan; a bad door or opening is left out and stands in its ``remarks``.
 
     Raises:
-        InvalidInputError: A missing or broken file, another format or version, an element that is not as it should
-            be (named by its kind, number and id).
+        InvalidInputError: A missing or broken file, another format or version, another element that is not as it
+            should be (named by its kind, number and id).
     """
     return plan_from(read_json(Path(path), what=WHAT), Path(path))
 
@@ -100,6 +105,7 @@ def plan_from(data: Any, path: Path) -> FloorPlan:
     if data.get("units", "m") != "m":
         raise InvalidInputError(f"a plan in {data['units']!r}", expected="metres ('m')", where=path)
     reader = _Reader(path)
+    remarks: list[Remark] = []
     plan = FloorPlan(
         name=str(data.get("name") or path.stem),
         rooms=tuple(
@@ -108,16 +114,13 @@ def plan_from(data: Any, path: Path) -> FloorPlan:
         walls=tuple(
             Wall(reader.name(w), reader.segment(w), reader.number(w, "thickness")) for w in reader.rows(data, "walls")
         ),
-        doors=tuple(reader.door(d) for d in reader.rows(data, "doors")),
-        openings=tuple(
-            Opening(reader.name(o), reader.segment(o), reader.sides(o)) for o in reader.rows(data, "openings")
-        ),
+        doors=tuple(reader.each(data, "doors", reader.door, remarks)),
+        openings=tuple(reader.each(data, "openings", reader.opening, remarks)),
         start=reader.start(data.get("start")),
         furniture=tuple(Furniture(reader.name(f), reader.polygon(f)) for f in reader.rows(data, "furniture")),
         meta=data["meta"] if isinstance(data.get("meta"), dict) else {},
     )
-    validate(plan, str(path))
-    return plan
+    return settle(plan, remarks, Source(rooms=len(plan.rooms), door_widths=[d.width for d in plan.doors]), path)
 
 
 class _Reader:
@@ -127,46 +130,69 @@ class _Reader:
         self._path = path
         self._element = ""
 
-    def rows(self, data: dict[str, Any], key: str) -> list[dict[str, Any]]:
+    def rows(self, data: dict[str, Any], key: str) -> Iterator[dict[str, Any]]:
+        for number, row in enumerate(self._list(data, key)):
+            self._element = f"{key}[{number}]"
+            yield self._object(row)
+
+    def _list(self, data: dict[str, Any], key: str) -> list[Any]:
         value = data.get(key, [])
         self._element = key
         if not isinstance(value, list) or len(value) > MAX_ELEMENTS:
             raise self._error("no list of a usable size", f"a list of at most {MAX_ELEMENTS}")
-        for number, row in enumerate(value):
-            self._element = f"{key}[{number}]"
-            if not isinstance(row, dict):
-                raise self._error("no object", "an object with an id")
-        self._element = key
         return value
+
+    def _object(self, row: Any) -> dict[str, Any]:
+        if not isinstance(row, dict):
+            raise self._error("no object", "an object with an id")
+        return row
 
     def name(self, row: dict[str, Any]) -> str:
         value = row.get("id")
         if not isinstance(value, str) or not value:
-            raise self._error(f"an element with the id {value!r}", "a text")
-        self._element = f"{self._element.split(' ')[0]} {value}"
+            raise self._error(f"an element with the id {_short(value)}", "a text")
+        self._element = f"{self._element.split('[')[0]} {value}"
         return value
+
+    def each(
+        self, data: dict[str, Any], key: str, read: Callable[[dict[str, Any]], Passage], remarks: list[Remark]
+    ) -> list[Passage]:
+        """The doors or openings that can be read; each of the others becomes a remark."""
+        found = []
+        for number, row in enumerate(self._list(data, key)):
+            self._element = f"{key}[{number}]"
+            try:
+                found.append(read(self._object(row)))
+            except InvalidInputError as error:
+                name = self._element.removeprefix(f"{key} ")
+                why = str(error).removesuffix(f": {self._path}").removeprefix(f"{self._element}: ")
+                remarks.append(Remark(action="dropped", what=key, why=why, names=(name,), loss=True))
+        return found
+
+    def opening(self, row: dict[str, Any]) -> Opening:
+        return Opening(self.name(row), self.segment(row), self.sides(row))
 
     def door(self, row: dict[str, Any]) -> PlanDoor:
         name = self.name(row)
         kind, hinge, into = row.get("kind", "hinged"), row.get("hinge", 0), row.get("opens_into")
-        if kind not in {"hinged", "double", "sliding"}:
-            raise self._error(f"kind {kind!r}", "hinged, double or sliding")
+        if kind not in ("hinged", "double", "sliding"):
+            raise self._error(f"kind {_short(kind)}", "hinged, double or sliding")
         if hinge not in (0, 1) or isinstance(hinge, bool):
-            raise self._error(f"hinge {hinge!r}", "0 or 1, an end of the segment")
+            raise self._error(f"hinge {_short(hinge)}", "0 or 1, an end of the segment")
         if into is not None and not isinstance(into, str):
-            raise self._error(f"opens_into {into!r}", "a room id or null")
+            raise self._error(f"opens_into {_short(into)}", "a room id or null")
         return PlanDoor(name, self.segment(row), self.sides(row), kind, hinge, into)
 
     def sides(self, row: dict[str, Any]) -> tuple[str | None, str | None]:
         value = row.get("rooms")
         if not isinstance(value, list) or len(value) != 2 or not all(v is None or isinstance(v, str) for v in value):
-            raise self._error(f"rooms {value!r}", "two room ids (null is outside)")
+            raise self._error(f"rooms {_short(value)}", "two room ids (null is outside)")
         return (value[0], value[1])
 
     def number(self, row: dict[str, Any], key: str) -> float:
         value = row.get(key)
         if not _is_number(value):
-            raise self._error(f"{key} {value!r}", "a number in metres")
+            raise self._error(f"{key} {_short(value)}", "a number in metres")
         return float(value)  # type: ignore[arg-type]
 
     def start(self, value: Any) -> tuple[float, float, float] | None:
@@ -174,7 +200,7 @@ class _Reader:
         if value is None:
             return None
         if not isinstance(value, list) or len(value) != 3 or not all(map(_is_number, value)):
-            raise self._error(f"{value!r}", "[x, y, heading] in metres and radians")
+            raise self._error(_short(value), "[x, y, heading] in metres and radians")
         return (float(value[0]), float(value[1]), float(value[2]))
 
     def segment(self, row: dict[str, Any]) -> Segment:
@@ -184,7 +210,10 @@ class _Reader:
         return (points[0], points[1])
 
     def polygon(self, row: dict[str, Any]) -> Polygon:
-        rings = [row.get("polygon"), *(row.get("holes") or [])]
+        holes = row.get("holes") or []
+        if not isinstance(holes, list):
+            raise self._error("holes that are no list", "a list of rings")
+        rings = [row.get("polygon"), *holes]
         points = [self._points(ring, "polygon") for ring in rings]
         if any(len(ring) < 3 for ring in points):
             raise self._error("a polygon of fewer than 3 points", "at least 3 points")
@@ -196,7 +225,7 @@ class _Reader:
         points = []
         for point in value:
             if not isinstance(point, list) or len(point) != 2 or not all(map(_is_number, point)):
-                raise self._error(f"{key} point {point!r}", "[x, y] in metres")
+                raise self._error(f"{key} point {_short(point)}", "[x, y] in metres")
             points.append((float(point[0]), float(point[1])))
         return points
 
@@ -205,4 +234,10 @@ class _Reader:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST
+
+
+def _short(value: object) -> str:
+    """A value for a message."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

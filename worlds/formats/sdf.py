@@ -40,16 +40,21 @@ def write_sdf(path: Path, plan: FloorPlan) -> None:
     for number, box in enumerate(wall_boxes(plan)):
         _solid(walls, f"wall_{number}", box, 0.0, WALL_HEIGHT, "0.8 0.8 0.78 1")
     for thing in plan.furniture:
-        _polyline(walls, thing.id, [(float(x), float(y)) for x, y in thing.polygon.exterior.coords[:-1]])
+        _polyline(walls, _name(thing.id), [(float(x), float(y)) for x, y in thing.polygon.exterior.coords[:-1]])
     fixed = SubElement(model, "joint", name="walls_to_world", type="fixed")
     _text(fixed, "parent", "world")
     _text(fixed, "child", "walls")
     for door in plan.doors:
         for number, leaf in enumerate(door_leaves(plan, door)):
-            name = door.id if number == 0 else f"{door.id}_{number}"
+            name = _name(door.id if number == 0 else f"{door.id}_{number}")
             _leaf(model, name, leaf)
     indent(root)
     write_bytes(Path(path), b'<?xml version="1.0"?>\n' + tostring(root) + b"\n")
+
+
+def _name(given: str) -> str:
+    """A name without what XML cannot hold."""
+    return "".join(c if c.isprintable() else "_" for c in given)
 
 
 def _text(parent: Element, tag: str, value: str) -> Element:

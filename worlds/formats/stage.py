@@ -53,7 +53,8 @@ def _text(plan: FloorPlan, picture: str, bounds: tuple[float, float, float, floa
     x0, y0, x1, y1 = bounds
     start = start_pose(plan)
     leaves = [
-        f'leaf ( name "{door.id}{"" if number == 0 else f"_{number}"}" size [{box.length:.4f} {box.thickness:.4f} 2.0]'
+        f'leaf ( name "{_name(door.id)}{"" if number == 0 else f"_{number}"}"'
+        f" size [{box.length:.4f} {box.thickness:.4f} 2.0]"
         f" pose [{box.x:.4f} {box.y:.4f} 0 {math.degrees(box.angle):.3f}] )"
         for door in plan.doors
         for number, leaf in enumerate(door_leaves(plan, door))
@@ -61,7 +62,7 @@ def _text(plan: FloorPlan, picture: str, bounds: tuple[float, float, float, floa
     ]
     things = [_thing(thing) for thing in plan.furniture]
     lines = [
-        f"# {' '.join(plan.name.split())}: metres, x right, y up; doors stand open, one model a leaf",
+        f"# {_name(' '.join(plan.name.split()))}: metres, x right, y up; doors stand open, one model a leaf",
         "resolution 0.02",
         "interval_sim 100",
         'define floorplan model ( color "gray30" boundary 0 gui_nose 0 gui_grid 0 gui_move 0 gripper_return 0 '
@@ -79,6 +80,11 @@ def _text(plan: FloorPlan, picture: str, bounds: tuple[float, float, float, floa
     return "\n".join(lines) + "\n"
 
 
+def _name(given: str) -> str:
+    """A name without what ends a text of Stage's."""
+    return "".join(c if c.isprintable() and c not in '"\\' else "_" for c in given)
+
+
 def _thing(thing: Furniture) -> str:
     """A piece of furniture: Stage fits a block's box into the size of its model, around the model's pose."""
     x0, y0, x1, y1 = thing.polygon.bounds
@@ -86,6 +92,7 @@ def _thing(thing: Furniture) -> str:
     corners = thing.polygon.exterior.coords[:-1]
     points = " ".join(f"point[{number}] [{a - x:.4f} {b - y:.4f}]" for number, (a, b) in enumerate(corners))
     return (
-        f'thing ( name "{thing.id}" size [{x1 - x0:.4f} {y1 - y0:.4f} {FURNITURE_HEIGHT}] pose [{x:.4f} {y:.4f} 0 0]'
+        f'thing ( name "{_name(thing.id)}" size [{x1 - x0:.4f} {y1 - y0:.4f} {FURNITURE_HEIGHT}]'
+        f" pose [{x:.4f} {y:.4f} 0 0]"
         f" block ( points {len(corners)} {points} z [0 {FURNITURE_HEIGHT}] ) )"
     )
