@@ -1,7 +1,7 @@
 """What a floor plan must satisfy before anything is built from it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import shapely
@@ -17,6 +17,8 @@ from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
 ON_WALL = 0.02
 # A door's middle lies within this of both its rooms, beside half the wall's thickness [m].
 AT_ROOM = 0.15
+# Two passages may share so much of a wall by rounding [m].
+OVERLAPPING = 0.1
 # Rooms may overlap by this share of the smaller one, no more.
 OVERLAP = 0.2
 # The largest building read, and the largest coordinate [m].
@@ -138,6 +140,7 @@ def passage_faults(plan: FloorPlan) -> dict[int, tuple[str, str]]:
             or _sides_fault(name, passage, rooms)
             or ((f"{name} stands on no wall", "both jambs on a wall") if is_door and not on_wall[number] else None)
             or _place_fault(name, passage, rooms, thickest, lines)
+            or _overlap_fault(name, passage, plan.passages, number, faults)
         )
         if fault is None and isinstance(passage, PlanDoor) and passage.opens_into not in passage.rooms:
             fault = (f"{name} opens into {passage.opens_into!r}", f"one of its rooms {passage.rooms}")
@@ -145,6 +148,23 @@ def passage_faults(plan: FloorPlan) -> dict[int, tuple[str, str]]:
             faults[number] = fault
         seen.add(passage.id)
     return faults
+
+
+def _overlap_fault(
+    name: str,
+    passage: PlanDoor | Opening,
+    passages: Sequence[PlanDoor | Opening],
+    number: int,
+    faults: Collection[int],
+) -> tuple[str, str] | None:
+    """A passage on the place of an earlier one that is kept."""
+    line = shapely.LineString(passage.segment)
+    for before, other in enumerate(passages[:number]):
+        if before not in faults and line.distance(shapely.LineString(other.segment)) < ON_WALL:
+            strip = shapely.LineString(other.segment).buffer(ON_WALL, cap_style="flat")
+            if line.intersection(strip).length > OVERLAPPING:
+                return (f"{name} lies on {other.id}", "one passage in a place")
+    return None
 
 
 def _sides_fault(name: str, passage: PlanDoor | Opening, rooms: dict[str, Polygon]) -> tuple[str, str] | None:

@@ -181,7 +181,7 @@ def coverage(polygons: Sequence[Polygon], *, gap: float = 0.0, snap: float = -1.
 
 
 def without_gaps(
-    polygons: Sequence[Polygon], width: float, *, fixed: int = 0, branches: bool = True
+    polygons: Sequence[Polygon], width: float, *, fixed: int = 0, branches: bool = True, touching: float = 0.0
 ) -> tuple[list[Polygon], list[Polygon]]:
     """Rooms grown into the gaps and notches between them that are narrower than ``width`` metres.
 
@@ -190,6 +190,7 @@ def without_gaps(
         width: Metres.
         fixed: So many rooms at the front keep their shape.
         branches: Cut gaps where they branch and join each piece by itself.
+        touching: Gap and room touch within this [m]: at odd angles they do so up to rounding only.
 
     Returns:
         The rooms, each gap joined to the one with the longest border of those around it, and the gaps themselves.
@@ -205,15 +206,23 @@ def without_gaps(
     filled = []
     for gap in gaps:
         near = np.sort(tree.query(gap, predicate="dwithin", distance=width)).tolist()
-        shared = {i: rooms[i].boundary.intersection(gap.boundary).length for i in near}
+        shared = {i: _border(gap, rooms[i], touching) for i in near}
         best = max((i for i in near if i >= fixed), key=lambda i: shared[i], default=None)
         if best is None:
             continue
         grown = areal(rooms[best].union(gap))
+        if touching and not isinstance(grown, Polygon):
+            grown = areal(rooms[best].union(gap.buffer(touching, join_style="mitre")))
         if sum(length > 0.05 for length in shared.values()) >= 2 and isinstance(grown, Polygon):
             rooms[best] = grown
             filled.append(gap)
     return rooms, filled
+
+
+def _border(gap: Polygon, room: Polygon, touching: float) -> float:
+    """How long a gap and a room touch [m]."""
+    beside = room.buffer(touching, quad_segs=1) if touching else room.boundary
+    return float(beside.intersection(gap.boundary).length)
 
 
 def _is_narrow(part: Polygon, width: float, least: float = 1e-3) -> bool:

@@ -14,7 +14,7 @@ from closedrooms.core.files import read_json
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.door_hinges import hung
 from closedrooms.worlds.formats.room_outlines import repaired
-from closedrooms.worlds.formats.settlement import Source, settle
+from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom
 from closedrooms.worlds.wall_assembly import Edge, coverage, shared_edges, walls_along
@@ -49,9 +49,14 @@ def read_houseexpo(path: str | Path) -> FloorPlan:
             "a HouseExpo home without room_category: no doors can be derived",
             expected="boxes [x0, y0, x1, y1] of at least one room", where=path,
         )  # fmt: skip
-    labels, polygons = _rooms(outline, boxes)
-    if not polygons:
-        raise InvalidInputError("a plan without rooms", expected="boxes inside the outline", where=path)
+    inside = [(label, box) for label, box in boxes if outline.intersection(box).area >= SMALLEST]
+    for label, box in boxes:
+        if (label, box) not in inside:
+            why = f"less than {SMALLEST} square metres of their boxes lie inside the outline"
+            remarks.append(Remark(action="dropped", what="rooms", why=why, names=(label,), loss=True))
+    if not inside:
+        raise no_rooms("boxes inside the outline", [outline.area / len(boxes)], remarks, path)
+    labels, polygons = _rooms(outline, inside)
     rooms = tuple(PlanRoom(f"r{i:02d}", label, p) for i, (label, p) in enumerate(zip(labels, polygons, strict=True)))
     edges = shared_edges([room.polygon for room in rooms])
     doors = _doors(edges, rooms)

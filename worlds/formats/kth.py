@@ -12,8 +12,8 @@ from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.formats.portals import Portal, paired, plan_of_portals
-from closedrooms.worlds.formats.room_outlines import GAP, clean_outlines, outline_lines, repaired
-from closedrooms.worlds.formats.settlement import Source, settle
+from closedrooms.worlds.formats.room_outlines import GAP, clean_outlines, hull_areas, outline_lines, repaired
+from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
 from closedrooms.worlds.formats.xml_text import attribute, child, descendants, parse_xml, text
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
 
@@ -43,7 +43,8 @@ def read_kth(path: str | Path) -> FloorPlan:
     polygons = clean_outlines(outlines, remarks, names=names)
     kept = [(space, polygon) for space, polygon in zip(spaces, polygons, strict=True) if polygon is not None]
     if not kept:
-        raise InvalidInputError("a plan without rooms", expected="spaces with a contour", where=path)
+        corners = [[point for _, segment in _lines(space, metres) for point in segment] for space in spaces]
+        raise no_rooms("spaces with a contour", hull_areas(corners), remarks, path)
     rooms = tuple(PlanRoom(f"r{i:02d}", _label(space), polygon) for i, (space, polygon) in enumerate(kept))
     portals, widths = _portals([space for space, _ in kept], rooms, metres, remarks)
     dropped = sum(remark.count for remark in remarks if remark.action == "dropped" and remark.what == "doors")
@@ -97,7 +98,12 @@ def _lines(space: Any, metres: float) -> list[tuple[Any, Segment]]:
 
 
 def _outline(space: Any, name: str, metres: float, remarks: list[Remark]) -> Polygon | None:
-    segments = [segment for _, segment in _lines(space, metres)]
+    lines = _lines(space, metres)
+    broken = len(descendants(child(space, "contour"), "linesegment")) - len(lines)
+    if lines and broken:
+        why = "without four coordinates"
+        remarks.append(Remark(action="dropped", what="contour lines", why=why, names=(name,), count=broken))
+    segments = [segment for _, segment in lines]
     points: list[Point] = []
     for a, b in segments:
         points += [p for p in (a, b) if not points or math.dist(p, points[-1]) > 1e-6]

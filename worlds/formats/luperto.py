@@ -12,8 +12,8 @@ from closedrooms.core.door import Point
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.formats.portals import Portal, paired, plan_of_portals
-from closedrooms.worlds.formats.room_outlines import GAP, clean_outlines, outline_lines, repaired
-from closedrooms.worlds.formats.settlement import Source, settle
+from closedrooms.worlds.formats.room_outlines import GAP, clean_outlines, hull_areas, outline_lines, repaired
+from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
 from closedrooms.worlds.formats.xml_text import attribute, child, children, parse_xml, text
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
 
@@ -39,7 +39,9 @@ def read_luperto(path: str | Path) -> FloorPlan:
     polygons = clean_outlines(outlines, remarks, names=names)
     kept = [(space, polygon) for space, polygon in zip(spaces, polygons, strict=True) if polygon is not None]
     if not kept:
-        raise InvalidInputError("a plan without rooms", expected="spaces with an outline", where=path)
+        read = [[_point(p, metres) for p in children(child(s, "bounding_polygon"), "point")] for s in spaces]
+        corners = [[point for point in points if point is not None] for points in read]
+        raise no_rooms("spaces with an outline", hull_areas(corners), remarks, path)
     rooms = tuple(PlanRoom(f"r{i:02d}", _label(space), polygon) for i, (space, polygon) in enumerate(kept))
     gone = {attribute(space, "id") for space in spaces} - {attribute(space, "id") for space, _ in kept}
     portals = _portals([space for space, _ in kept], gone, metres, remarks)

@@ -51,10 +51,18 @@ def read_pyrobosim(path: str | Path) -> FloorPlan:
     if not rows:
         raise InvalidInputError("a plan without rooms", expected=WHAT, where=path)
     remarks: list[Remark] = []
-    names = [str(row.get("name", f"room {number}")) for number, row in enumerate(rows)]
+    # Rooms without a name are counted, as pyrobosim does.
+    names = [str(row.get("name") or f"room_{number}") for number, row in enumerate(rows)]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InvalidInputError(f"two rooms named {twice!r}", expected="names used once", where=path)
     wall = _wall_width(rows)
     # Footprints are free floor: the walls' centre lines lie half a wall further out.
     footprints = _placed_footprints(rows, names, path)
+    overlap = sum(footprint.area for footprint in footprints) - shapely.union_all(footprints).area
+    if overlap > 0.01:
+        why = f"{overlap:.2f} square metres given to one room each"
+        remarks.append(Remark(action="repaired", what="overlaps of rooms", why=why))
     outlines = [footprint.buffer(wall / 2, join_style="mitre") for footprint in footprints]
     hallways = _hallways(halls, names, footprints, path, remarks)
     building = _Building(footprints, [*outlines], [*names], wall)

@@ -7,6 +7,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.strtree import STRtree
 
+from closedrooms.core.door import Point
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.wall_assembly import coverage, without_gaps
@@ -53,7 +54,7 @@ def clean_outlines(
     if not given:
         return list(outlines)
     overlap = sum(outline.area for outline in given) - shapely.union_all(given).area
-    polygons, gaps = without_gaps(coverage(given, snap=JOG / 2), GAP)
+    polygons, gaps = without_gaps(coverage(given, snap=JOG / 2), GAP, touching=GRID)
     polygons = coverage(polygons, gap=GAP, snap=JOG / 2)
     simple = iter([_largest(part) for part in shapely.coverage_simplify(polygons, JOG)])
     if overlap > 0.01:
@@ -71,6 +72,11 @@ def clean_outlines(
             polygon = None
         result.append(polygon)
     return result
+
+
+def hull_areas(corners: Sequence[Sequence[Point]]) -> list[float]:
+    """Rough areas of rooms whose outlines may be broken: of the convex hulls of their corners."""
+    return [float(shapely.MultiPoint(points).convex_hull.area) for points in corners if len(points) >= 3]
 
 
 def _on_grid(outline: Polygon) -> Polygon:

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.geometry import WallLines, wall_area
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
@@ -55,11 +56,17 @@ def settle(plan: FloorPlan, remarks: Iterable[Remark], source: Source, path: Pat
         InvalidInputError: What is left is not a valid plan.
     """
     kept, bad = _without_bad_passages(plan)
-    validate(kept, str(path))
+    odd = _odd_scale(kept, source.door_widths)
+    try:
+        validate(kept, str(path))
+    except InvalidInputError as error:
+        # A plan a thousand times too large fails for its coordinates: say why.
+        hint = "".join(f" ({remark.what}: {remark.why})" for remark in odd)
+        raise InvalidInputError(f"{str(error).removesuffix(f': {path}')}{hint}", where=path) from error
     said = [*remarks, *bad]
     said += _missing(kept, source, said)
     said += _lost_walls(kept, source)
-    said += _odd_scale(kept, source.door_widths)
+    said += odd
     return replace(kept, remarks=tuple(merged(said)))
 
 
@@ -126,14 +133,36 @@ def _lost_walls(plan: FloorPlan, source: Source) -> list[Remark]:
 
 def _odd_scale(plan: FloorPlan, widths: Sequence[float]) -> list[Remark]:
     """A warning where doors or rooms are of a size that no building has, with the scale that would fit."""
-    if widths:
-        median = float(np.median(widths))
+    usable = [width for width in widths if math.isfinite(width)]
+    if usable:
+        median = float(np.median(usable))
         if not NARROWEST_MEDIAN_DOOR <= median <= WIDEST_MEDIAN_DOOR:
             return [_scale_remark(f"the median door is {median:.2f} m wide", USUAL_DOOR / max(median, 1e-6))]
-    area = float(np.median([room.polygon.area for room in plan.rooms]))
-    if not SMALLEST_MEDIAN_ROOM <= area <= LARGEST_MEDIAN_ROOM:
-        return [_scale_remark(f"the median room has {area:.3g} square metres", math.sqrt(USUAL_ROOM / area))]
-    return []
+    return _odd_rooms([room.polygon.area for room in plan.rooms])
+
+
+def _odd_rooms(areas: Sequence[float]) -> list[Remark]:
+    usable = [area for area in areas if math.isfinite(area) and area > 0.0]
+    area = float(np.median(usable)) if usable else USUAL_ROOM
+    if SMALLEST_MEDIAN_ROOM <= area <= LARGEST_MEDIAN_ROOM:
+        return []
+    return [_scale_remark(f"the median room has {area:.3g} square metres", math.sqrt(USUAL_ROOM / area))]
+
+
+def no_rooms(expected: str, areas: Sequence[float], remarks: Sequence[Remark], path: Path) -> InvalidInputError:
+    """The error of a file none of whose rooms can be used, with the reason.
+
+    Args:
+        expected: What a file of this format holds.
+        areas: Of its rooms as drawn, as far as they have any [square metres].
+        remarks: Why rooms were dropped.
+        path: Of the file.
+    """
+    dropped = merged(remark for remark in remarks if remark.action == "dropped" and remark.what == "rooms")
+    reasons = [f"{remark.count} with {remark.why}" for remark in dropped]
+    reasons += [f"{remark.what}: {remark.why}" for remark in _odd_rooms(areas)]
+    what = f"a plan without rooms ({'; '.join(reasons)})" if reasons else "a plan without rooms"
+    return InvalidInputError(what, expected=expected, where=path)
 
 
 def _scale_remark(what: str, factor: float) -> Remark:

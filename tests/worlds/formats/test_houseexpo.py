@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import shapely
 
+from closedrooms.core.errors import InvalidInputError
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.formats.houseexpo import read_houseexpo
 from closedrooms.worlds.geometry import wall_area
@@ -62,3 +63,11 @@ def test_a_broken_box_costs_that_room_and_is_named(tmp_path: Path) -> None:
     (remark,) = [remark for remark in plan.remarks if remark.loss]
     assert remark.names == ("Hall[1]", "Hall[2]", "Hall[3]")
     assert len(plan.rooms) == 2
+
+
+def test_a_box_outside_costs_that_room_and_nothing_inside_is_refused(tmp_path: Path) -> None:
+    plan = read(tmp_path, SQUARE, Hall=[[0, 0, 10, 8]], Bath=[[20, 0, 30, 8]])
+    (remark,) = [remark for remark in plan.remarks if remark.loss]
+    assert remark.names == ("bath",)
+    with pytest.raises(InvalidInputError, match=r"a plan without rooms \(1 with less than"):
+        read(tmp_path, SQUARE, Bath=[[20, 0, 30, 8]])

@@ -9,8 +9,9 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from closedrooms.core.errors import InvalidInputError
 from closedrooms.worlds.formats.kth import read_kth
-from closedrooms.worlds.geometry import solid_walls, wall_area
+from closedrooms.worlds.geometry import room_interior, solid_walls, wall_area
 from closedrooms.worlds.outline import leaks
 from closedrooms.worlds.plan import FloorPlan
 
@@ -134,3 +135,28 @@ def test_what_the_plan_lost_of_the_files_walls_is_measured(tmp_path: Path) -> No
     assert (remark.what, remark.count, remark.loss) == ("rooms", 2, True)
     (remark,) = settle(plan, (), Source(rooms=5, doors=6), path).remarks
     assert (remark.what, remark.count, remark.loss) == ("doors", 2, True)
+
+
+def test_a_scale_that_leaves_no_room_or_none_on_earth_is_refused_with_the_one_that_fits(tmp_path: Path) -> None:
+    path = tmp_path / "floor.xml"
+    text = floor_xml(0.0, 0.0, 0)
+    path.write_text(text.replace('RealDistance="1"', 'RealDistance="0.05"'))
+    with pytest.raises(
+        InvalidInputError, match=r"without rooms \(5 with an area below .* all lengths times 24 would fit"
+    ):
+        read_kth(path)
+    path.write_text(text.replace('RealDistance="1"', 'RealDistance="1e6"'))
+    with pytest.raises(InvalidInputError, match=r"no usable coordinates.*all lengths times 1e-06 would fit") as caught:
+        read_kth(path)
+    assert str(caught.value).endswith(f": {path}")
+
+
+def test_gaps_between_rooms_close_at_any_angle(tmp_path: Path) -> None:
+    """The walls between offices are inner ones, not two outer ones with a gap."""
+    for degrees in (0.0, 33.0, 71.0):
+        path = tmp_path / "floor.xml"
+        path.write_text(floor_xml(math.radians(degrees), 0.004, 5))
+        plan = read_kth(path)
+        offices = [room_interior(plan, room.id) for room in plan.rooms if room.label == "kontor"]
+        apart = sorted(a.distance(b) for n, a in enumerate(offices) for b in offices[n + 1 :])[:3]
+        assert apart == pytest.approx([0.15] * 3, abs=0.03)

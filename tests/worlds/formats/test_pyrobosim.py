@@ -137,3 +137,15 @@ def test_the_start_is_in_a_room_and_not_in_a_stub_of_a_hallway(tmp_path: Path) -
         plan = read(tmp_path, rooms, [{"room_start": "living", "room_end": "bed", "width": 0.9}])
         pose = start_pose(plan)
         assert next(made.label for made in plan.rooms if made.polygon.covers(shapely.Point(pose.x, pose.y))) == "living"
+
+
+def test_two_rooms_of_one_name_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="two rooms named 'a'; expected names used once"):
+        read(tmp_path, [room("a", 2.0, 2.0), room("a", 2.0, 2.0, pose=[9, 0])], [])
+
+
+def test_rooms_without_a_name_are_counted(tmp_path: Path) -> None:
+    rooms = [room("", 4.0, 4.0), room("", 4.0, 4.0, pose=[4.2, 0.0])]
+    plan = read(tmp_path, rooms, [{"room_start": "room_0", "room_end": "room_1", "width": 0.9}])
+    assert [made.label for made in plan.rooms] == ["room_0", "room_1"]
+    assert len(plan.doors) == 1
