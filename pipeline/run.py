@@ -114,7 +114,10 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
         recorder.building(plan, sim.world_T_map.inverse(), closed)
         log, mapper = RunLog(sim, progress, keep_scans=config.keep_scans), Mapper(config.mapper)
         found = _find_out(config, closed, log, mapper, recorder, progress, watch)
-        remarks = too_narrow(plan, closed, sim.world_T_map, config.navigation.for_robot(config.sim.robot))
+        remarks = [
+            *plan.remarks,
+            *too_narrow(plan, closed, sim.world_T_map, config.navigation.for_robot(config.sim.robot)),
+        ]
         manifest |= _figures(plan, closed, sim.world_T_map.inverse(), found)
         manifest["remarks"] = [remark.as_json() for remark in remarks]
         with watch.stage("write"):

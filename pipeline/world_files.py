@@ -34,7 +34,7 @@ def list_worlds() -> list[str]:
 
 
 def show_world(world: str, out_png: str | Path, *, level: str | None = None, force: bool = False) -> FloorPlan:
-    """Write a picture of a world; returns its plan.
+    """Write a picture of a world; returns its plan, with what was dropped, repaired or guessed in ``remarks``.
 
     Raises:
         InvalidInputError: See :func:`closedrooms.worlds.library.load_world`.
@@ -70,7 +70,7 @@ def generate_world(
 
 
 def convert_world(src: str, dst: str | Path, to: str, *, level: str | None = None, force: bool = False) -> FloorPlan:
-    """Write a world of any known format in the format ``to``; returns its plan.
+    """Write a world of any known format in the format ``to``; returns its plan, with ``remarks``.
 
     Raises:
         InvalidInputError: See :func:`closedrooms.worlds.library.load_world`; an unknown format.

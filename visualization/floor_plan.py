@@ -23,6 +23,8 @@ COLOURS = {
 }  # fmt: skip
 OTHER, WALL, OPEN, CLOSED, START = "#ece9f3", "#3b3f46", "#9a6b3f", "#c0392b", "#1f77b4"
 DOTS_PER_INCH = 110
+# Characters of 10 points in an inch of title, and how many of a name are shown at least.
+CHARACTERS_PER_INCH, SHORTEST_NAME = 11.0, 12
 
 
 def draw_plan(plan: FloorPlan, path_png: str | Path, *, closed: Collection[str] = ()) -> None:
@@ -60,12 +62,23 @@ def draw_plan(plan: FloorPlan, path_png: str | Path, *, closed: Collection[str] 
     _write_labels(axes, plan)
     pose = start_pose(plan)
     axes.plot(pose.x, pose.y, marker=(3, 0, pose.theta * 57.29578 - 90.0), color=START, markersize=9)
-    name = plot_text(plan.name)
-    figure.text(0.01, 0.965, f"{name}   {x_max - x_min:.0f} x {y_max - y_min:.0f} m   {len(plan.rooms)} rooms, "
-                f"{len(plan.doors)} doors", fontsize=10)  # fmt: skip
+    _write_title(figure, plan.name, f"{x_max - x_min:.0f} x {y_max - y_min:.0f} m   {len(plan.rooms)} rooms, "
+                 f"{len(plan.doors)} doors")  # fmt: skip
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})
     write_bytes(Path(path_png), buffer.getvalue())
+
+
+def _write_title(figure: Any, name: str, rest: str) -> None:
+    """The name and figures of a plan, the name shortened until the line fits into the picture."""
+    room = int(figure.get_figwidth() * CHARACTERS_PER_INCH) - len(rest) - 3
+    size = 10.0
+    if room < SHORTEST_NAME:
+        size *= (len(rest) + 3 + room) / (len(rest) + 3 + SHORTEST_NAME)
+        room = SHORTEST_NAME
+    shown = plot_text(name)
+    shown = shown if len(shown) <= room else f"{shown[: room - 3]}..."
+    figure.text(0.01, 0.965, f"{shown}   {rest}", fontsize=size, parse_math=False)
 
 
 def _colour(label: str) -> str:
@@ -87,8 +100,8 @@ def _fill(axes: Any, area: Polygon | MultiPolygon, colour: str, *, edgecolor: st
 def _draw_door(axes: Any, plan: FloorPlan, door: PlanDoor, *, closed: bool) -> None:
     if closed:
         _fill(axes, door_leaf(plan, door).buffer(0.06), CLOSED)
-        name = plot_text(door.id)
-        axes.annotate(name, door.midpoint, xytext=(4, 4), textcoords="offset points", fontsize=6, color=CLOSED)
+        axes.annotate(plot_text(door.id), door.midpoint, xytext=(4, 4), textcoords="offset points", fontsize=6,
+                      color=CLOSED, parse_math=False)  # fmt: skip
     elif door.kind == "hinged":
         _draw_swing(axes, plan, door)
     else:
@@ -121,5 +134,5 @@ def _write_labels(axes: Any, plan: FloorPlan) -> None:
     for room in plan.rooms:
         if room.polygon.area > 4.0:
             point = room.polygon.representative_point()
-            label = f"{plot_text(room.id)}\n{plot_text(room.label)}"
-            axes.text(point.x, point.y, label, fontsize=4.5, ha="center", va="center", color="#555555")
+            axes.text(point.x, point.y, f"{plot_text(room.id)}\n{plot_text(room.label)}", fontsize=4.5, ha="center",
+                      va="center", color="#555555", parse_math=False)  # fmt: skip

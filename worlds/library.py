@@ -1,15 +1,17 @@
 """Worlds by name or file: the bundled ones, and every format that the importers read."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.incoming import is_there, read_head, reading
 from closedrooms.core.nearest import nearest
-from closedrooms.worlds.door_hinges import without_entrances
-from closedrooms.worlds.plan import FloorPlan
+
+if TYPE_CHECKING:
+    from closedrooms.worlds.plan import FloorPlan
 
 # An office of about 40 x 30 m.
 DEFAULT_WORLD = "office-07"
@@ -35,7 +37,7 @@ class Importer:
     name: str
     what: str
     recognises: Callable[[Path, str], bool]
-    read: Callable[[Path, str | None], FloorPlan]
+    read: Callable[[Path, str | None], "FloorPlan"]
     levels: bool = False
 
 
@@ -44,42 +46,90 @@ def bundled_names() -> list[str]:
     return sorted(path.stem for path in PLANS.glob("*.json"))
 
 
-def load_world(name_or_path: str, *, level: str | None = None) -> FloorPlan:
+def load_world(name_or_path: str, *, level: str | None = None) -> "FloorPlan":
     """A bundled world by its name, or a file of any known format, told by its content.
 
-    Doors to the outside are walled up (``meta["sealed"]``): a robot that maps a floor must not leave it.
+    Doors to the outside are walled up (``meta["sealed"]``) and open outlines closed: a robot that maps a floor must
+    not leave it. What was dropped, repaired or guessed on reading is in the plan's ``remarks``.
 
     Args:
-        name_or_path: A name wins over a file of the same name.
+        name_or_path: A name wins over a file of the same name; ``FILE:LEVEL`` names the floor too.
         level: Which floor, for files that hold several.
 
     Raises:
         InvalidInputError: Neither a name nor a file (the message lists the names), an unknown format, a plan that
             is not valid.
     """
-    return without_entrances(read_world(name_or_path, level=level))
+    from closedrooms.worlds.door_hinges import without_entrances
+    from closedrooms.worlds.outline import without_leaks
+
+    plan = without_entrances(read_world(name_or_path, level=level))
+    return plan if name_or_path in bundled_names() else without_leaks(plan)
 
 
-def read_world(name_or_path: str, *, level: str | None = None) -> FloorPlan:
+def read_world(name_or_path: str, *, level: str | None = None) -> "FloorPlan":
     """As :func:`load_world`, entrances included."""
     from closedrooms.worlds.formats.native import read_plan
 
     if name_or_path in bundled_names():
         _refuse_level(level, name_or_path)
         return read_plan(PLANS / f"{name_or_path}.json")
-    path = Path(name_or_path)
-    if not is_there(path):
-        names = ", ".join(bundled_names())
-        near = nearest(name_or_path, bundled_names())
-        meant = f" (did you mean {near}?)" if near else ""
-        raise InvalidInputError(
-            f"unknown world {name_or_path!r}{meant}", expected=f"a floor plan file or one of {names}"
-        )
+    path, level = split_level(name_or_path, level)
     importer = importer_of(path)
     if not importer.levels:
         _refuse_level(level, path)
     with reading(path, importer.what):
         return importer.read(path, level)
+
+
+def split_level(given: str, level: str | None = None) -> tuple[Path, str | None]:
+    """The file and the floor that ``FILE`` or ``FILE:LEVEL`` names.
+
+    Raises:
+        InvalidInputError: There is no such file, or ``level`` is another one.
+    """
+    if _is_file_name(given):
+        return Path(given), level
+    for at in range(len(given) - 1, 0, -1):
+        if given[at] == ":" and given[at + 1 :] and _is_file_name(given[:at]):
+            if level not in (None, given[at + 1 :]):
+                raise InvalidInputError(f"--level {level} of {given[at + 1 :]!r}", expected="one level", where=given)
+            return Path(given[:at]), given[at + 1 :]
+    names = ", ".join(bundled_names())
+    shown = given if len(given) <= 80 else f"...{given[-77:]}"
+    near = nearest(given, bundled_names())
+    meant = f" (did you mean {near}?)" if near else ""
+    raise InvalidInputError(f"unknown world {shown!r}{meant}", expected=f"a floor plan file or one of {names}")
+
+
+def _is_file_name(given: str) -> bool:
+    return bool(given) and is_there(Path(given))
+
+
+def distinct_names(plans: Sequence["FloorPlan"], sources: Sequence[str]) -> list[str]:
+    """A name for each plan, its own where no other plan has it.
+
+    Plans of one name are told apart by the folders of their files, as few of them as it takes, and by a number where
+    that is not enough; the order of the plans does not matter for the former.
+
+    Args:
+        plans: In any order.
+        sources: The file that each was read from, or its bundled name.
+    """
+    names = [plan.name for plan in plans]
+    folders = [Path(source).resolve().parent.parts[::-1] for source in sources]
+    result = [*names]
+    for name in {name for name in names if names.count(name) > 1}:
+        same = [number for number, other in enumerate(names) if other == name]
+        for depth in range(1, max(len(folders[number]) for number in same) + 1):
+            told = ["-".join([*folders[number][:depth][::-1], name]).lstrip("/-") for number in same]
+            if len({*told}) == len(same):
+                break
+        else:
+            told = [name if k == 0 else f"{name}-{k + 1}" for k in range(len(same))]
+        for number, better in zip(same, told, strict=True):
+            result[number] = better
+    return result
 
 
 def _refuse_level(level: str | None, where: str | Path) -> None:

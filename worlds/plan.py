@@ -6,6 +6,7 @@ from typing import Literal
 from shapely.geometry import Polygon
 
 from closedrooms.core.door import Point, Segment
+from closedrooms.core.remarks import Remark
 
 DoorKind = Literal["hinged", "double", "sliding"]
 
@@ -96,7 +97,8 @@ class FloorPlan:
         openings: Every passage without a door.
         start: Where the robot starts ``(x, y, heading)`` [m, rad], or ``None`` where an importer knows none.
         furniture: Optional clutter.
-        meta: Where the plan came from: generator version and seed, source file, what was repaired.
+        meta: Where the plan came from: generator version and seed, source file.
+        remarks: What was dropped, repaired or guessed on reading; neither compared nor written.
     """
 
     name: str
@@ -107,6 +109,7 @@ class FloorPlan:
     start: tuple[float, float, float] | None = None
     furniture: tuple[Furniture, ...] = ()
     meta: dict[str, object] = field(default_factory=dict)
+    remarks: tuple[Remark, ...] = field(default=(), compare=False)
 
     @property
     def passages(self) -> tuple[PlanDoor | Opening, ...]:

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from collections.abc import Iterable
 
 import numpy as np
 import shapely
@@ -20,13 +21,13 @@ CLEARANCE = 0.3
 
 
 def start_room(plan: FloorPlan) -> str:
-    """Id of the room that the robot starts in: that of ``plan.start``, else the main circulation room.
+    """Id of the room that the robot starts in: that of ``plan.start``, else the main room.
 
     Raises:
-        InvalidInputError: ``plan.start`` lies in no room, or the plan has no room.
+        InvalidInputError: ``plan.start`` lies in no room, or the robot fits into none.
     """
     if plan.start is None:
-        return _main_room(plan).id
+        return _main_room(plan)[0].id
     point = shapely.Point(plan.start[0], plan.start[1])
     for room in plan.rooms:
         if room.polygon.covers(point):
@@ -38,36 +39,56 @@ def start_room(plan: FloorPlan) -> str:
 
 
 def start_pose(plan: FloorPlan) -> Pose2:
-    """``world_T_robot`` at the start: ``plan.start``, or the widest place of the main circulation room.
+    """``world_T_robot`` at the start: ``plan.start``, or the widest place of the main room.
 
-    The main room is the largest among the circulation rooms (by their label, else by their passages) of the
-    largest connected part; the heading is along its longer side.
+    The main room is the one with most passages of those in the largest connected part that the robot fits into;
+    between equals a circulation room by its label, then the larger one. The heading is along its longer side.
 
     Raises:
-        InvalidInputError: The plan has no room, or furniture fills the one to start in.
+        InvalidInputError: The robot fits into no room.
     """
     if plan.start is not None:
         return Pose2(*plan.start)
-    room = _main_room(plan)
+    _, place = _main_room(plan)
+    circle = shapely.maximum_inscribed_circle(place, tolerance=0.05)
+    centre = shapely.get_coordinates(circle)[0]
+    return Pose2(round(float(centre[0]), 3), round(float(centre[1]), 3), round(_long_side(place), 4))
+
+
+def _main_room(plan: FloorPlan) -> tuple[PlanRoom, Polygon]:
+    """The room that the robot starts in, and the part of its floor that it fits into."""
+    passages = Counter(room for p in plan.passages if None not in p.rooms for room in p.rooms)
+    for part in _parts_by_area(plan):
+        rooms = [room for room in plan.rooms if room.id in part]
+        for room in sorted(rooms, key=lambda room: _rank(room, passages), reverse=True):
+            place = _place_in(plan, room)
+            if place is not None:
+                return room, place
+    raise InvalidInputError(
+        "a plan without a place for the robot", expected=f"a room with a free circle of {CLEARANCE} m radius",
+        where=plan.name,
+    )  # fmt: skip
+
+
+def _rank(room: PlanRoom, passages: Counter[str | None]) -> tuple[int, bool, float]:
+    """What makes a room the better start: passages, then its label, then its size."""
+    circulation = any(word in room.label.lower() for word in CIRCULATION)
+    return (passages[room.id], circulation, room.polygon.area)
+
+
+def _place_in(plan: FloorPlan, room: PlanRoom) -> Polygon | None:
+    """The largest part of a room's free floor that the robot can stand and drive in, narrow passages cut."""
     interior = room_interior(plan, room.id)
     blocked = [thing.polygon for thing in plan.furniture if thing.polygon.intersects(interior)]
     free = shapely.difference(interior, shapely.union_all(blocked)) if blocked else interior
-    if free.area < CLEARANCE**2:
-        raise InvalidInputError(f"no free floor in room {room.id}", expected="a place to start from", where=plan.name)
-    largest = _widest_part(free)
-    circle = shapely.maximum_inscribed_circle(largest, tolerance=0.05)
-    centre = shapely.get_coordinates(circle)[0]
-    return Pose2(round(float(centre[0]), 3), round(float(centre[1]), 3), round(_long_side(largest), 4))
-
-
-def _widest_part(free: BaseGeometry) -> Polygon:
-    """The largest part of a free area that a robot can drive through, passages too narrow for it cut."""
-    cores = [part for part in shapely.get_parts(free.buffer(-CLEARANCE)) if isinstance(part, Polygon)]
-    parts = [part for part in shapely.get_parts(free) if isinstance(part, Polygon)]
+    cores = [part for part in shapely.get_parts(free.buffer(-CLEARANCE)) if isinstance(part, Polygon) and part.area > 0]
+    if not cores:
+        return None
+    parts: Iterable[BaseGeometry] = shapely.get_parts(free)
     if len(cores) > 1:
         core = max(cores, key=lambda part: part.area)
-        parts = [part for part in shapely.get_parts(free & core.buffer(CLEARANCE)) if isinstance(part, Polygon)]
-    return max(parts, key=lambda part: part.area)
+        parts = shapely.get_parts(free & core.buffer(CLEARANCE))
+    return max((part for part in parts if isinstance(part, Polygon)), key=lambda part: part.area)
 
 
 def _long_side(area: Polygon) -> float:
@@ -80,21 +101,8 @@ def _long_side(area: Polygon) -> float:
     return angle - math.pi if angle > half + 1e-9 else angle + math.pi if angle <= -half + 1e-9 else angle
 
 
-def _main_room(plan: FloorPlan) -> PlanRoom:
-    if not plan.rooms:
-        raise InvalidInputError("a plan without rooms", expected="at least one room", where=plan.name)
-    part = _largest_part(plan)
-    passages = Counter(room for p in plan.passages if None not in p.rooms for room in p.rooms if room in part)
-    rooms = [room for room in plan.rooms if room.id in part]
-    circulation = [room for room in rooms if any(word in room.label.lower() for word in CIRCULATION)]
-    busy = [room for room in circulation if passages[room.id] >= 2] or circulation
-    if busy:
-        return max(busy, key=lambda room: room.polygon.area)
-    return max(rooms, key=lambda room: (passages[room.id], room.polygon.area))
-
-
-def _largest_part(plan: FloorPlan) -> set[str]:
-    """The connected part of the building with the largest area, every door open."""
+def _parts_by_area(plan: FloorPlan) -> list[set[str]]:
+    """The connected parts of the building, every door open, the largest first."""
     area = {room.id: room.polygon.area for room in plan.rooms}
     parts = connected_parts([room.id for room in plan.rooms], [passage.rooms for passage in plan.passages])
-    return max(parts, key=lambda part: (sum(area[room] for room in sorted(part)), min(part)))
+    return sorted(parts, key=lambda part: (sum(area[room] for room in sorted(part)), min(part)), reverse=True)

@@ -1,7 +1,7 @@
 """What a floor plan must satisfy before anything is built from it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import shapely
@@ -10,19 +10,21 @@ from shapely.strtree import STRtree
 
 from closedrooms.core.door import Segment
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.worlds.geometry import wall_area
+from closedrooms.worlds.geometry import WallLines, wall_area
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
 
 # Jambs lie on a wall's centre line within this [m].
 ON_WALL = 0.02
 # A door's middle lies within this of both its rooms, beside half the wall's thickness [m].
 AT_ROOM = 0.15
+# Two passages may share so much of a wall by rounding [m].
+OVERLAPPING = 0.1
 # Rooms may overlap by this share of the smaller one, no more.
 OVERLAP = 0.2
 # The largest building read, and the largest coordinate [m].
 MAX_COORDINATE = 10_000.0
-# A robot stands free of walls by this radius at the start [m].
-START_RADIUS = 0.15
+# A robot of usual size stands free of walls by this radius at the start [m].
+START_RADIUS = 0.2
 
 
 def validate(plan: FloorPlan, where: str = "") -> None:
@@ -49,7 +51,6 @@ def _check_names(plan: FloorPlan, where: str) -> None:
     names = [
         *(("room", room.id) for room in plan.rooms),
         *(("wall", wall.id) for wall in plan.walls),
-        *(("door or opening", passage.id) for passage in plan.passages),
         *(("piece of furniture", thing.id) for thing in plan.furniture),
     ]
     seen: set[tuple[str, str]] = set()
@@ -94,65 +95,121 @@ def _check_walls(plan: FloorPlan, where: str) -> None:
     if not plan.walls:
         raise InvalidInputError("a plan without walls", expected="at least one wall", where=where)
     for wall in plan.walls:
-        _check_segment(f"wall {wall.id}", wall.segment, 1e-4, where)
+        fault = _segment_fault(f"wall {wall.id}", wall.segment, 1e-4)
+        if fault is not None:
+            raise InvalidInputError(fault[0], expected=fault[1], where=where)
         if not (math.isfinite(wall.thickness) and 0.01 <= wall.thickness <= 5.0):
             raise InvalidInputError(
                 f"wall {wall.id} of thickness {wall.thickness:g} m", expected="0.01 to 5 m", where=where
             )
 
 
-def _check_segment(name: str, segment: Segment, shortest: float, where: str) -> None:
+def _segment_fault(name: str, segment: Segment, shortest: float) -> tuple[str, str] | None:
     (x0, y0), (x1, y1) = segment
     if not all(math.isfinite(v) and abs(v) <= MAX_COORDINATE for v in (x0, y0, x1, y1)):
-        raise InvalidInputError(
-            f"{name} has no usable coordinates", expected=f"metres within +-{MAX_COORDINATE:g}", where=where
-        )
+        return (f"{name} has no usable coordinates", f"metres within +-{MAX_COORDINATE:g}")
     if math.hypot(x1 - x0, y1 - y0) < shortest:
-        raise InvalidInputError(f"{name} is {math.hypot(x1 - x0, y1 - y0):.3f} m long",
-                                expected=f"at least {shortest:g} m", where=where)  # fmt: skip
+        return (f"{name} is {math.hypot(x1 - x0, y1 - y0):.3f} m long", f"at least {shortest:g} m")
+    return None
 
 
 def _check_passages(plan: FloorPlan, where: str) -> None:
+    for what, expected in passage_faults(plan).values():
+        raise InvalidInputError(what, expected=expected, where=where)
+
+
+def passage_faults(plan: FloorPlan) -> dict[int, tuple[str, str]]:
+    """What is wrong with doors and openings, and what was expected, by their number among ``plan.passages``.
+
+    Args:
+        plan: Its rooms and walls are as they should be.
+    """
     rooms = {room.id: room.polygon for room in plan.rooms}
-    thickest = max(wall.thickness for wall in plan.walls)
+    thickest = max((wall.thickness for wall in plan.walls), default=0.0)
+    lines = WallLines(plan)
     on_wall = _on_walls(plan, [door.segment for door in plan.doors])
+    seen: set[str] = set()
+    faults: dict[int, tuple[str, str]] = {}
     for number, passage in enumerate(plan.passages):
-        kind = "door" if isinstance(passage, PlanDoor) else "opening"
-        name = f"{kind} {passage.id}"
-        _check_segment(name, passage.segment, 0.3, where)
-        _check_sides(name, passage, rooms, where)
-        if number < len(plan.doors) and not on_wall[number]:
-            raise InvalidInputError(f"{name} stands on no wall", expected="both jambs on a wall", where=where)
-        (x0, y0), (x1, y1) = passage.segment
-        middle = shapely.Point((x0 + x1) / 2, (y0 + y1) / 2)
-        for room in passage.rooms:
-            if room is not None and rooms[room].distance(middle) > thickest / 2 + AT_ROOM:
-                raise InvalidInputError(
-                    f"{name} is {rooms[room].distance(middle):.2f} m away from room {room}",
-                    expected="a door at the wall of its rooms", where=where,
-                )  # fmt: skip
-        if isinstance(passage, PlanDoor) and passage.opens_into not in passage.rooms:
-            raise InvalidInputError(
-                f"{name} opens into {passage.opens_into!r}", expected=f"one of its rooms {passage.rooms}", where=where
-            )
+        is_door = isinstance(passage, PlanDoor)
+        name = f"{'door' if is_door else 'opening'} {passage.id}"
+        fault = (
+            (f"two door or openings with the id {passage.id!r}", "ids used once")
+            if passage.id in seen
+            else _segment_fault(name, passage.segment, 0.3)
+            or _sides_fault(name, passage, rooms)
+            or ((f"{name} stands on no wall", "both jambs on a wall") if is_door and not on_wall[number] else None)
+            or _place_fault(name, passage, rooms, thickest, lines)
+            or _overlap_fault(name, passage, plan.passages, number, faults)
+        )
+        if fault is None and isinstance(passage, PlanDoor) and passage.opens_into not in passage.rooms:
+            fault = (f"{name} opens into {passage.opens_into!r}", f"one of its rooms {passage.rooms}")
+        if fault is not None:
+            faults[number] = fault
+        seen.add(passage.id)
+    return faults
 
 
-def _check_sides(name: str, passage: PlanDoor | Opening, rooms: dict[str, Polygon], where: str) -> None:
+def _overlap_fault(
+    name: str,
+    passage: PlanDoor | Opening,
+    passages: Sequence[PlanDoor | Opening],
+    number: int,
+    faults: Collection[int],
+) -> tuple[str, str] | None:
+    """A passage on the place of an earlier one that is kept."""
+    line = shapely.LineString(passage.segment)
+    for before, other in enumerate(passages[:number]):
+        if before not in faults and line.distance(shapely.LineString(other.segment)) < ON_WALL:
+            strip = shapely.LineString(other.segment).buffer(ON_WALL, cap_style="flat")
+            if line.intersection(strip).length > OVERLAPPING:
+                return (f"{name} lies on {other.id}", "one passage in a place")
+    return None
+
+
+def _sides_fault(name: str, passage: PlanDoor | Opening, rooms: dict[str, Polygon]) -> tuple[str, str] | None:
     for room in passage.rooms:
         if room is not None and room not in rooms:
-            raise InvalidInputError(f"{name} leads to the unknown room {room!r}", expected="a room id", where=where)
+            return (f"{name} leads to the unknown room {room!r}", "a room id")
     if passage.rooms[0] == passage.rooms[1]:
-        raise InvalidInputError(
-            f"{name} has {passage.rooms[0]!r} on both sides", expected="two different sides", where=where
-        )
+        return (f"{name} has {passage.rooms[0]!r} on both sides", "two different sides")
+    return None
+
+
+def _place_fault(
+    name: str, passage: PlanDoor | Opening, rooms: dict[str, Polygon], thickest: float, lines: WallLines
+) -> tuple[str, str] | None:
+    """A passage away from its rooms, or with one of them on the wrong side."""
+    (x0, y0), (x1, y1) = passage.segment
+    middle = shapely.Point((x0 + x1) / 2, (y0 + y1) / 2)
+    for room in passage.rooms:
+        if room is not None and rooms[room].distance(middle) > thickest / 2 + AT_ROOM:
+            return (f"{name} is {rooms[room].distance(middle):.2f} m away from room {room}",
+                    "a door at the wall of its rooms")  # fmt: skip
+    depth = (lines.thickness(passage.segment) or 0.0) / 2 + AT_ROOM
+    length = math.hypot(x1 - x0, y1 - y0)
+    nx, ny = -(y1 - y0) / length * depth, (x1 - x0) / length * depth
+    left, right = shapely.Point(middle.x + nx, middle.y + ny), shapely.Point(middle.x - nx, middle.y - ny)
+
+    def beside(first: shapely.Point, second: shapely.Point) -> bool:
+        places = zip(passage.rooms, (first, second), strict=True)
+        return all(room is None or rooms[room].distance(place) < AT_ROOM for room, place in places)
+
+    if beside(left, right) or beside(right, left):
+        return None
+    return (f"{name} does not lead from {passage.rooms[0]} to {passage.rooms[1]}", "its rooms on both its sides")
 
 
 def _on_walls(plan: FloorPlan, segments: Sequence[Segment]) -> list[bool]:
     """Whether each segment lies on the walls' centre lines along its whole length."""
-    lines = np.asarray(shapely.linestrings(np.array([wall.segment for wall in plan.walls], dtype=np.float64)))
+    centre_lines = np.array([wall.segment for wall in plan.walls], dtype=np.float64).reshape(-1, 2, 2)
+    lines = np.asarray(shapely.linestrings(centre_lines))
     tree = STRtree(lines)
     result = []
     for segment in segments:
+        if not np.isfinite(segment).all():
+            result.append(False)
+            continue
         probe = shapely.LineString(segment)
         near = np.sort(tree.query(probe, predicate="dwithin", distance=ON_WALL))
         strip = shapely.union_all(shapely.buffer(lines[near], ON_WALL, cap_style="square", quad_segs=2))

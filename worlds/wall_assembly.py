@@ -72,36 +72,50 @@ def shared_edges(polygons: Sequence[Polygon]) -> list[Edge]:
 
 
 def joined(segments: Iterable[Segment]) -> list[Segment]:
-    """Segments with collinear neighbours that touch put together."""
+    """Segments put together to straight runs as long as they go.
+
+    A run grows from piece to touching piece while all its points lie within :data:`STRAIGHT` of the line between its
+    ends, so that slow bends are cut into several runs. Every piece is part of one run.
+
+    Returns:
+        The two ends of each run that lie furthest apart along it, the smaller first.
+    """
     pieces = sorted({(min(s), max(s)) for s in segments})
     at: defaultdict[Point, list[int]] = defaultdict(list)
-    for index, (a, b) in enumerate(pieces):
-        at[a].append(index)
-        at[b].append(index)
-    parent = list(range(len(pieces)))
-
-    def root(index: int) -> int:
-        while parent[index] != index:
-            parent[index] = parent[parent[index]]
-            index = parent[index]
-        return index
-
-    for meeting in at.values():
-        for k, i in enumerate(meeting):
-            for j in meeting[k + 1 :]:
-                if _collinear(pieces[i], pieces[j]):
-                    parent[max(root(i), root(j))] = min(root(i), root(j))
-    groups: defaultdict[int, list[Point]] = defaultdict(list)
     for index, piece in enumerate(pieces):
-        groups[root(index)] += piece
-    return [(min(points), max(points)) for points in groups.values()]
+        for point in piece:
+            at[point].append(index)
+    runs: list[Segment] = []
+    used = [False] * len(pieces)
+    for first, piece in enumerate(pieces):
+        if used[first]:
+            continue
+        used[first] = True
+        points, waiting, ends = [*piece], [*piece], piece
+        while waiting:
+            for index in at[waiting.pop()]:
+                longer = None if used[index] else _straight_run([*points, *pieces[index]])
+                if longer is not None:
+                    used[index], ends = True, longer
+                    points += pieces[index]
+                    waiting += pieces[index]
+        runs.append((min(ends), max(ends)))
+    return runs
 
 
-def _collinear(first: Segment, second: Segment) -> bool:
-    longer, shorter = (second, first) if math.dist(*first) < math.dist(*second) else (first, second)
-    (x0, y0), length = longer[0], math.dist(*longer)
-    ux, uy = (longer[1][0] - x0) / length, (longer[1][1] - y0) / length
-    return all(abs(ux * (y - y0) - uy * (x - x0)) <= STRAIGHT for x, y in shorter)
+def _straight_run(points: Sequence[Point]) -> Segment | None:
+    """The two of ``points`` that lie furthest apart along their direction; ``None`` where others lie off their line.
+
+    The point furthest from the middle and the one furthest from it: of points on one line these are the ends, however
+    the line is turned.
+    """
+    x, y = (math.fsum(values) / len(points) for values in zip(*points, strict=True))
+    start = max(points, key=lambda point: math.dist(point, (x, y)))
+    end = max(points, key=lambda point: math.dist(point, start))
+    length = math.dist(start, end)
+    ux, uy = (end[0] - start[0]) / length, (end[1] - start[1]) / length
+    aside = max(abs(ux * (y - start[1]) - uy * (x - start[0])) for x, y in points)
+    return (start, end) if aside <= STRAIGHT else None
 
 
 def walls_along(edges: Sequence[Edge], thickness: Callable[[Edge], float]) -> list[Wall]:
@@ -167,7 +181,7 @@ def coverage(polygons: Sequence[Polygon], *, gap: float = 0.0, snap: float = -1.
 
 
 def without_gaps(
-    polygons: Sequence[Polygon], width: float, *, fixed: int = 0, branches: bool = True
+    polygons: Sequence[Polygon], width: float, *, fixed: int = 0, branches: bool = True, touching: float = 0.0
 ) -> tuple[list[Polygon], list[Polygon]]:
     """Rooms grown into the gaps and notches between them that are narrower than ``width`` metres.
 
@@ -176,6 +190,7 @@ def without_gaps(
         width: Metres.
         fixed: So many rooms at the front keep their shape.
         branches: Cut gaps where they branch and join each piece by itself.
+        touching: Gap and room touch within this [m]: at odd angles they do so up to rounding only.
 
     Returns:
         The rooms, each gap joined to the one with the longest border of those around it, and the gaps themselves.
@@ -191,15 +206,23 @@ def without_gaps(
     filled = []
     for gap in gaps:
         near = np.sort(tree.query(gap, predicate="dwithin", distance=width)).tolist()
-        shared = {i: rooms[i].boundary.intersection(gap.boundary).length for i in near}
+        shared = {i: _border(gap, rooms[i], touching) for i in near}
         best = max((i for i in near if i >= fixed), key=lambda i: shared[i], default=None)
         if best is None:
             continue
         grown = areal(rooms[best].union(gap))
+        if touching and not isinstance(grown, Polygon):
+            grown = areal(rooms[best].union(gap.buffer(touching, join_style="mitre")))
         if sum(length > 0.05 for length in shared.values()) >= 2 and isinstance(grown, Polygon):
             rooms[best] = grown
             filled.append(gap)
     return rooms, filled
+
+
+def _border(gap: Polygon, room: Polygon, touching: float) -> float:
+    """How long a gap and a room touch [m]."""
+    beside = room.buffer(touching, quad_segs=1) if touching else room.boundary
+    return float(beside.intersection(gap.boundary).length)
 
 
 def _is_narrow(part: Polygon, width: float, least: float = 1e-3) -> bool:

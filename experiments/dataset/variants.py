@@ -13,7 +13,7 @@ from closedrooms.core.random import stream
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.formats.native import plan_text
-from closedrooms.worlds.library import bundled_names, load_world
+from closedrooms.worlds.library import bundled_names, distinct_names, load_world
 from closedrooms.worlds.plan import FloorPlan
 
 Split = Literal["train", "validation", "test"]
@@ -69,13 +69,14 @@ def find_worlds(config: DatasetConfig) -> list[World]:
         InvalidInputError: An unreadable world, two of one name, or one without a room that a door closes.
     """
     wanted = [name for given in config.worlds for name in (bundled_names() if given == ALL else [given])]
+    given = list(dict.fromkeys(wanted))
+    plans = [load_world(text) for text in given]
+    sources = [text if text in bundled_names() else str(Path(text).resolve()) for text in given]
     found: dict[str, tuple[str, FloorPlan]] = {}
-    for given in dict.fromkeys(wanted):
-        plan = load_world(given)
-        source = given if given in bundled_names() else str(Path(given).resolve())
-        name = re.sub(r"[^A-Za-z0-9._-]+", "-", plan.name).strip(".-") or "world"
+    for told, source, plan in zip(distinct_names(plans, sources), sources, plans, strict=True):
+        name = re.sub(r"[^A-Za-z0-9._-]+", "-", told).strip(".-") or "world"
         if name in found:
-            raise InvalidInputError(f"two worlds named {name!r}", expected="one world a name", where=given)
+            raise InvalidInputError(f"two worlds named {name!r}", expected="one world a name", where=source)
         found[name] = (source, plan)
     names = sorted(found)
     splits = split_buildings(names, config.seed)

@@ -14,6 +14,7 @@ from typing import Any
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError, reason
 from closedrooms.core.files import MANIFEST, PROGRAM, only_writer, write_json
 from closedrooms.core.incoming import read_json
+from closedrooms.core.names import file_name
 from closedrooms.core.report import Report
 from closedrooms.experiments.evaluation.claimed_folder import claim
 from closedrooms.experiments.evaluation.tours import code_digest
@@ -23,7 +24,7 @@ from closedrooms.experiments.robustness.onset import Onset
 from closedrooms.experiments.workers import one_thread
 from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
-from closedrooms.worlds.library import bundled_names, load_world
+from closedrooms.worlds.library import bundled_names, distinct_names, load_world
 
 Row = dict[str, Any]
 ALL = "all"
@@ -109,15 +110,9 @@ def _rows(onsets: Sequence[Onset]) -> list[tuple[str, ...]]:
 def _worlds(given: Sequence[str]) -> dict[str, str]:
     """Names of the worlds by what was given."""
     wanted = [name for text in given for name in (bundled_names() if text == ALL else [text])]
-    found: dict[str, str] = {}
-    for text in dict.fromkeys(wanted):
-        name = load_world(text).name
-        if name in found.values():
-            raise InvalidInputError(f"two worlds named {name!r}", expected="one world a name", where=text)
-        if not name or Path(name).name != name or name.startswith("."):
-            raise InvalidInputError(f"a world named {name!r}", expected="a name fit for a folder", where=text)
-        found[text] = name
-    return found
+    given = list(dict.fromkeys(wanted))
+    names = distinct_names([load_world(text) for text in given], given)
+    return {text: file_name(name) for text, name in zip(given, names, strict=True)}
 
 
 def _work(worlds: dict[str, str], config: RobustnessConfig) -> Iterator[tuple[int, dict[str, str]]]:

@@ -19,7 +19,7 @@ from PIL import Image
 from closedrooms.core.geojson import read_doors, read_rooms
 from closedrooms.core.rosmap import read_ros_map
 from closedrooms.core.tum import read_trajectory
-from closedrooms.mapping.logs.recorded_run import read_run
+from closedrooms.mapping.logs import read_run
 from closedrooms.worlds.library import load_world
 
 FIXTURES = Path(__file__).parents[1] / "fixtures"

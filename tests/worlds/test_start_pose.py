@@ -1,4 +1,5 @@
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 import shapely
@@ -7,7 +8,7 @@ from shapely.geometry import box
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.worlds.geometry import wall_area
 from closedrooms.worlds.library import bundled_names, load_world
-from closedrooms.worlds.plan import FloorPlan, Furniture, PlanRoom, Wall
+from closedrooms.worlds.plan import FloorPlan, Furniture, Opening, PlanRoom, Wall
 from closedrooms.worlds.start_pose import start_pose, start_room
 
 
@@ -59,3 +60,47 @@ def test_a_part_behind_a_gap_too_narrow_for_a_robot_is_not_started_in(small: Flo
         walls=(*small.walls[:4], Wall("w9", ((7.0, 0.0), (7.0, 3.0)), 0.2)),
     )
     assert start_room(wide) == "r0"
+
+
+def test_a_hallway_too_small_for_the_robot_is_no_start_whatever_its_label(small: FloorPlan) -> None:
+    """The stub between two rooms has most passages and the label, but no floor."""
+    rooms = (
+        PlanRoom("r0", "living", box(0, 0, 4, 4)),
+        PlanRoom("r1", "hallway", box(4, 1.5, 4.3, 2.5)),
+        PlanRoom("r2", "bed", box(4.3, 0.5, 7, 3.5)),
+    )
+    outlines = [((x0, y0), (x1, y1)) for room in rooms for (x0, y0), (x1, y1) in pairwise(room.polygon.exterior.coords)]
+    walls = tuple(Wall(f"w{n}", segment, 0.2) for n, segment in enumerate(outlines))
+    openings = (
+        Opening("o0", ((4, 1.6), (4, 2.4)), ("r0", "r1")),
+        Opening("o1", ((4.3, 1.6), (4.3, 2.4)), ("r1", "r2")),
+    )
+    plan = replace(small, rooms=rooms, walls=walls, doors=(), openings=openings, start=None)
+    assert start_room(plan) == "r0"
+    pose = start_pose(plan)
+    assert wall_area(plan).distance(shapely.Point(pose.x, pose.y)) > 0.3
+
+
+def test_labels_only_break_ties(small: FloorPlan) -> None:
+    plan = replace(small, start=None, rooms=tuple(replace(r, label="room") for r in small.rooms))
+    assert start_room(plan) == "r0"
+    # The corridor has more doors than a room that is called one.
+    called = tuple(replace(room, label="hall" if room.id == "r2" else "room") for room in small.rooms)
+    assert start_room(replace(plan, rooms=called)) == "r0"
+    # With as many doors as the others, the label decides, without one the size.
+    alike = replace(plan, doors=plan.doors[:2], openings=())
+    pair = replace(alike, rooms=small.rooms[:2], doors=plan.doors[:1])
+    assert start_room(replace(pair, rooms=tuple(replace(r, label="room") for r in pair.rooms))) == "r0"
+    called = (replace(pair.rooms[0], label="room"), replace(pair.rooms[1], label="hall"))
+    assert start_room(replace(pair, rooms=called)) == "r1"
+
+
+def test_a_room_full_of_furniture_is_no_start(small: FloorPlan) -> None:
+    plan = replace(small, start=None, furniture=(Furniture("f0", box(0, 0, 12, 2)),))
+    assert start_room(plan) != "r0"
+
+
+def test_a_plan_in_which_the_robot_fits_nowhere_is_one_clear_line(small: FloorPlan) -> None:
+    plan = replace(small, start=None, furniture=(Furniture("f0", box(0, 0, 12, 5)),))
+    with pytest.raises(InvalidInputError, match="a plan without a place for the robot; expected a room"):
+        start_pose(plan)

@@ -46,6 +46,11 @@ def door(**changes: Any) -> PlanDoor:
         ({"doors": (door(rooms=("r0", "r0")),)}, "door d9 has 'r0' on both sides"),
         ({"doors": (door(rooms=("r0", "r3"), opens_into="r3"),)}, "door d9 is .* away from room r3"),
         ({"doors": (door(opens_into="r3"),)}, "door d9 opens into 'r3'"),
+        ({"doors": (door(), door(id="d8", segment=((3.0, 2.0), (3.9, 2.0))))}, "door d8 lies on d9"),
+        (
+            {"doors": (door(rooms=("r1", "r2"), opens_into="r2", segment=((3.5, 2.0), (4.4, 2.0))),)},
+            "does not lead from",
+        ),
         ({"openings": (Opening("d0", ((9.0, 2.0), (10.0, 2.0)), ("r0", "r3")),)}, "two door or openings .*'d0'"),
         ({"start": (0.1, 1.0, 0.0)}, "the start .* lies inside a wall"),
         ({"start": (50.0, 1.0, 0.0)}, "the start .* lies in no room"),

@@ -10,11 +10,12 @@ from shapely.geometry import Polygon
 
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.remarks import Remark
 from closedrooms.worlds.formats.portals import Portal, paired, plan_of_portals
-from closedrooms.worlds.formats.room_outlines import clean_outlines, repaired
+from closedrooms.worlds.formats.room_outlines import GAP, clean_outlines, hull_areas, outline_lines, repaired
+from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
 from closedrooms.worlds.formats.xml_text import attribute, child, descendants, parse_xml, text
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
-from closedrooms.worlds.validation import validate
 
 WHAT = "a floor plan (KTH XML)"
 # Both rooms draw a door on their own side of the wall, about 0.16 m apart; up to this distance it is one door [m].
@@ -25,7 +26,7 @@ MAX_SPACES = 5000
 
 
 def read_kth(path: str | Path) -> FloorPlan:
-    """Read one floor; what was repaired stands in ``meta["repairs"]``.
+    """Read one floor; what was dropped, repaired or guessed stands in its ``remarks``.
 
     Raises:
         InvalidInputError: Missing file, broken XML, no scale, no room with a contour.
@@ -36,18 +37,27 @@ def read_kth(path: str | Path) -> FloorPlan:
     spaces = descendants(root, "space")
     if len(spaces) > MAX_SPACES:
         raise InvalidInputError(f"{len(spaces)} spaces", expected=f"at most {MAX_SPACES}", where=path)
-    repairs: list[str] = []
-    outlines = [_outline(space, number, metres, repairs) for number, space in enumerate(spaces)]
-    polygons = clean_outlines(outlines, repairs, what="space")
+    remarks: list[Remark] = []
+    names = [f"{_field(space, 'name') or number} ({_label(space)})" for number, space in enumerate(spaces)]
+    outlines = [_outline(space, name, metres, remarks) for space, name in zip(spaces, names, strict=True)]
+    polygons = clean_outlines(outlines, remarks, names=names)
     kept = [(space, polygon) for space, polygon in zip(spaces, polygons, strict=True) if polygon is not None]
     if not kept:
-        raise InvalidInputError("a plan without rooms", expected="spaces with a contour", where=path)
+        corners = [[point for _, segment in _lines(space, metres) for point in segment] for space in spaces]
+        raise no_rooms("spaces with a contour", hull_areas(corners), remarks, path)
     rooms = tuple(PlanRoom(f"r{i:02d}", _label(space), polygon) for i, (space, polygon) in enumerate(kept))
-    portals = _portals([space for space, _ in kept], rooms, metres, repairs)
-    plan = plan_of_portals(rooms, portals, repairs)
-    plan = replace(plan, name=path.stem, meta={"source": path.name, "format": "kth", "repairs": repairs})
-    validate(plan, str(path))
-    return plan
+    portals, widths = _portals([space for space, _ in kept], rooms, metres, remarks)
+    dropped = sum(remark.count for remark in remarks if remark.action == "dropped" and remark.what == "doors")
+    plan = plan_of_portals(rooms, portals, remarks)
+    plan = replace(plan, name=path.stem, meta={"source": path.name, "format": "kth"})
+    source = Source(
+        rooms=len(spaces),
+        doors=len(portals) + dropped,
+        walls=outline_lines(outlines, polygons),
+        within=GAP,
+        door_widths=widths,
+    )
+    return settle(plan, remarks, source, path)
 
 
 def _field(element: Any, name: str) -> str:
@@ -87,52 +97,64 @@ def _lines(space: Any, metres: float) -> list[tuple[Any, Segment]]:
     return found
 
 
-def _outline(space: Any, number: int, metres: float, repairs: list[str]) -> Polygon | None:
-    name = f"space {number} ({_field(space, 'name') or _label(space)})"
-    segments = [segment for _, segment in _lines(space, metres)]
+def _outline(space: Any, name: str, metres: float, remarks: list[Remark]) -> Polygon | None:
+    lines = _lines(space, metres)
+    broken = len(descendants(child(space, "contour"), "linesegment")) - len(lines)
+    if lines and broken:
+        why = "without four coordinates"
+        remarks.append(Remark(action="dropped", what="contour lines", why=why, names=(name,), count=broken))
+    segments = [segment for _, segment in lines]
     points: list[Point] = []
     for a, b in segments:
         points += [p for p in (a, b) if not points or math.dist(p, points[-1]) > 1e-6]
     polygon = Polygon(points) if len(set(points)) >= 3 else None
     if polygon is None:
-        repairs.append(f"{name}: left out, its contour has fewer than 3 points")
+        why = "their contour has fewer than 3 points"
+        remarks.append(Remark(action="dropped", what="rooms", why=why, names=(name,), loss=True))
         return None
     if not polygon.is_valid:
         # Segments out of order still close when they are put together by their ends.
         faces = shapely.get_parts(shapely.polygonize([shapely.LineString(s) for s in segments if s[0] != s[1]]))
         closed = [face for face in faces if isinstance(face, Polygon)]
         if len(closed) == 1:
-            repairs.append(f"{name}: contour put in order")
+            remarks.append(Remark(action="repaired", what="rooms", why="contour put in order", names=(name,)))
             polygon = closed[0]
-    return repaired(polygon, name, repairs)
+    return repaired(polygon, name, remarks)
 
 
-def _portals(spaces: list[Any], rooms: tuple[PlanRoom, ...], metres: float, repairs: list[str]) -> list[Portal]:
-    """Doors between rooms, each once although it stands on both contours as a rule."""
+def _portals(
+    spaces: list[Any], rooms: tuple[PlanRoom, ...], metres: float, remarks: list[Remark]
+) -> tuple[list[Portal], list[float]]:
+    """Doors between rooms, each once although it stands on both contours as a rule, and all widths as drawn [m]."""
     index: dict[str, list[int]] = {}
     for number, space in enumerate(spaces):
         index.setdefault(_field(space, "name").lower(), []).append(number)
     found: list[tuple[int, Portal]] = []
-    outside = 0
+    widths: list[float] = []
+    outside: list[str] = []
     for number, space in enumerate(spaces):
         for line, (a, b) in _lines(space, metres):
             if _field(line, "type").lower() != "portal":
                 continue
             middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
-            other = _target(_field(line, "target"), number, middle, index, rooms)
+            target = _field(line, "target")
+            name = f"{_field(space, 'name') or rooms[number].id} to {target or 'nowhere'}"
+            other = _target(target, number, middle, index, rooms)
+            widths.append(math.dist(a, b))
             if other is None:
-                outside += 1
+                outside.append(name)
                 continue
-            width = min(max(math.dist(a, b), NARROWEST), WIDEST)
+            width = min(max(widths[-1], NARROWEST), WIDEST)
             pair = (min(number, other), max(number, other))
-            found.append((number, Portal(middle, pair, True, width)))
+            found.append((number, Portal(middle, pair, True, width, name)))
     if outside:
-        repairs.append(f"{outside} portals left out: they lead outside or to a room that is not there")
+        why = "they lead outside or to a room that is not there"
+        remarks.append(Remark(action="dropped", what="portals", why=why, names=tuple(outside), count=len(outside)))
     portals = paired(found, within=SAME_DOOR)
     single = 2 * len(portals) - len(found)
     if single:
-        repairs.append(f"{single} portals stand on one contour only")
-    return portals
+        remarks.append(Remark(action="guessed", what="doors", why="they stand on one contour only", count=single))
+    return portals, widths
 
 
 def _target(

@@ -10,11 +10,12 @@ from shapely.geometry import Polygon
 
 from closedrooms.core.door import Point
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.remarks import Remark
 from closedrooms.worlds.formats.portals import Portal, paired, plan_of_portals
-from closedrooms.worlds.formats.room_outlines import clean_outlines, repaired
+from closedrooms.worlds.formats.room_outlines import GAP, clean_outlines, hull_areas, outline_lines, repaired
+from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
 from closedrooms.worlds.formats.xml_text import attribute, child, children, parse_xml, text
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
-from closedrooms.worlds.validation import validate
 
 WHAT = "a floor plan (Luperto XML)"
 MAX_SPACES = 5000
@@ -23,7 +24,7 @@ MAX_SPACES = 5000
 def read_luperto(path: str | Path) -> FloorPlan:
     """Read one floor.
 
-    What was repaired stands in ``meta["repairs"]``, one sentence each.
+    What was dropped, repaired or guessed stands in its ``remarks``.
 
     Raises:
         InvalidInputError: Missing file, broken XML, no scale, no room with an outline.
@@ -31,19 +32,24 @@ def read_luperto(path: str | Path) -> FloorPlan:
     path = Path(path)
     root = parse_xml(path, what=WHAT)
     metres = _scale(root, path)
-    repairs: list[str] = []
+    remarks: list[Remark] = []
     spaces = _spaces(root, path)
-    outlines = [_outline(space, number, metres, repairs) for number, space in enumerate(spaces)]
-    polygons = clean_outlines(outlines, repairs, what="space")
+    names = [f"space {number} ({_label(space)})" for number, space in enumerate(spaces)]
+    outlines = [_outline(space, name, metres, remarks) for space, name in zip(spaces, names, strict=True)]
+    polygons = clean_outlines(outlines, remarks, names=names)
     kept = [(space, polygon) for space, polygon in zip(spaces, polygons, strict=True) if polygon is not None]
     if not kept:
-        raise InvalidInputError("a plan without rooms", expected="spaces with an outline", where=path)
+        read = [[_point(p, metres) for p in children(child(s, "bounding_polygon"), "point")] for s in spaces]
+        corners = [[point for point in points if point is not None] for points in read]
+        raise no_rooms("spaces with an outline", hull_areas(corners), remarks, path)
     rooms = tuple(PlanRoom(f"r{i:02d}", _label(space), polygon) for i, (space, polygon) in enumerate(kept))
-    portals = _portals([space for space, _ in kept], metres, repairs)
-    plan = plan_of_portals(rooms, portals, repairs)
-    plan = replace(plan, name=path.stem, meta={"source": path.name, "format": "luperto", "repairs": repairs})
-    validate(plan, str(path))
-    return plan
+    gone = {attribute(space, "id") for space in spaces} - {attribute(space, "id") for space, _ in kept}
+    portals = _portals([space for space, _ in kept], gone, metres, remarks)
+    dropped = sum(remark.count for remark in remarks if remark.action == "dropped" and remark.what == "doors")
+    plan = plan_of_portals(rooms, portals, remarks)
+    plan = replace(plan, name=path.stem, meta={"source": path.name, "format": "luperto"})
+    walls = outline_lines(outlines, polygons)
+    return settle(plan, remarks, Source(rooms=len(spaces), doors=len(portals) + dropped, walls=walls, within=GAP), path)
 
 
 def _scale(root: Any, path: Path) -> float:
@@ -84,21 +90,23 @@ def _point(element: Any, metres: float) -> Point | None:
     return (x * metres, -y * metres) if math.isfinite(x) and math.isfinite(y) else None
 
 
-def _outline(space: Any, number: int, metres: float, repairs: list[str]) -> Polygon | None:
+def _outline(space: Any, name: str, metres: float, remarks: list[Remark]) -> Polygon | None:
     """The outline of a space [m], repaired; ``None`` when there is nothing to make one of."""
-    name = f"space {number} ({_label(space)})"
     read = [_point(point, metres) for point in children(child(space, "bounding_polygon"), "point")]
     points = [point for point in read if point is not None]
     if len(points) < len(read):
-        repairs.append(f"{name}: {len(read) - len(points)} points without coordinates left out")
+        why = "without coordinates"
+        count = len(read) - len(points)
+        remarks.append(Remark(action="dropped", what="points of outlines", why=why, names=(name,), count=count))
     polygon = Polygon(points) if len(set(points)) >= 3 else None
     if polygon is None:
         polygon = _from_segments(space, metres)
         if polygon is None:
-            repairs.append(f"{name}: left out, it has neither an outline nor segments that close")
+            why = "they have neither an outline nor segments that close"
+            remarks.append(Remark(action="dropped", what="rooms", why=why, names=(name,), loss=True))
             return None
-        repairs.append(f"{name}: outline made of its segments")
-    return repaired(polygon, name, repairs)
+        remarks.append(Remark(action="repaired", what="rooms", why="outline made of their segments", names=(name,)))
+    return repaired(polygon, name, remarks)
 
 
 def _from_segments(space: Any, metres: float) -> Polygon | None:
@@ -114,26 +122,45 @@ def _from_segments(space: Any, metres: float) -> Polygon | None:
     return max(faces, key=lambda face: face.area, default=None)
 
 
-def _portals(spaces: list[Any], metres: float, repairs: list[str]) -> list[Portal]:
-    """The passages, each once although both of its rooms list it."""
+def _portals(spaces: list[Any], gone: set[str | None], metres: float, remarks: list[Remark]) -> list[Portal]:
+    """The passages, each once although both of its rooms list it.
+
+    Args:
+        spaces: That became rooms.
+        gone: Ids of the others.
+        metres: Per pixel.
+        remarks: Portals without a place, or to no single other room, are added here.
+    """
     index = {attribute(space, "id"): number for number, space in enumerate(spaces)}
     found: list[tuple[int, Portal]] = []
-    lost = 0
     for number, space in enumerate(spaces):
         places = _segment_places(space, metres)
-        for portal in children(child(space, "portals"), "portal"):
+        for order, portal in enumerate(children(child(space, "portals"), "portal")):
             targets = {text(target).strip() for target in children(child(portal, "target"), "id")}
             others = sorted(index[t] for t in targets if t in index and index[t] != number)
             place = places.get(text(child(portal, "linesegment")).strip())
+            name = f"portal {order} of r{number:02d} ({_label(space)})"
             if len(others) != 1 or place is None:
-                lost += 1
+                remarks.append(_useless(name, place, len(others), bool(targets & gone)))
                 continue
             pair = (min(number, others[0]), max(number, others[0]))
             explicit = text(child(portal, "type")).strip().upper() != "IMPLICIT"
-            found.append((number, Portal(place, pair, explicit)))
-    if lost:
-        repairs.append(f"{lost} portals left out: no place or no second room")
+            found.append((number, Portal(place, pair, explicit, name=name)))
     return paired(found)
+
+
+def _useless(name: str, place: Point | None, others: int, to_dropped_room: bool) -> Remark:
+    """Why a portal is left out; one that leads out of the building is nothing that a robot misses."""
+    if others > 1:
+        why = "they name more than one other room"
+    elif others == 1 or (place is None and to_dropped_room):
+        why = "their line segment is not in the file"
+    elif to_dropped_room:
+        why = "their other room is left out"
+    else:
+        why = "they name no other room of the file"
+        return Remark(action="dropped", what="portals", why=why, names=(name,))
+    return Remark(action="dropped", what="doors", why=why, names=(name,), loss=True)
 
 
 def _segment_places(space: Any, metres: float) -> dict[str, Point]:

@@ -1,8 +1,9 @@
 """Floor plans as JSON, the project's own format."""
 
 import json
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from shapely.geometry import Polygon
 
@@ -12,8 +13,13 @@ from closedrooms.core.files import write_bytes
 from closedrooms.core.incoming import read_json
 from closedrooms.core.names import is_name, is_path
 from closedrooms.core.numbers import is_number, repr_of
+from closedrooms.core.remarks import Remark
+from closedrooms.worlds.formats.settlement import Source, settle
 from closedrooms.worlds.plan import FloorPlan, Furniture, Opening, PlanDoor, PlanRoom, Wall
-from closedrooms.worlds.validation import validate
+
+# Numbers beyond this are mistakes; an integer may be too large for a float.
+LARGEST = 1e12
+Passage = TypeVar("Passage", PlanDoor, Opening)
 
 FORMAT, VERSION = "closedrooms-plan", 1
 WHAT = "a floor plan (JSON)"
@@ -84,11 +90,11 @@ def _rings(polygon: Polygon) -> list[Any]:
 
 
 def read_plan(path: str | Path) -> FloorPlan:
-    """Read and validate an untrusted plan.
+    """Read and validate an untrusted plan; a bad door or opening is left out and stands in its ``remarks``.
 
     Raises:
-        InvalidInputError: A missing or broken file, another format or version, an element that is not as it should
-            be (named by its kind, number and id).
+        InvalidInputError: A missing or broken file, another format or version, another element that is not as it
+            should be (named by its kind, number and id).
     """
     return plan_from(read_json(Path(path), what=WHAT), Path(path))
 
@@ -104,6 +110,7 @@ def plan_from(data: Any, path: Path) -> FloorPlan:
     if data.get("units", "m") != "m":
         raise InvalidInputError(f"a plan in {data['units']!r}", expected="metres ('m')", where=path)
     reader = _Reader(path)
+    remarks: list[Remark] = []
     plan = FloorPlan(
         name=_plan_name(data.get("name") or path.stem, path),
         rooms=tuple(
@@ -112,16 +119,13 @@ def plan_from(data: Any, path: Path) -> FloorPlan:
         walls=tuple(
             Wall(reader.name(w), reader.segment(w), reader.number(w, "thickness")) for w in reader.rows(data, "walls")
         ),
-        doors=tuple(reader.door(d) for d in reader.rows(data, "doors")),
-        openings=tuple(
-            Opening(reader.name(o), reader.segment(o), reader.sides(o)) for o in reader.rows(data, "openings")
-        ),
+        doors=tuple(reader.each(data, "doors", reader.door, remarks)),
+        openings=tuple(reader.each(data, "openings", reader.opening, remarks)),
         start=reader.start(data.get("start")),
         furniture=tuple(Furniture(reader.name(f), reader.polygon(f)) for f in reader.rows(data, "furniture")),
         meta=data["meta"] if isinstance(data.get("meta"), dict) else {},
     )
-    validate(plan, str(path))
-    return plan
+    return settle(plan, remarks, Source(rooms=len(plan.rooms), door_widths=[d.width for d in plan.doors]), path)
 
 
 def _plan_name(value: Any, path: Path) -> str:
@@ -142,24 +146,47 @@ class _Reader:
         self._path = path
         self._element = ""
 
-    def rows(self, data: dict[str, Any], key: str) -> list[dict[str, Any]]:
+    def rows(self, data: dict[str, Any], key: str) -> Iterator[dict[str, Any]]:
+        for number, row in enumerate(self._list(data, key)):
+            self._element = f"{key}[{number}]"
+            yield self._object(row)
+
+    def _list(self, data: dict[str, Any], key: str) -> list[Any]:
         value = data.get(key, [])
         self._element = key
         if not isinstance(value, list) or len(value) > MAX_ELEMENTS:
             raise self._error("no list of a usable size", f"a list of at most {MAX_ELEMENTS}")
-        for number, row in enumerate(value):
-            self._element = f"{key}[{number}]"
-            if not isinstance(row, dict):
-                raise self._error("no object", "an object with an id")
-        self._element = key
         return value
+
+    def _object(self, row: Any) -> dict[str, Any]:
+        if not isinstance(row, dict):
+            raise self._error("no object", "an object with an id")
+        return row
 
     def name(self, row: dict[str, Any]) -> str:
         value = row.get("id")
         if not is_name(value):
             raise self._error(f"an element with the id {repr_of(value)}", "a short text")
-        self._element = f"{self._element.split(' ')[0]} {value}"
+        self._element = f"{self._element.split('[')[0]} {value}"
         return value
+
+    def each(
+        self, data: dict[str, Any], key: str, read: Callable[[dict[str, Any]], Passage], remarks: list[Remark]
+    ) -> list[Passage]:
+        """The doors or openings that can be read; each of the others becomes a remark."""
+        found = []
+        for number, row in enumerate(self._list(data, key)):
+            self._element = f"{key}[{number}]"
+            try:
+                found.append(read(self._object(row)))
+            except InvalidInputError as error:
+                name = self._element.removeprefix(f"{key} ")
+                why = str(error).removesuffix(f": {self._path}").removeprefix(f"{self._element}: ")
+                remarks.append(Remark(action="dropped", what=key, why=why, names=(name,), loss=True))
+        return found
+
+    def opening(self, row: dict[str, Any]) -> Opening:
+        return Opening(self.name(row), self.segment(row), self.sides(row))
 
     def door(self, row: dict[str, Any]) -> PlanDoor:
         name = self.name(row)
@@ -199,7 +226,10 @@ class _Reader:
         return (points[0], points[1])
 
     def polygon(self, row: dict[str, Any]) -> Polygon:
-        rings = [row.get("polygon"), *(row.get("holes") or [])]
+        holes = row.get("holes") or []
+        if not isinstance(holes, list):
+            raise self._error("holes that are no list", "a list of rings")
+        rings = [row.get("polygon"), *holes]
         points = [self._points(ring, "polygon") for ring in rings]
         if any(len(ring) < 3 for ring in points):
             raise self._error("a polygon of fewer than 3 points", "at least 3 points")

@@ -1,17 +1,18 @@
 """Plans from rooms without thickness and portals that are points: walls, doors and openings are made for them."""
 
 import math
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import shapely
 
 from closedrooms.core.door import Point, Segment
+from closedrooms.core.remarks import Remark
 from closedrooms.worlds.connectivity import connected_parts
 from closedrooms.worlds.door_hinges import hung, is_circulation
 from closedrooms.worlds.geometry import distance_along
-from closedrooms.worlds.plan import DoorKind, FloorPlan, Opening, PlanDoor, PlanRoom
+from closedrooms.worlds.plan import DoorKind, FloorPlan, Opening, PlanDoor, PlanRoom, Wall
 from closedrooms.worlds.wall_assembly import Edge, free_spans, shared_edges, walls_along
 
 # Usual outer and inner walls, where a file gives walls no thickness [m].
@@ -39,12 +40,31 @@ class Portal:
         rooms: Indices of the rooms, the smaller first.
         has_door: Whether there is a door in it.
         width: Metres; ``None`` where the file does not say.
+        name: How messages call it; empty for its rooms.
     """
 
     point: Point
     rooms: tuple[int, int]
     has_door: bool
     width: float | None = None
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class DeepDoor:
+    """A door through the walls of two rooms that do not share one.
+
+    Attributes:
+        segment: From jamb to jamb, in the middle between the rooms, building frame [m].
+        rooms: Indices of the rooms, the smaller first.
+        depth: From the floor of one room to that of the other [m].
+        beside: How far the walls beside it reach [m].
+    """
+
+    segment: Segment
+    rooms: tuple[int, int]
+    depth: float
+    beside: float
 
 
 def paired(listed: Sequence[tuple[int, Portal]], *, within: float = SAME) -> list[Portal]:
@@ -80,27 +100,36 @@ def paired(listed: Sequence[tuple[int, Portal]], *, within: float = SAME) -> lis
 def plan_of_portals(
     rooms: tuple[PlanRoom, ...],
     portals: Sequence[Portal],
-    repairs: list[str],
+    remarks: list[Remark],
     *,
     outer: float = OUTER_WALL,
     inner: float = INNER_WALL,
     fits: tuple[tuple[float, float], ...] = FITS,
+    deep_doors: Sequence[DeepDoor] = (),
 ) -> FloorPlan:
     """A plan whose walls run along the rooms' outlines, with the portals' doors and openings in them.
 
     Args:
         rooms: Their outlines share edges.
         portals: In the order in which the doors are numbered.
-        repairs: What had to be moved, narrowed or left out is added here.
+        remarks: What had to be moved, narrowed or left out is added here.
         outer: Thickness of walls to the outside [m].
         inner: Thickness of walls between rooms [m].
         fits: Clear wall beside a passage and its least width [m], in the order in which they are tried.
+        deep_doors: Doors between rooms without a common wall; a piece of wall is made for each.
     """
     edges = shared_edges([room.polygon for room in rooms])
-    doors, openings = _passages(portals, rooms, edges, fits, repairs)
-    walls = tuple(walls_along(edges, lambda edge: outer if edge.rooms[1] is None else inner))
-    repairs += _unreached(rooms, doors, openings)
-    return FloorPlan("", rooms, walls, hung(doors, openings, rooms), tuple(openings))
+    doors, openings = _passages(portals, rooms, edges, fits, remarks)
+    walls = walls_along(edges, lambda edge: outer if edge.rooms[1] is None else inner)
+    for deep in deep_doors:
+        frame = Edge(deep.segment, deep.rooms)
+        walls.append(
+            Wall(f"w{len(walls):03d}", frame.part(frame.length / 2, frame.length + 2 * deep.beside), deep.depth)
+        )
+        sides = (rooms[deep.rooms[0]].id, rooms[deep.rooms[1]].id)
+        doors.append(PlanDoor(f"d{len(doors):02d}", deep.segment, sides, _kind(frame.length)))
+    remarks += _unreached(rooms, doors, openings)
+    return FloorPlan("", rooms, tuple(walls), hung(doors, openings, rooms), tuple(openings))
 
 
 def _passages(
@@ -108,26 +137,28 @@ def _passages(
     rooms: tuple[PlanRoom, ...],
     edges: list[Edge],
     fits: tuple[tuple[float, float], ...],
-    repairs: list[str],
+    remarks: list[Remark],
 ) -> tuple[list[PlanDoor], list[Opening]]:
     """Doors and openings on the walls nearest to their portals."""
     doors: list[PlanDoor] = []
     openings: list[Opening] = []
     taken: list[Segment] = []
-    problems: Counter[str] = Counter()
     for portal in portals:
-        segment = _place(portal, _widest(portal, rooms), edges, taken, fits, problems)
+        sides = (rooms[portal.rooms[0]].id, rooms[portal.rooms[1]].id)
+        name = portal.name or "-".join(sides)
+        segment = _place(portal, name, _widest(portal, rooms), edges, taken, fits, remarks)
         if segment is None:
             continue
         taken.append(segment)
-        sides = (rooms[portal.rooms[0]].id, rooms[portal.rooms[1]].id)
         if portal.has_door:
-            kind: DoorKind = "double" if math.dist(*segment) > DOUBLE else "hinged"
-            doors.append(PlanDoor(f"d{len(doors):02d}", segment, sides, kind))
+            doors.append(PlanDoor(f"d{len(doors):02d}", segment, sides, _kind(math.dist(*segment))))
         else:
             openings.append(Opening(f"o{len(openings):02d}", segment, sides))
-    repairs.extend(f"{count} portals {what}" for what, count in sorted(problems.items()))
     return doors, openings
+
+
+def _kind(width: float) -> DoorKind:
+    return "double" if width > DOUBLE else "hinged"
 
 
 def _widest(portal: Portal, rooms: tuple[PlanRoom, ...]) -> float:
@@ -141,23 +172,26 @@ def _widest(portal: Portal, rooms: tuple[PlanRoom, ...]) -> float:
 
 def _place(
     portal: Portal,
+    name: str,
     widest: float,
     edges: list[Edge],
     taken: list[Segment],
     fits: tuple[tuple[float, float], ...],
-    problems: Counter[str],
+    remarks: list[Remark],
 ) -> Segment | None:
     """The passage's segment: as near to the portal as the wall between its two rooms allows."""
     found = (_nearest(portal, widest, edges, taken, margin, narrowest) for margin, narrowest in fits)
     best = next((place for place in found if place is not None), None)
     if best is None:
-        problems["left out: their rooms share no wall long enough"] += 1
+        why = "their rooms share no wall long enough"
+        remarks.append(Remark(action="dropped", what="doors", why=why, names=(name,), loss=True))
         return None
     cost, ((x0, y0), (x1, y1)) = best
     if math.dist((x0, y0), (x1, y1)) < min(widest, DOOR_WIDTH) - 0.01:
-        problems["made narrower to fit their wall"] += 1
+        remarks.append(Remark(action="repaired", what="doors", why="made narrower to fit their wall", names=(name,)))
     elif cost > MOVED:
-        problems[f"moved by more than {MOVED:g} m to the wall between their rooms"] += 1
+        why = f"moved by more than {MOVED:g} m to the wall between their rooms"
+        remarks.append(Remark(action="repaired", what="doors", why=why, names=(name,)))
     return ((round(x0, 4), round(y0, 4)), (round(x1, 4), round(y1, 4)))
 
 
@@ -183,8 +217,11 @@ def _nearest(
     return best
 
 
-def _unreached(rooms: tuple[PlanRoom, ...], doors: list[PlanDoor], openings: list[Opening]) -> list[str]:
+def _unreached(rooms: tuple[PlanRoom, ...], doors: list[PlanDoor], openings: list[Opening]) -> list[Remark]:
     sides = [door.rooms for door in doors] + [opening.rooms for opening in openings]
     parts = sorted(connected_parts([room.id for room in rooms], sides), key=lambda part: (-len(part), min(part)))
-    apart = [room for part in parts[1:] for room in sorted(part)]
-    return [f"{len(apart)} rooms are not connected to the rest: {', '.join(apart)}"] if apart else []
+    apart = tuple(room for part in parts[1:] for room in sorted(part))
+    if not apart:
+        return []
+    why = "no door of the file joins them to the rest, a robot cannot get there"
+    return [Remark(action="dropped", what="ways into rooms", why=why, names=apart, count=len(apart))]

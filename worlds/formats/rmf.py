@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +15,12 @@ from shapely.strtree import STRtree
 
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.remarks import Remark
 from closedrooms.core.yaml_text import parse_yaml
 from closedrooms.worlds.door_hinges import hung
+from closedrooms.worlds.formats.settlement import Source, settle
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import DoorKind, FloorPlan, PlanDoor, PlanRoom, Wall
-from closedrooms.worlds.validation import validate
 
 WHAT = "an RMF building (building.yaml)"
 # Thickness that the RMF tools give walls [m].
@@ -40,47 +41,66 @@ MAX_ELEMENTS = 200_000
 
 
 @dataclass(frozen=True, slots=True)
+class _Door:
+    name: str
+    segment: Segment
+    kind: DoorKind
+
+
+@dataclass(frozen=True, slots=True)
 class _Level:
     vertices: tuple[Point, ...]
     names: tuple[str, ...]
     walls: tuple[Segment, ...]
-    doors: tuple[tuple[Segment, DoorKind], ...]
+    doors: tuple[_Door, ...]
     floor: Polygon | MultiPolygon
 
 
 def read_rmf(path: str | Path, level: str | None = None) -> FloorPlan:
-    """Read one level; what was repaired or guessed stands in ``meta["repairs"]``.
+    """Read one level; what was dropped, repaired or guessed stands in its ``remarks``.
+
+    In ``reference_image`` (the default) vertices are pixels with y downwards, scaled by the measurements; in
+    ``cartesian_meters`` they are metres with y upwards.
 
     Args:
         path: The building.yaml.
         level: Name of the level; may be left out when there is only one.
 
     Raises:
-        InvalidInputError: Missing or broken file, no such level, no scale, no closed room.
+        InvalidInputError: Missing or broken file, no such level, another coordinate system, no scale, no wall, no
+            closed room.
     """
     path = Path(path)
     data = parse_yaml(path, what=WHAT)
+    system = _coordinate_system(data, path)
     name, fields = _level_fields(data, level, path)
-    repairs: list[str] = []
-    read = _read_level(fields, _scale(data, fields, path), path, repairs)
-    closers = _closers(read, repairs)
-    lines = [LineString(s) for s in (*read.walls, *(segment for segment, _ in read.doors), *closers)]
-    rooms = _rooms(lines, read, repairs)
+    remarks: list[Remark] = []
+    metres = (1.0, 1.0) if system == "cartesian_meters" else _pixel(data, fields, path)
+    read = _read_level(fields, metres, path, remarks)
+    if not read.walls:
+        raise InvalidInputError(f"no walls on level {name}", expected="walls that close rooms", where=path)
+    closers = _closers(read, remarks)
+    lines = [LineString(s) for s in (*read.walls, *(door.segment for door in read.doors), *closers)]
+    rooms = _rooms(lines, read, remarks)
     if not rooms:
         raise InvalidInputError(f"a plan without rooms on level {name}", expected="walls that close rooms", where=path)
-    doors = _doors(read, rooms, repairs)
-    segments = [*read.walls, *closers, *(segment for segment, _ in read.doors)]
+    doors = _doors(read, rooms, remarks)
+    segments = [*read.walls, *closers, *(door.segment for door in read.doors)]
     walls = tuple(Wall(f"w{number:03d}", segment, WALL) for number, segment in enumerate(segments))
     plan = FloorPlan(
         name=f"{path.name.split('.')[0]}-{name}",
         rooms=rooms,
         walls=walls,
         doors=hung(doors, (), rooms),
-        meta={"source": path.name, "format": "rmf", "level": name, "repairs": repairs},
+        meta={"source": path.name, "format": "rmf", "level": name},
     )
-    plan = replace(plan, doors=tuple(door for door in plan.doors if door.rooms != (None, None)))
-    validate(plan, str(path))
-    return plan
+    source = Source(
+        doors=len(_rows(fields, "doors", path)),
+        walls=shapely.union_all([LineString(wall) for wall in read.walls]),
+        within=0.01,
+        door_widths=[math.dist(*door.segment) for door in read.doors],
+    )
+    return settle(plan, remarks, source, path)
 
 
 def _level_fields(data: dict[str, Any], level: str | None, path: Path) -> tuple[str, dict[str, Any]]:
@@ -90,10 +110,12 @@ def _level_fields(data: dict[str, Any], level: str | None, path: Path) -> tuple[
     names = ", ".join(map(str, levels))
     if level is None and len(levels) > 1:
         raise InvalidInputError(f"a building with the levels {names}", expected="--level with one of them", where=path)
-    name = next(iter(levels)) if level is None else level
-    if not isinstance(levels.get(name), dict):
+    # A level called 1 is a number to YAML.
+    by_name = {str(key): fields for key, fields in levels.items()}
+    name = next(iter(by_name)) if level is None else level
+    if not isinstance(by_name.get(name), dict):
         raise InvalidInputError(f"no level {name!r}", expected=f"one of {names}", where=path)
-    return str(name), levels[name]
+    return name, by_name[name]
 
 
 def _rows(fields: dict[str, Any], key: str, path: Path) -> list[Any]:
@@ -103,10 +125,24 @@ def _rows(fields: dict[str, Any], key: str, path: Path) -> list[Any]:
     return rows
 
 
+def _coordinate_system(data: dict[str, Any], path: Path) -> str:
+    """How the vertices are given; the traffic editor's default are pixels."""
+    system = data.get("coordinate_system", "reference_image")
+    if system not in ("reference_image", "cartesian_meters"):
+        raise InvalidInputError(
+            f"coordinates in {str(system)[:60]!r}", expected="reference_image or cartesian_meters", where=path
+        )
+    return str(system)
+
+
+def _pixel(data: dict[str, Any], fields: dict[str, Any], path: Path) -> tuple[float, float]:
+    """Metres per pixel to the right and, since rows of a picture go down, per pixel of y."""
+    scale = _scale(data, fields, path)
+    return (scale, -scale)
+
+
 def _scale(data: dict[str, Any], fields: dict[str, Any], path: Path) -> float:
-    """Metres per unit: the mean of the level's measurements, else of another level's."""
-    if data.get("coordinate_system") == "cartesian_meters":
-        return 1.0
+    """Metres per pixel: the mean of the level's measurements, else of another level's."""
     for level in [fields, *(f for f in data["levels"].values() if isinstance(f, dict))]:
         values = [_measured(row, _rows(level, "vertices", path)) for row in _rows(level, "measurements", path)]
         usable = [value for value in values if value is not None]
@@ -119,69 +155,94 @@ def _measured(row: Any, vertices: list[Any]) -> float | None:
     try:
         a, b = vertices[row[0]], vertices[row[1]]
         value = float(row[2]["distance"][1]) / math.dist((float(a[0]), float(a[1])), (float(b[0]), float(b[1])))
-    except (IndexError, KeyError, TypeError, ValueError, ZeroDivisionError):
+    except (IndexError, KeyError, TypeError, ValueError, OverflowError, ZeroDivisionError):
         return None
     return value if math.isfinite(value) and value > 0.0 else None
 
 
-def _read_level(fields: dict[str, Any], metres: float, path: Path, repairs: list[str]) -> _Level:
+def _read_level(fields: dict[str, Any], metres: tuple[float, float], path: Path, remarks: list[Remark]) -> _Level:
     rows = _rows(fields, "vertices", path)
-    vertices = []
-    for number, row in enumerate(rows):
-        try:
-            x, y = float(row[0]) * metres, -float(row[1]) * metres
-        except (IndexError, TypeError, ValueError):
-            x = y = math.nan
-        if not (math.isfinite(x) and math.isfinite(y)):
-            raise InvalidInputError(f"vertex {number} {row!r}", expected="[x, y, z, name]", where=path)
-        vertices.append((round(x, 4), round(y, 4)))
+    vertices = [_vertex(row, number, metres, path) for number, row in enumerate(rows)]
     names = [str(row[3]).strip() if len(row) > 3 and row[3] else "" for row in rows]
-
-    def segment(row: Any, what: str) -> Segment:
-        try:
-            first, second = int(row[0]), int(row[1])
-            if first < 0 or second < 0:
-                raise IndexError(first)
-            return (vertices[first], vertices[second])
-        except (IndexError, TypeError, ValueError) as error:
-            raise InvalidInputError(f"{what} {row!r}", expected="numbers of two vertices", where=path) from error
-
-    walls = [segment(row, "wall") for row in _rows(fields, "walls", path)]
+    walls = []
+    for row in _rows(fields, "walls", path):
+        segment = _segment(row, vertices)
+        if segment is None:
+            raise InvalidInputError(f"wall {str(row)[:60]}", expected="numbers of two vertices", where=path)
+        walls.append(segment)
     doors = []
-    for row in _rows(fields, "doors", path):
-        try:
-            kind = str(row[2]["type"][1])
-        except (IndexError, KeyError, TypeError):
-            kind = "hinged"
-        if kind not in KINDS:
-            repairs.append(f"door of the unknown type {kind!r} read as hinged")
-        doors.append((segment(row, "door"), KINDS.get(kind, "hinged")))
-    short = [door for door in doors if math.dist(*door[0]) < SHORTEST_DOOR]
-    if short:
-        repairs.append(f"{len(short)} doors left out: shorter than {SHORTEST_DOOR} m")
+    for number, row in enumerate(_rows(fields, "doors", path)):
+        door = _door(row, number, vertices, remarks)
+        if door is not None:
+            doors.append(door)
     return _Level(
         tuple(vertices),
         tuple(names),
         tuple(dict.fromkeys((min(wall), max(wall)) for wall in walls if math.dist(*wall) > 0.01)),
-        tuple(door for door in doors if door not in short),
-        _floor(fields, vertices, path, repairs),
+        tuple(doors),
+        _floor(fields, vertices, remarks, path),
     )
 
 
-def _floor(fields: dict[str, Any], vertices: Sequence[Point], path: Path, repairs: list[str]) -> Polygon | MultiPolygon:
+def _vertex(row: Any, number: int, metres: tuple[float, float], path: Path) -> Point:
+    try:
+        x, y = float(row[0]) * metres[0], float(row[1]) * metres[1]
+    except (IndexError, KeyError, TypeError, ValueError, OverflowError):
+        x = y = math.nan
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise InvalidInputError(f"vertex {number} {str(row)[:60]}", expected="[x, y, z, name]", where=path)
+    return (round(x, 4), round(y, 4))
+
+
+def _segment(row: Any, vertices: Sequence[Point]) -> Segment | None:
+    """Between the two vertices whose numbers a row begins with."""
+    try:
+        first, second = int(row[0]), int(row[1])
+        return (vertices[first], vertices[second]) if min(first, second) >= 0 else None
+    except (IndexError, KeyError, TypeError, ValueError, OverflowError):
+        return None
+
+
+def _parameter(row: Any, key: str) -> str:
+    """The value of a typed parameter ``{key: [type, value]}`` of a wall or door; empty without one."""
+    try:
+        return str(row[2][key][1]).strip()
+    except (IndexError, KeyError, TypeError):
+        return ""
+
+
+def _door(row: Any, number: int, vertices: Sequence[Point], remarks: list[Remark]) -> _Door | None:
+    """One door; what cannot be one is named in ``remarks``."""
+    name = _parameter(row, "name") or f"doors[{number}]"
+    segment = _segment(row, vertices)
+    if segment is None or math.dist(*segment) < SHORTEST_DOOR:
+        why = "without two vertices of the level" if segment is None else f"shorter than {SHORTEST_DOOR} m"
+        remarks.append(Remark(action="dropped", what="doors", why=why, names=(name,), loss=True))
+        return None
+    kind = _parameter(row, "type") or "hinged"
+    if kind not in KINDS:
+        why = f"of the unknown type {kind[:40]!r}, read as hinged"
+        remarks.append(Remark(action="guessed", what="doors", why=why, names=(name,)))
+    return _Door(name, segment, KINDS.get(kind, "hinged"))
+
+
+def _floor(
+    fields: dict[str, Any], vertices: Sequence[Point], remarks: list[Remark], path: Path
+) -> Polygon | MultiPolygon:
     areas = []
     for number, row in enumerate(_rows(fields, "floors", path)):
         try:
             ring = [vertices[int(index)] for index in row["vertices"]]
             areas.append(shapely.make_valid(Polygon(ring)))
-        except (IndexError, KeyError, TypeError, ValueError):
-            repairs.append(f"floor {number} left out: it has no outline")
+        except (IndexError, KeyError, TypeError, ValueError, OverflowError):
+            why = "without an outline"
+            remarks.append(Remark(action="dropped", what="floors", why=why, names=(f"floors[{number}]",), loss=True))
     return areal(shapely.union_all(areas))
 
 
-def _closers(level: _Level, repairs: list[str]) -> list[Segment]:
+def _closers(level: _Level, remarks: list[Remark]) -> list[Segment]:
     """Walls that the file leaves out: from loose ends to the next wall, and along the floor's edge."""
-    lines = [LineString(s) for s in (*level.walls, *(segment for segment, _ in level.doors))]
+    lines = [LineString(s) for s in (*level.walls, *(door.segment for door in level.doors))]
     loose = _loose_ends(lines)
     edges: list[Segment] = []
     if not level.floor.is_empty:
@@ -191,10 +252,12 @@ def _closers(level: _Level, repairs: list[str]) -> list[Segment]:
                 points = [(round(x, 4), round(y, 4)) for x, y in shapely.get_coordinates(line).tolist()]
                 edges += [(a, b) for a, b in itertools.pairwise(points) if math.dist(a, b) > 0.01]
     if loose:
-        repairs.append(f"{len(loose)} loose ends of walls closed, up to {LOOSE_END} m")
+        why = f"closed by up to {LOOSE_END} m of wall each"
+        remarks.append(Remark(action="repaired", what="loose ends of walls", why=why, count=len(loose)))
     if edges:
         length = sum(math.dist(*edge) for edge in edges)
-        repairs.append(f"{length:.1f} m of the floor's edge without a wall closed by one")
+        why = f"{length:.1f} m along the floor's edge, which has none in the file"
+        remarks.append(Remark(action="guessed", what="walls", why=why, count=len(edges)))
         ends = _loose_ends([*lines, *(LineString(edge) for edge in edges)], reach=2 * LOOSE_END)
         return [*loose, *edges, *ends]
     return loose
@@ -222,7 +285,7 @@ def _loose_ends(lines: Sequence[LineString], reach: float = LOOSE_END) -> list[S
     return pieces
 
 
-def _rooms(lines: Sequence[BaseGeometry], level: _Level, repairs: list[str]) -> tuple[PlanRoom, ...]:
+def _rooms(lines: Sequence[BaseGeometry], level: _Level, remarks: list[Remark]) -> tuple[PlanRoom, ...]:
     """The faces between walls and doors, named after the waypoints in them."""
     # On a grid of 1 cm, so that feet of loose ends and edges of floors lie on their wall.
     noded = shapely.union_all(np.array(lines, dtype=object), grid_size=0.01)
@@ -240,17 +303,18 @@ def _rooms(lines: Sequence[BaseGeometry], level: _Level, repairs: list[str]) -> 
         label = min((name for point, name in named if face.contains(point)), default="room")
         rooms.append(PlanRoom(f"r{len(rooms):02d}", label, face))
     if outside:
-        repairs.append(f"{outside} areas between walls left out: no floor under them")
+        why = "no floor under them"
+        remarks.append(Remark(action="dropped", what="areas between walls", why=why, count=outside))
     return tuple(rooms)
 
 
-def _doors(level: _Level, rooms: Sequence[PlanRoom], repairs: list[str]) -> list[PlanDoor]:
+def _doors(level: _Level, rooms: Sequence[PlanRoom], remarks: list[Remark]) -> list[PlanDoor]:
     tree = STRtree([room.polygon for room in rooms])
     doors: list[PlanDoor] = []
-    lost = entrances = 0
-    for segment, kind in level.doors:
-        (x0, y0), (x1, y1) = segment
-        length = math.dist(*segment)
+    entrances: list[str] = []
+    for door in level.doors:
+        (x0, y0), (x1, y1) = door.segment
+        length = math.dist(*door.segment)
         nx, ny = -(y1 - y0) / length, (x1 - x0) / length
         sides: list[str | None] = []
         for side in (PROBE, -PROBE):
@@ -258,12 +322,15 @@ def _doors(level: _Level, rooms: Sequence[PlanRoom], repairs: list[str]) -> list
             found = np.sort(tree.query(probe, predicate="within"))
             sides.append(rooms[int(found[0])].id if found.size else None)
         if sides[0] == sides[1]:
-            lost += 1
+            why = "walled up: no room on either side" if sides[0] is None else "walled up: the same room on both sides"
+            remarks.append(Remark(action="dropped", what="doors", why=why, names=(door.name,), loss=True))
             continue
-        entrances += None in sides
-        doors.append(PlanDoor(f"d{len(doors):02d}", segment, (sides[0], sides[1]), kind))
-    if lost:
-        repairs.append(f"{lost} doors walled up: the same room, or none, on both sides")
+        if None in sides:
+            entrances.append(door.name)
+        doors.append(PlanDoor(f"d{len(doors):02d}", door.segment, (sides[0], sides[1]), door.kind))
     if entrances:
-        repairs.append(f"{entrances} doors lead outside")
+        why = "read as entrances: a room on one side only"
+        remarks.append(
+            Remark(action="guessed", what="doors", why=why, names=tuple(entrances), count=len(entrances))
+        )  # fmt: skip
     return doors

@@ -4,7 +4,11 @@ from collections.abc import Sequence
 
 import shapely
 from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.strtree import STRtree
 
+from closedrooms.core.door import Point
+from closedrooms.core.remarks import Remark
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.wall_assembly import coverage, without_gaps
 
@@ -12,54 +16,85 @@ from closedrooms.worlds.wall_assembly import coverage, without_gaps
 GAP = 0.6
 # Jogs of outlines below this size come from drawing by hand [m].
 JOG = 0.12
+# Coordinates of plans are kept to this [m].
+GRID = 1e-4
 # Outlines below this area are no rooms [square metres].
 SMALLEST = 0.2
 
 
-def repaired(polygon: Polygon, name: str, repairs: list[str]) -> Polygon | None:
-    """A valid outline of usable size, or ``None``; what was done is added to ``repairs``."""
+def repaired(polygon: Polygon, name: str, remarks: list[Remark]) -> Polygon | None:
+    """A valid outline of usable size, or ``None``; what was done is added to ``remarks``."""
     if not polygon.is_valid:
         reason = shapely.is_valid_reason(polygon).split("[")[0]
         parts = shapely.get_parts(areal(shapely.make_valid(polygon)))
         polygon = max((p for p in parts if isinstance(p, Polygon)), key=lambda part: part.area, default=Polygon())
-        repairs.append(f"{name}: invalid outline ({reason}), its largest part kept")
+        why = f"invalid outline ({reason}), the largest part kept"
+        remarks.append(Remark(action="repaired", what="rooms", why=why, names=(name,)))
     if polygon.area < SMALLEST:
-        repairs.append(f"{name}: left out, its area is {polygon.area:.2f} square metres")
+        why = f"an area below {SMALLEST} square metres"
+        remarks.append(Remark(action="dropped", what="rooms", why=why, names=(name,)))
         return None
     return polygon
 
 
-def clean_outlines(outlines: Sequence[Polygon | None], repairs: list[str], *, what: str) -> list[Polygon | None]:
+def clean_outlines(
+    outlines: Sequence[Polygon | None], remarks: list[Remark], *, names: Sequence[str]
+) -> list[Polygon | None]:
     """Outlines that share their edges: overlaps cut, narrow gaps closed, jogs of the drawing straightened.
 
     Args:
         outlines: Valid polygons [m]; ``None`` stays ``None``.
-        repairs: What was done is added here.
-        what: How the file calls a room, for ``repairs``.
+        remarks: What was done is added here.
+        names: Of the outlines, for ``remarks``.
 
     Returns:
         One for each outline; ``None`` also where nothing is left beside the neighbours.
     """
-    given = [outline for outline in outlines if outline is not None]
+    given = [_on_grid(outline) for outline in outlines if outline is not None]
     if not given:
         return list(outlines)
     overlap = sum(outline.area for outline in given) - shapely.union_all(given).area
-    polygons, gaps = without_gaps(coverage(given, snap=JOG / 2), GAP)
+    polygons, gaps = without_gaps(coverage(given, snap=JOG / 2), GAP, touching=GRID)
     polygons = coverage(polygons, gap=GAP, snap=JOG / 2)
     simple = iter([_largest(part) for part in shapely.coverage_simplify(polygons, JOG)])
     if overlap > 0.01:
-        repairs.append(f"overlaps of {overlap:.2f} square metres given to one room each")
+        why = f"{overlap:.2f} square metres given to one room each"
+        remarks.append(Remark(action="repaired", what="overlaps of rooms", why=why))
     if gaps:
-        area = sum(gap.area for gap in gaps)
-        repairs.append(f"{len(gaps)} gaps between rooms below {GAP} m closed, {area:.2f} square metres")
+        why = f"narrower than {GAP} m, closed: {sum(gap.area for gap in gaps):.2f} square metres"
+        remarks.append(Remark(action="repaired", what="gaps between rooms", why=why, count=len(gaps)))
     result: list[Polygon | None] = []
-    for number, outline in enumerate(outlines):
+    for name, outline in zip(names, outlines, strict=True):
         polygon = None if outline is None else next(simple)
         if polygon is not None and not (polygon.is_valid and polygon.area >= SMALLEST):
-            repairs.append(f"{what} {number}: left out, nothing of it is left beside its neighbours")
+            why = "nothing is left of them beside their neighbours"
+            remarks.append(Remark(action="dropped", what="rooms", why=why, names=(name,), loss=True))
             polygon = None
         result.append(polygon)
     return result
+
+
+def hull_areas(corners: Sequence[Sequence[Point]]) -> list[float]:
+    """Rough areas of rooms whose outlines may be broken: of the convex hulls of their corners."""
+    return [float(shapely.MultiPoint(points).convex_hull.area) for points in corners if len(points) >= 3]
+
+
+def _on_grid(outline: Polygon) -> Polygon:
+    """An outline with its corners on a grid: corners that nearly meet a neighbour's would hide gaps."""
+    snapped = shapely.set_precision(shapely.set_precision(outline, GRID), 0.0)
+    return snapped if isinstance(snapped, Polygon) and snapped.is_valid and not snapped.is_empty else outline
+
+
+def outline_lines(outlines: Sequence[Polygon | None], kept: Sequence[Polygon | None]) -> BaseGeometry:
+    """The walls of a file that draws rooms: the outlines of those that became rooms, as they were given.
+
+    Where two rooms claim the same floor, one of them lost it and its wall there; that stands in the remarks already.
+    """
+    given = [outline for outline, made in zip(outlines, kept, strict=True) if outline is not None and made is not None]
+    first, second = STRtree(given).query(given, predicate="overlaps")
+    twice = [areal(given[a].intersection(given[b])).buffer(-GAP / 4) for a, b in zip(first, second, strict=True)]
+    claimed = shapely.union_all(twice).buffer(GAP / 2)
+    return shapely.union_all([outline.boundary for outline in given]).difference(claimed)
 
 
 def _largest(area: shapely.Geometry) -> Polygon:

@@ -54,8 +54,8 @@ def _text(plan: FloorPlan, picture: str, bounds: tuple[float, float, float, floa
     x0, y0, x1, y1 = bounds
     start = start_pose(plan)
     leaves = [
-        f'leaf ( name "{stage_text(door.id)}{"" if number == 0 else f"_{number}"}" '
-        f"size [{box.length:.4f} {box.thickness:.4f} 2.0]"
+        f'leaf ( name "{stage_text(door.id)}{"" if number == 0 else f"_{number}"}"'
+        f" size [{box.length:.4f} {box.thickness:.4f} 2.0]"
         f" pose [{box.x:.4f} {box.y:.4f} 0 {math.degrees(box.angle):.3f}] )"
         for door in plan.doors
         for number, leaf in enumerate(door_leaves(plan, door))
@@ -88,7 +88,7 @@ def _thing(thing: Furniture) -> str:
     corners = thing.polygon.exterior.coords[:-1]
     points = " ".join(f"point[{number}] [{a - x:.4f} {b - y:.4f}]" for number, (a, b) in enumerate(corners))
     return (
-        f'thing ( name "{stage_text(thing.id)}" size [{x1 - x0:.4f} {y1 - y0:.4f} {FURNITURE_HEIGHT}] '
-        f"pose [{x:.4f} {y:.4f} 0 0]"
+        f'thing ( name "{stage_text(thing.id)}" size [{x1 - x0:.4f} {y1 - y0:.4f} {FURNITURE_HEIGHT}]'
+        f" pose [{x:.4f} {y:.4f} 0 0]"
         f" block ( points {len(corners)} {points} z [0 {FURNITURE_HEIGHT}] ) )"
     )

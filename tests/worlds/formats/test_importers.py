@@ -27,10 +27,12 @@ def by_label(plan: FloorPlan) -> dict[str, str]:
     return {room.label: room.id for room in plan.rooms}
 
 
-def repairs_of(plan: FloorPlan) -> str:
-    repairs = plan.meta["repairs"]
-    assert isinstance(repairs, list)
-    return "\n".join(repairs)
+def remarks_of(plan: FloorPlan) -> str:
+    return "\n".join(map(str, plan.remarks))
+
+
+def lost(plan: FloorPlan) -> list[str]:
+    return [str(remark) for remark in plan.remarks if remark.loss]
 
 
 # KTH
@@ -53,10 +55,10 @@ def test_kth_doors_listed_twice_or_once_are_one_each_with_their_width(fixtures: 
     assert set(doors) == {frozenset({ids["korridor"], ids["kontor"]}), frozenset({ids["korridor"], ids["forrad"]})}
     assert all(door.width == pytest.approx(0.9, abs=0.01) for door in plan.doors)
     assert doors[frozenset({ids["korridor"], ids["kontor"]})].midpoint[0] == pytest.approx(2.45, abs=0.01)
-    assert "1 portals stand on one contour only" in repairs_of(plan)
-    assert "1 portals left out: they lead outside" in repairs_of(plan)
-    assert "space 3 (S1): left out" in repairs_of(plan)
-    assert "space 2 (F1): contour put in order" in repairs_of(plan)
+    assert "guessed doors: they stand on one contour only" in remarks_of(plan)
+    assert "dropped 1 portals (K1 to OUTSIDE): they lead outside" in remarks_of(plan)
+    assert "dropped 1 rooms (S1 (skrap)): their contour" in remarks_of(plan)
+    assert "repaired 1 rooms (F1 (forrad)): contour put in order" in remarks_of(plan)
 
 
 # RMF
@@ -68,8 +70,8 @@ def test_rmf_rooms_come_from_walls_doors_and_the_floors_edge(fixtures: Path) -> 
     assert set(ids) == {"lobby", "office_1", "room"}
     assert {door.kind for door in plan.doors} == {"hinged", "sliding"}
     assert sorted(door.width for door in plan.doors) == pytest.approx([0.9, 2.0])
-    assert "1 loose ends of walls closed" in repairs_of(plan)
-    assert "floor's edge without a wall closed" in repairs_of(plan)
+    assert "repaired loose ends of walls: closed" in remarks_of(plan)
+    assert "guessed walls: 9.0 m along the floor's edge" in remarks_of(plan)
     hall = room_interior(plan, ids["lobby"])
     assert hall.area == pytest.approx(9.9 * 3.9, rel=0.02)
     assert len(closable_rooms(plan)) == 2
@@ -109,18 +111,18 @@ def test_pyrobosim_hallways_close_their_outer_room_with_a_door(fixtures: Path) -
     assert len(plan.openings) == 3
     assert {labels[room] for room in closable_rooms(plan)} == {"kitchen", "bedroom", "store"}
     assert sorted(door.width for door in plan.doors) == pytest.approx([0.8, 0.9, 1.0], abs=0.01)
-    assert "up is closed in the file" in repairs_of(plan)
+    assert "guessed 1 hallways (up): closed in the file" in remarks_of(plan)
 
 
 # HouseExpo
 
 
-def test_houseexpo_doors_are_derived_where_rooms_meet_over_the_width_of_a_door(fixtures: Path) -> None:
+def test_houseexpo_doors_are_derived_where_rooms_touch(fixtures: Path) -> None:
     plan = read_houseexpo(fixtures / "houseexpo_small.json")
     assert sorted(room.label for room in plan.rooms) == ["bedroom", "bedroom", "living_room"]
     assert len(plan.doors) == 2
     assert len(closable_rooms(plan)) == 2
-    assert "2 doors and 0 openings derived" in repairs_of(plan)
+    assert "guessed 2 doors" in remarks_of(plan)
 
 
 def test_houseexpo_without_rooms_is_refused(tmp_path: Path) -> None:
@@ -176,12 +178,12 @@ def test_a_picture_uses_the_yaml_beside_it(mapped: Path) -> None:
 
 
 def test_a_map_without_doors_says_so(mapped: Path) -> None:
-    assert "no list of doors" in repairs_of(read_raster(mapped))
+    assert "guessed doors: no list of doors" in remarks_of(read_raster(mapped))
 
 
 def test_a_door_in_the_open_is_left_out(mapped: Path) -> None:
     write_doors(mapped.with_name("doors.geojson"), [ClosedDoor("x", (3.0, 1.0), ((2.5, 1.0), (3.4, 1.0)))])
-    assert "door x left out" in repairs_of(read_raster(mapped))
+    assert "dropped 1 doors (x): the same free area on both sides" in lost(read_raster(mapped))
 
 
 # Every importer
@@ -218,7 +220,13 @@ YAML_FAULTS: list[tuple[str, dict[str, Any], str]] = [
         {"rooms": [{"name": "a", "footprint": {"type": "polygon", "coords": [[0, 0], [1, 1], [1, 0], [0, 1]]}}]},
         "room a has an invalid footprint",
     ),
-    ("pyrobosim_small.yaml", {"hallways": [{"room_start": "hub", "room_end": "moon"}]}, "hallway 0 has the room_end"),
+    (
+        "pyrobosim_small.yaml",
+        {"rooms": [{"name": "a", "footprint": {"type": "box", "dims": [2, 2]}, "pose": [1]}]},
+        "room a pose",
+    ),
+    ("rmf_small.building.yaml", {"coordinate_system": "wgs84"}, "coordinates in 'wgs84'; expected reference_image or"),
+    ("rmf_small.building.yaml", {"coordinate_system": "web_mercator"}, "coordinates in 'web_mercator'"),
     ("rmf_small.building.yaml", {"levels": {}}, "a building without levels"),
     ("rmf_small.building.yaml", {"levels": {"L1": {"vertices": [[0, 0, 0]]}}}, "a building without measurements"),
     (
@@ -255,7 +263,7 @@ def test_faults_of_yaml_plans_are_named(
     [
         ({"verts": [[0, 0]]}, "no outline in 'verts'"),
         ({"verts": [[0, 0], [1, "x"], [2, 2]]}, "no outline in 'verts'"),
-        ({"room_category": {"Bedroom": [[0, 0, 1]]}}, "box .* of Bedroom"),
+        ({"room_category": {"Bedroom": [[0, 0, 1]]}}, "no doors can be derived"),
         ({"room_category": [1]}, "room_category"),
     ],
 )

@@ -7,6 +7,7 @@ from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.formats.luperto import read_luperto
 from closedrooms.worlds.geometry import room_interior, wall_area
 from closedrooms.worlds.library import load_world
+from closedrooms.worlds.outline import leaks
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start_pose import start_pose
 from closedrooms.worlds.validation import validate
@@ -50,12 +51,13 @@ def test_a_gap_between_rooms_becomes_one_shared_wall(plan: FloorPlan) -> None:
 
 
 def test_every_repair_is_named(plan: FloorPlan) -> None:
-    repairs = "\n".join(map(str, plan.meta["repairs"]))  # type: ignore[call-overload]
-    assert "space 3 (store): outline made of its segments" in repairs
-    assert "space 4 (hall): invalid outline" in repairs
-    assert "space 5 (nothing): left out" in repairs
-    assert "gaps between rooms below 0.6 m closed" in repairs
-    assert "1 portals left out: no place or no second room" in repairs
+    remarks = "\n".join(map(str, plan.remarks))
+    assert "repaired 1 rooms (space 3 (store)): outline made of their segments" in remarks
+    assert "rooms (space 4 (hall)): invalid outline" in remarks
+    assert "dropped 1 rooms (space 5 (nothing)): they have neither" in remarks
+    assert "gaps between rooms: narrower than 0.6 m, closed" in remarks
+    assert "dropped 1 doors (portal 4 of r00 (corridor)): their line segment is not in the file" in remarks
+    assert {remark.what for remark in plan.remarks if remark.loss} == {"rooms", "doors"}
 
 
 def test_doors_swing_into_the_room_that_they_close(plan: FloorPlan) -> None:
@@ -89,7 +91,8 @@ def test_bad_files_are_one_clear_line(tmp_path: Path, content: str, message: str
 def check_floor(path: Path) -> None:
     plan = load_world(str(path))
     validate(plan, path.name)
-    assert isinstance(plan.meta["repairs"], list)
+    assert not [remark for remark in plan.remarks if "accounted" in remark.why or "solids" in remark.why], path.name
+    assert not leaks(plan), path.name
     assert wall_area(plan).is_valid
     assert len(closable_rooms(plan)) >= 5, path.name
     start_pose(plan)

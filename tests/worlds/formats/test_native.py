@@ -52,15 +52,6 @@ def broken(small: FloorPlan, **changes: Any) -> str:
             r"room r0 \(room\) has an invalid polygon \(Self-intersection",
         ),
         ({"walls": [{"id": "w0", "segment": [[0, 0], [1, 0]]}]}, "walls w0: thickness None"),
-        ({"doors": [{"id": "d0", "segment": [[0, 0]], "rooms": ["r0", "r1"]}]}, "doors d0: a segment of 1 points"),
-        (
-            {"doors": [{"id": "d0", "segment": [[0, 0], [1, 0]], "rooms": ["r0"]}]},
-            "doors d0: rooms .*expected two room ids",
-        ),
-        (
-            {"doors": [{"id": "d0", "segment": [[0, 0], [1, 0]], "rooms": ["r0", "r1"], "kind": "x"}]},
-            "doors d0: kind 'x'; expected hinged, double or sliding",
-        ),
         ({"start": [1, 2]}, "start: "),
     ],
 )
@@ -73,6 +64,62 @@ def test_the_element_that_is_wrong_is_named(
         read_plan(path)
     assert str(caught.value).endswith(str(path))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"segment": [[0, 0]]}, "a segment of 1 points; expected 2 points"),
+        ({"segment": [[0, 0], [1, 9**400]]}, "...; expected [x, y] in metres"),
+        ({"segment": [[1.5, 1.0], [2.4, 1.0]]}, "door d0 stands on no wall"),
+        ({"segment": [[1.5, 2.0], [1.6, 2.0]]}, "door d0 is 0.100 m long"),
+        ({"rooms": ["r0"]}, "expected two room ids"),
+        ({"rooms": ["r0", "r9"]}, "door d0 leads to the unknown room 'r9'"),
+        ({"rooms": ["r0", "r3"]}, "away from room r3"),
+        ({"rooms": ["r1", "r1"]}, "door d0 has 'r1' on both sides"),
+        ({"kind": ["hinged"]}, "kind ['hinged']; expected hinged, double or sliding"),
+        ({"opens_into": "r2"}, "door d0 opens into 'r2'"),
+        ({"hinge": 2}, "hinge 2; expected 0 or 1"),
+        ({"id": "d1"}, "two door or openings with the id 'd1'"),
+    ],
+)
+def test_a_bad_door_costs_that_door_and_is_named(
+    small: FloorPlan, tmp_path: Path, changes: dict[str, Any], message: str
+) -> None:
+    data = json.loads(plan_text(small))
+    data["doors"][0] |= changes
+    path = tmp_path / "plan.json"
+    path.write_text(json.dumps(data))
+    plan = read_plan(path)
+    (remark,) = plan.remarks
+    assert len(plan.doors) == 2
+    assert (remark.action, remark.what, remark.names, remark.loss) == (
+        "dropped",
+        "doors",
+        (data["doors"][0]["id"],),
+        True,
+    )
+    assert message in str(remark)
+    assert len(str(remark)) < 200
+
+
+@pytest.mark.parametrize("row", [3, None, [], {"segment": [[1.5, 2], [2.4, 2]]}])
+def test_a_door_without_a_name_is_called_by_its_number(small: FloorPlan, tmp_path: Path, row: object) -> None:
+    data = json.loads(plan_text(small))
+    data["doors"].append(row)
+    path = tmp_path / "plan.json"
+    path.write_text(json.dumps(data))
+    plan = read_plan(path)
+    assert plan.doors == small.doors
+    assert plan.remarks[0].names == ("doors[3]",)
+
+
+def test_remarks_are_neither_compared_nor_written(small: FloorPlan) -> None:
+    from closedrooms.core.remarks import Remark
+
+    said = replace(small, remarks=(Remark(action="guessed", what="scale", why="for the test"),))
+    assert said == small
+    assert plan_text(said) == plan_text(small)
 
 
 @pytest.mark.parametrize(("content", "message"), [("{", "broken JSON"), ("[1]", "no closedrooms plan")])

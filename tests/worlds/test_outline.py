@@ -1,0 +1,63 @@
+"""No robot leaves a building."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import shapely
+
+from closedrooms.worlds.formats.native import write_plan
+from closedrooms.worlds.geometry import wall_area
+from closedrooms.worlds.library import bundled_names, load_world, read_world
+from closedrooms.worlds.outline import leaks, without_leaks
+from closedrooms.worlds.plan import FloorPlan, Wall
+
+
+@pytest.mark.parametrize("name", bundled_names()[::4])
+def test_bundled_worlds_are_closed(name: str) -> None:
+    plan = load_world(name)
+    assert not leaks(plan)
+    assert without_leaks(plan) is plan
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_an_outer_wall_that_is_missing_is_added_and_said(small: FloorPlan, tmp_path: Path, number: int) -> None:
+    plan = replace(small, walls=tuple(wall for n, wall in enumerate(small.walls) if n != number))
+    assert leaks(plan)
+    path = tmp_path / "plan.json"
+    write_plan(path, plan)
+    loaded = load_world(str(path))
+    assert not leaks(loaded)
+    (remark,) = loaded.remarks
+    assert (remark.action, remark.what, remark.loss) == ("repaired", "walls", False)
+    assert "added along the outline" in remark.why
+    assert wall_area(loaded).intersection(wall_area(small)).area > 0.9 * wall_area(small).area
+    # What is converted stays as it was read.
+    assert read_world(str(path)).walls == plan.walls
+
+
+def test_a_hole_that_the_robot_fits_through_is_closed_and_a_narrower_one_is_not(small: FloorPlan) -> None:
+    for width, leaky in ((0.35, True), (0.25, False)):
+        ends = (Wall("w0", ((0.0, 0.0), (6.0, 0.0)), 0.3), Wall("w9", ((6.0 + width, 0.0), (12.0, 0.0)), 0.3))
+        plan = replace(small, walls=(*ends, *small.walls[1:]))
+        assert leaks(plan) == leaky
+        closed = without_leaks(plan)
+        assert not leaks(closed)
+        assert (closed is plan) != leaky
+
+
+def test_a_wall_that_stops_short_inside_is_no_leak(small: FloorPlan) -> None:
+    plan = replace(small, walls=tuple(wall for wall in small.walls if wall.id != "w5"))
+    assert not leaks(plan)
+
+
+def test_rooms_drawn_apart_by_their_walls_are_one_outline(small: FloorPlan) -> None:
+    """Rooms on their walls' inner faces, as others draw them: the space between them is wall and not outside."""
+    rooms = tuple(replace(room, polygon=room.polygon.buffer(-0.1, join_style="mitre")) for room in small.rooms)
+    plan = replace(small, rooms=rooms, walls=small.walls[1:])
+    closed = without_leaks(plan)
+    assert not leaks(closed)
+    added = [wall for wall in closed.walls if wall not in plan.walls]
+    assert all(
+        shapely.LineString(wall.segment).distance(shapely.box(0.2, 0.2, 11.8, 4.8).boundary) < 0.3 for wall in added
+    )

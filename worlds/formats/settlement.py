@@ -1,0 +1,170 @@
+"""The last step of every importer: bad doors are left out, and the plan is compared with its file."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.remarks import Remark
+from closedrooms.worlds.geometry import WallLines, wall_area
+from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
+from closedrooms.worlds.validation import passage_faults, validate
+
+# Interior doors are 0.61 to 1.11 m wide (leaves after DIN 18101). Outside of these medians the scale is wrong; a lobby
+# may have none but sliding doors of 3 m [m].
+NARROWEST_MEDIAN_DOOR, WIDEST_MEDIAN_DOOR, USUAL_DOOR = 0.65, 6.0, 0.9
+# Median floors of rooms outside of this are absurd, and a usual one [square metres].
+SMALLEST_MEDIAN_ROOM, LARGEST_MEDIAN_ROOM, USUAL_ROOM = 1.5, 1500.0, 20.0
+# Walls shorter than this in all may be lost by rounding [m].
+NOTICED = 0.05
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """What a file holds, to compare the plan with.
+
+    Attributes:
+        rooms: How many; ``None`` where the format knows no rooms.
+        doors: How many doors and openings; ``None`` where the format knows none.
+        walls: Lines on which the file has walls, in the plan's frame [m]; ``None`` where they are checked elsewhere.
+        within: A line of ``walls`` may lie this far from a wall, door or opening of the plan [m].
+        door_widths: Widths of its doors as they stand there [m], before any repair.
+    """
+
+    rooms: int | None = None
+    doors: int | None = None
+    walls: BaseGeometry | None = None
+    within: float = 0.0
+    door_widths: Sequence[float] = ()
+
+
+def settle(plan: FloorPlan, remarks: Iterable[Remark], source: Source, path: Path) -> FloorPlan:
+    """The plan without its bad doors, valid, with every remark on it.
+
+    Args:
+        plan: As the importer made it.
+        remarks: The importer's own.
+        source: What the file holds.
+        path: Of the file, for messages.
+
+    Raises:
+        InvalidInputError: What is left is not a valid plan.
+    """
+    kept, bad = _without_bad_passages(plan)
+    odd = _odd_scale(kept, source.door_widths)
+    try:
+        validate(kept, str(path))
+    except InvalidInputError as error:
+        # A plan a thousand times too large fails for its coordinates: say why.
+        hint = "".join(f" ({remark.what}: {remark.why})" for remark in odd)
+        raise InvalidInputError(f"{str(error).removesuffix(f': {path}')}{hint}", where=path) from error
+    said = [*remarks, *bad]
+    said += _missing(kept, source, said)
+    said += _lost_walls(kept, source)
+    said += odd
+    return replace(kept, remarks=tuple(merged(said)))
+
+
+def merged(remarks: Iterable[Remark]) -> list[Remark]:
+    """Remarks of one kind put together, in the order of their first."""
+    kinds: dict[tuple[str, str, str, bool], Remark] = {}
+    for remark in remarks:
+        key = (remark.action, remark.what, remark.why, remark.loss)
+        first = kinds.get(key)
+        kinds[key] = remark if first is None else replace(
+            first, names=(*first.names, *remark.names), count=first.count + remark.count
+        )  # fmt: skip
+    return list(kinds.values())
+
+
+def _without_bad_passages(plan: FloorPlan) -> tuple[FloorPlan, list[Remark]]:
+    """The plan without the doors and openings that are not as they should be, each named with its reason."""
+    faults = passage_faults(plan)
+    if not faults:
+        return plan, []
+    passages = plan.passages
+    kept = [passage for number, passage in enumerate(passages) if number not in faults]
+    remarks = []
+    for number, (what, _) in faults.items():
+        kind = "doors" if isinstance(passages[number], PlanDoor) else "openings"
+        remarks.append(Remark(action="dropped", what=kind, why=what, names=(passages[number].id,), loss=True))
+    doors = tuple(passage for passage in kept if isinstance(passage, PlanDoor))
+    openings = tuple(passage for passage in kept if isinstance(passage, Opening))
+    return replace(plan, doors=doors, openings=openings), remarks
+
+
+def _missing(plan: FloorPlan, source: Source, remarks: Sequence[Remark]) -> list[Remark]:
+    """Rooms and doors of the file that are neither in the plan nor named as dropped."""
+    found = []
+    for kinds, given, made in (
+        (("rooms",), source.rooms, len(plan.rooms)),
+        (("doors", "openings"), source.doors, len(plan.passages)),
+    ):
+        dropped = sum(r.count for r in remarks if r.action == "dropped" and r.what in kinds)
+        if given is not None and given - dropped > made:
+            why = f"the file holds {given}, the plan {made}, and only {dropped} are accounted for"
+            found.append(Remark(action="dropped", what=kinds[0], why=why, count=given - dropped - made, loss=True))
+    return found
+
+
+def _lost_walls(plan: FloorPlan, source: Source) -> list[Remark]:
+    """Walls of the file that the plan lacks, and walls of the plan that its solids lack."""
+    lost = []
+    passages = [shapely.LineString(passage.segment) for passage in plan.passages]
+    lines = [shapely.LineString(wall.segment) for wall in plan.walls]
+    if source.walls is not None:
+        near = shapely.union_all([*lines, *passages]).buffer(source.within, quad_segs=4)
+        lost.append(("in the file but not in the plan", source.walls.difference(near).length))
+    gaps = WallLines(plan)
+    solid = shapely.union_all([wall_area(plan), *(gaps.gap(passage.segment) for passage in plan.passages)])
+    bare = shapely.union_all(lines).difference(solid).length
+    lost.append(("in the plan but not among the solids that block robot and rays", bare))
+    return [
+        Remark(action="dropped", what="walls", why=f"{length:.2f} m are {where}", loss=True)
+        for where, length in lost
+        if length > NOTICED
+    ]
+
+
+def _odd_scale(plan: FloorPlan, widths: Sequence[float]) -> list[Remark]:
+    """A warning where doors or rooms are of a size that no building has, with the scale that would fit."""
+    usable = [width for width in widths if math.isfinite(width)]
+    if usable:
+        median = float(np.median(usable))
+        if not NARROWEST_MEDIAN_DOOR <= median <= WIDEST_MEDIAN_DOOR:
+            return [_scale_remark(f"the median door is {median:.2f} m wide", USUAL_DOOR / max(median, 1e-6))]
+    return _odd_rooms([room.polygon.area for room in plan.rooms])
+
+
+def _odd_rooms(areas: Sequence[float]) -> list[Remark]:
+    usable = [area for area in areas if math.isfinite(area) and area > 0.0]
+    area = float(np.median(usable)) if usable else USUAL_ROOM
+    if SMALLEST_MEDIAN_ROOM <= area <= LARGEST_MEDIAN_ROOM:
+        return []
+    return [_scale_remark(f"the median room has {area:.3g} square metres", math.sqrt(USUAL_ROOM / area))]
+
+
+def no_rooms(expected: str, areas: Sequence[float], remarks: Sequence[Remark], path: Path) -> InvalidInputError:
+    """The error of a file none of whose rooms can be used, with the reason.
+
+    Args:
+        expected: What a file of this format holds.
+        areas: Of its rooms as drawn, as far as they have any [square metres].
+        remarks: Why rooms were dropped.
+        path: Of the file.
+    """
+    dropped = merged(remark for remark in remarks if remark.action == "dropped" and remark.what == "rooms")
+    reasons = [f"{remark.count} with {remark.why}" for remark in dropped]
+    reasons += [f"{remark.what}: {remark.why}" for remark in _odd_rooms(areas)]
+    what = f"a plan without rooms ({'; '.join(reasons)})" if reasons else "a plan without rooms"
+    return InvalidInputError(what, expected=expected, where=path)
+
+
+def _scale_remark(what: str, factor: float) -> Remark:
+    why = f"it looks wrong: {what}; all lengths times {factor:.2g} would fit"
+    return Remark(action="guessed", what="scale", why=why)

@@ -1,0 +1,64 @@
+"""Whether a robot can leave a building, and the walls that keep it inside."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+
+from closedrooms.core.door import Segment
+from closedrooms.core.remarks import Remark
+from closedrooms.worlds.geometry import areal, wall_area
+from closedrooms.worlds.plan import FloorPlan, Wall
+from closedrooms.worlds.wall_assembly import joined
+
+# The smallest robot that must not get out [m].
+RADIUS = 0.15
+# Rooms closer together than this face each other and not the outside [m].
+FACING = 0.6
+# Pieces of outline shorter than this are no way out [m].
+SHORTEST = 0.01
+
+
+def leaks(plan: FloorPlan, radius: float = RADIUS) -> bool:
+    """Whether a disc of ``radius`` [m] gets from a room to the outside, every door open."""
+    walls = wall_area(plan)
+    rooms = shapely.union_all([room.polygon for room in plan.rooms])
+    x_min, y_min, x_max, y_max = shapely.total_bounds([walls, rooms])
+    margin = 4.0 * radius + 1.0
+    around = shapely.box(x_min - margin, y_min - margin, x_max + margin, y_max + margin)
+    room_for_it = around.difference(walls).buffer(-radius, quad_segs=4)
+    corner = shapely.Point(x_min - margin + 2.0 * radius, y_min - margin + 2.0 * radius)
+    outside = next((part for part in shapely.get_parts(room_for_it) if part.covers(corner)), Polygon())
+    # Behind an open door that is sealed the outside reaches to the middle of the wall.
+    return bool(outside.intersection(rooms).area > 1e-3)
+
+
+def without_leaks(plan: FloorPlan) -> FloorPlan:
+    """The plan with walls where its outline has none and a robot would get out; said in ``remarks``.
+
+    Args:
+        plan: Without doors and openings to the outside.
+    """
+    if not leaks(plan):
+        return plan
+    rooms = shapely.union_all([room.polygon for room in plan.rooms])
+    closed = rooms.buffer(FACING / 2, join_style="mitre").buffer(-FACING / 2, join_style="mitre")
+    bare = areal(closed).boundary.difference(wall_area(plan).buffer(1e-3, quad_segs=2))
+    segments: list[Segment] = []
+    for line in shapely.get_parts(bare):
+        points = [(round(x, 4), round(y, 4)) for x, y in shapely.get_coordinates(line).tolist()]
+        segments += [(a, b) for a, b in itertools.pairwise(points) if a != b]
+    runs = [run for run in joined(segments) if math.dist(*run) >= SHORTEST]
+    if not runs:
+        return plan
+    thickness = round(float(np.median([wall.thickness for wall in plan.walls])), 4)
+    taken = {wall.id for wall in plan.walls}
+    names = (name for name in (f"outline{n:03d}" for n in itertools.count()) if name not in taken)
+    added = tuple(Wall(name, run, thickness) for name, run in zip(names, runs, strict=False))
+    length = sum(math.dist(*run) for run in runs)
+    why = f"{length:.1f} m added along the outline, where a robot would have left the building"
+    remark = Remark(action="repaired", what="walls", why=why, count=len(added))
+    return replace(plan, walls=(*plan.walls, *added), remarks=(*plan.remarks, remark))
