@@ -36,7 +36,7 @@ def test_files_of_no_known_format_are_clear_errors(tmp_path: Path, content: byte
 
 
 def test_a_folder_is_a_clear_error(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="cannot read"):
+    with pytest.raises(InvalidInputError, match="a folder; expected a floor plan"):
         load_world(str(tmp_path))
 
 

@@ -157,7 +157,7 @@ def test_a_bad_door_is_left_open_and_named(tmp_path: Path) -> None:
     x, y = centre(GridFrame(CELL, -1.35, 2.4, *cells.shape), 28, 40)
     good = ClosedDoor("good", (x + CELL / 2, y), ((x + CELL / 2, y - 0.45), (x + CELL / 2, y + 0.45)))
     into_wall = ClosedDoor("wall", (centre(GridFrame(CELL, -1.35, 2.4, 60, 80), 2, 20)), None, 0.9)
-    wide = ClosedDoor("wide", (0.0, 3.4), None, 1e9)
+    wide = ClosedDoor("wide", (0.0, 3.4), None, 60.0)
     plan, _ = plan_of(cells, tmp_path, [good, into_wall, wide])
     assert [door.id for door in plan.doors] == ["good"]
     assert sorted(name for remark in plan.remarks if remark.loss for name in remark.names) == ["wall", "wide"]
