@@ -160,7 +160,11 @@ def row(floor: Floor, out: Path) -> list[str]:
         f"{metrics['ate_m']:.3f}",
         _figure(metrics["room_iou_mean"]),
         _figure(paper_iou(floor, out, set(metrics["room_iou"]))),
-        " / ".join(f"{errors[kind]:.1f}" for kind in ("closed", "baseline", "predicted")) if errors else "",
+        " / ".join(
+            "n/a" if errors[kind] is None else f"{errors[kind]:.1f}" for kind in ("closed", "baseline", "predicted")
+        )
+        if errors
+        else "",
         f"{run['exploration']['simulated_s']:.0f}",
         *cost,
         remark_of(run["exploration"]["status"], doors, run["notes"]),

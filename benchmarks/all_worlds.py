@@ -38,7 +38,11 @@ def row(name: str, result: RunResult) -> list[str]:
         f"{metrics['ate_m']:.3f}",
         f"{len(result.seen)} of {len(result.closed)}",
         "" if average is None else f"{average:.3f}",
-        " / ".join(f"{errors[kind]:.1f}" for kind in ("closed", "baseline", "predicted")) if errors else "",
+        " / ".join(
+            "n/a" if errors[kind] is None else f"{errors[kind]:.1f}" for kind in ("closed", "baseline", "predicted")
+        )
+        if errors
+        else "",
         str(result.exploration["scans"]),
         f"{result.durations['total']:.1f}",
     ]

@@ -88,14 +88,14 @@ def samples(world: str, seed: int, done: set[int], out: Path, noise: str) -> Ite
 
 def errors(row: Row) -> dict[str, float]:
     """The errors of one row in percent, by kind of estimate."""
-    found = {}
+    found: dict[str, float | None] = {}
     for preset in PRESETS:
         figures = errors_of_lengths(
             float(row["tsp_closed"]), float(row[f"tsp_{preset}"]), float(row["tsp_gt"]),
             n_rooms=int(row["rooms_seen"]), n_doors=int(row["seen"]),
         )  # fmt: skip
         found |= {"closed": figures.error_closed, "baseline": figures.error_baseline, preset: figures.error_pred}
-    return found
+    return {kind: error for kind, error in found.items() if error is not None}
 
 
 def report(rows: list[Row]) -> Iterator[str]:

@@ -15,7 +15,8 @@ class CoverageErrors:
         tsp_baseline: ``tsp_closed + tsp_closed / |R| * |D|`` [m].
         tsp_pred: Tour on M_pred [m].
         tsp_gt: Tour on M_GT [m].
-        error_closed: ``|tsp_gt - tsp_closed| / tsp_gt`` in percent.
+        error_closed: ``|tsp_gt - tsp_closed| / tsp_gt`` in percent; ``None`` where the true tour has no length: a
+            building with a single place to visit.
         error_baseline: Likewise for the baseline, percent.
         error_pred: Likewise for the prediction, percent.
     """
@@ -24,9 +25,9 @@ class CoverageErrors:
     tsp_baseline: float
     tsp_pred: float
     tsp_gt: float
-    error_closed: float
-    error_baseline: float
-    error_pred: float
+    error_closed: float | None
+    error_baseline: float | None
+    error_pred: float | None
 
 
 def coverage_errors(
@@ -43,7 +44,7 @@ def coverage_errors(
         n_doors: |D|, the closed doors in M.
 
     Raises:
-        InvalidInputError: Tours of different methods, or a true tour of length 0.
+        InvalidInputError: Tours of different methods.
     """
     methods = {tour.method for tour in (closed, predicted, truth)}
     if len(methods) > 1:
@@ -52,16 +53,10 @@ def coverage_errors(
 
 
 def errors_of_lengths(closed: float, predicted: float, truth: float, *, n_rooms: int, n_doors: int) -> CoverageErrors:
-    """The estimates and errors of :func:`coverage_errors` from the lengths of the three tours [m].
-
-    Raises:
-        InvalidInputError: A true tour of length 0.
-    """
-    if truth <= 0.0:
-        raise InvalidInputError("a true tour of length 0", expected="a building with more than one place to visit")
+    """The estimates and errors of :func:`coverage_errors` from the lengths of the three tours [m]."""
     baseline = closed + closed / max(n_rooms, 1) * n_doors
 
-    def error(estimate: float) -> float:
-        return abs(truth - estimate) / truth * 100.0
+    def error(estimate: float) -> float | None:
+        return abs(truth - estimate) / truth * 100.0 if truth > 0.0 else None
 
     return CoverageErrors(closed, baseline, predicted, truth, error(closed), error(baseline), error(predicted))

@@ -1,6 +1,7 @@
 """Whether a straight segment crosses an obstacle, cell by cell."""
 
 import numpy as np
+import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 
@@ -29,7 +30,7 @@ def cells_between(a: FloatArray, b: FloatArray) -> IntArray:
     return cells
 
 
-def is_clear(passable: BoolArray, a: FloatArray, b: FloatArray) -> bool:
+def is_clear(passable: BoolArray, a: npt.ArrayLike, b: npt.ArrayLike) -> bool:
     """Whether all cells between two points (row, col; continuous cells) are passable and inside the grid."""
     cells = cells_between(np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64))
     rows, cols = cells[:, 0], cells[:, 1]

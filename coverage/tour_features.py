@@ -30,7 +30,7 @@ def tour_features(tour: CoverageTour, map_name: str) -> list[Feature]:
         if number in doors:
             properties["door"] = doors[number]
         features.append((Point(point), properties))
-    for (u, v), length in zip(graph.edges.tolist(), graph.lengths.tolist(), strict=True):
+    for (u, v), length in zip(graph.pairs.tolist(), graph.lengths.tolist(), strict=True):
         line = LineString(graph.vertices[[u, v]])
         features.append((line, {"map": map_name, "type": "edge", "vertices": [u, v], "length": round(length, 4)}))
     features.append(

@@ -8,8 +8,9 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.coverage.biconnected import find_blocks, join_walks, metric
+from closedrooms.coverage.biconnected import find_blocks, join_walks, measure_paths
 from closedrooms.coverage.config import CoverageConfig, TourConfig
+from closedrooms.coverage.exact_tour import MOST_PLACES, find_shortest_tour
 from closedrooms.coverage.graph import TopologicalGraph
 from closedrooms.coverage.graph_builder import build_graph
 from closedrooms.coverage.local_search import search_tour
@@ -36,6 +37,7 @@ def plan_coverage(
     config: CoverageConfig | None = None,
     *,
     start: Point | None = None,
+    map_name: str | None = None,
 ) -> CoverageTour:
     """Clean the map, build its topological graph, and find a short closed tour over all vertices.
 
@@ -45,12 +47,13 @@ def plan_coverage(
         config: Options.
         start: Where the robot is, map frame [m]; the tour begins at the nearest vertex in sight. Without it the
             largest connected part is covered.
+        map_name: Which map it is, for the graph to remember (``tour.graph.graph["map"]``).
 
     Raises:
         InvalidInputError: A map without free space.
     """
     config = config or CoverageConfig()
-    built = build_graph(grid, doors, config, start=start)
+    built = build_graph(grid, doors, config, start=start, map_name=map_name)
     tour = solve_tour(built.graph, config.tour, start=built.start)
     return CoverageTour(
         tour.graph,
@@ -111,7 +114,7 @@ def _part_walk(graph: TopologicalGraph, members: list[int], config: TourConfig, 
     bound = min(sum(block.lower_bound for block in blocks), _length(graph, stops))
     if config.method == "default":
         return _Walk(stops, bound, max((block.end for block in blocks), key=ENDS.index))
-    whole = metric(graph, [start, *(v for v in members if v != start)])
+    whole = measure_paths(graph, [start, *(v for v in members if v != start)])
     paper = config.method == "paper"
     tour, end = tabu_search(
         whole.distances,
@@ -125,11 +128,16 @@ def _part_walk(graph: TopologicalGraph, members: list[int], config: TourConfig, 
 
 
 def _block_walk(graph: TopologicalGraph, block: list[int], config: TourConfig) -> _Walk:
-    """Christofides by OR-Tools, then moves, over the metric of one block, and the bound of Held and Karp."""
-    within = metric(graph, block)
+    """A short closed walk within one block, and a bound of all.
+
+    Few vertices are solved exactly. More: Christofides by OR-Tools, then moves, over the metric of the block, and the
+    bound of Held and Karp.
+    """
+    within = measure_paths(graph, block)
     distances = within.distances
-    if len(block) == 2:
-        return _Walk([block[0], block[1], block[0]], 2.0 * float(distances[0, 1]), "optimal")
+    if len(block) <= MOST_PLACES:
+        tour = find_shortest_tour(distances)
+        return _Walk(within.walk(tour), float(distances[tour, tour[1:] + tour[:1]].sum()), "optimal")
     tour, _ = search_tour(distances, christofides(distances), lower_bound=0.0, kicks=1, patience=1)
     upper = float(distances[tour, tour[1:] + tour[:1]].sum())
     bound = held_karp_bound(distances, upper=upper, steps=config.bound_steps)

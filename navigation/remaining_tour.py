@@ -8,7 +8,7 @@ from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.door import Point
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.coverage.biconnected import metric
+from closedrooms.coverage.biconnected import measure_paths
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.graph_builder import build_graph
 from closedrooms.coverage.local_search import search_tour
@@ -32,7 +32,7 @@ class Itinerary:
         parts = tour.graph.parts
         # Stops of other parts cannot be driven to.
         own = parts == parts[tour.order[0]]
-        self._metric = metric(tour.graph, np.flatnonzero(own).tolist())
+        self._metric = measure_paths(tour.graph, np.flatnonzero(own).tolist())
         self._stops: IntArray = tour.order[own[tour.order]]
         self._last = int(tour.order[0])
         self.home: Point = _point(self._places[self._last])
@@ -109,7 +109,7 @@ class Itinerary:
         home = members[int(np.argmin(np.hypot(*(graph.vertices[members] - np.array(self.home)).T)))]
         others = [v for v in members if v not in {built.start, home}]
         others = [v for v in others if not _was_near(graph.vertices[v], done, reach, grid)]
-        ways = metric(graph, members)
+        ways = measure_paths(graph, members)
         at = np.searchsorted(members, [built.start, home, *others])
         order = open_tour(ways.distances[np.ix_(at, at)], config)
         # At the first the robot is already, and home, the last, is driven to anyway.

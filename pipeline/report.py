@@ -31,12 +31,14 @@ def run_rows(result: "RunResult") -> Rows:
     return rows
 
 
-def tour_rows(tour: dict[str, dict[str, float]]) -> Rows:
+def tour_rows(tour: dict[str, Any]) -> Rows:
     """Lengths of the tours and the errors of the estimates (paper, section 5.3)."""
     names = {"closed": "map with closed doors", "predicted": "predicted map", "truth": "true map"}
     rows = [(f"tour on the {text}", f"{tour[name]['length_m']:.1f} m") for name, text in names.items() if name in tour]
     errors = tour.get("errors_percent", {})
-    return rows + [(f"tour error, {name}", f"{error:.1f} %") for name, error in errors.items()]
+    return rows + [
+        (f"tour error, {name}", "n/a" if error is None else f"{error:.1f} %") for name, error in errors.items()
+    ]
 
 
 def drive_rows(drive: dict[str, Any] | None) -> Rows:

@@ -279,9 +279,12 @@ def _metrics(
             tours["closed"], tours["predicted"], tours["truth"], metrics["rooms_seen"], len(survey.doors)
         )
         metrics["tour"]["errors_percent"] = {
-            "closed": round(errors.error_closed, 4),
-            "baseline": round(errors.error_baseline, 4),
-            "predicted": round(errors.error_pred, 4),
+            name: None if error is None else round(error, 4)
+            for name, error in (
+                ("closed", errors.error_closed),
+                ("baseline", errors.error_baseline),
+                ("predicted", errors.error_pred),
+            )
         }
     return metrics
 

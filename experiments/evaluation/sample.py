@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray
-from closedrooms.core.errors import OutputError, reason
+from closedrooms.core.errors import InvalidInputError, OutputError, reason
 from closedrooms.core.files import write_json
 from closedrooms.core.geojson import write_rooms
 from closedrooms.core.grid import OccupancyGrid
@@ -259,6 +259,8 @@ def _tours(sample: Sample, predicted: OccupancyGrid, rooms_seen: int, out: Path)
     errors = errors_of_lengths(
         closed["length_m"], own["length_m"], truth["length_m"], n_rooms=rooms_seen, n_doors=len(sample.doors)
     )
+    if errors.error_closed is None or errors.error_baseline is None or errors.error_pred is None:
+        raise InvalidInputError("a true tour of length 0", expected="a building with more than one place to visit")
     return {
         "rooms_seen": rooms_seen,
         "closed": closed,

@@ -162,9 +162,12 @@ class Building:
         seen = rooms_seen(self._plan, grid, world_T_map.inverse())
         errors = errors_of_lengths(lengths[0], lengths[1], truth, n_rooms=seen, n_doors=len(doors))
         return {
-            "error_closed": _rounded(errors.error_closed),
-            "error_baseline": _rounded(errors.error_baseline),
-            "error_predicted": _rounded(errors.error_pred),
+            name: None if error is None else _rounded(error)
+            for name, error in (
+                ("error_closed", errors.error_closed),
+                ("error_baseline", errors.error_baseline),
+                ("error_predicted", errors.error_pred),
+            )
         }
 
     def _predict(self, grid: OccupancyGrid, doors: Sequence[ClosedDoor]) -> Prediction:
