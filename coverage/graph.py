@@ -9,7 +9,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray, frozen
 
-VertexKind = Literal["end", "junction", "bend", "door"]
+VertexKind = Literal["end", "junction", "bend", "detour", "door"]
 
 
 class TopologicalGraph(nx.Graph):  # type: ignore[type-arg]
@@ -19,8 +19,8 @@ class TopologicalGraph(nx.Graph):  # type: ignore[type-arg]
     is a copy that can be changed. Attributes of networkx's own kind:
 
     - vertices: ``pos`` (x and y, map frame [m]), ``kind`` (an ``end`` of degree 1, a ``junction`` of degree 3 or more,
-      a ``bend`` where an edge would cross an obstacle, or a closed ``door``), ``part`` (connected part, from 0), and
-      ``door`` (its id) where it is one;
+      a ``bend`` where an edge would cross a wall, a ``detour`` around a doorpost or furniture, where nothing is to be
+      visited, or a closed ``door``), ``part`` (connected part, from 0), and ``door`` (its id) where it is one;
     - edges: ``length`` (Euclidean [m]; paper, section 5.2), and ``polyline``, the piece of the Voronoi graph that it
       stands for, map frame [m], shape (k, 2), where there is one;
     - graph: ``map``, which map it is of (``closed``, ``predicted``, ``truth``), where that was said.

@@ -17,6 +17,8 @@ from closedrooms.coverage.vertex_merging import merge_thin
 
 # A start farther from all free space than this [m] is worth a note: no robot stands there.
 FAR_START = 1.0
+# So much space is worth a note when it is left out [m2]: about a doorway's square is in every map.
+WORTH_SAYING = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,6 +97,9 @@ def _chosen_parts(space: FreeSpace, config: CoverageConfig, start: Point | None)
     notes = []
     if space.outside > 0.0:
         notes.append(f"{space.outside:.1f} m2 that rays saw through windows, with hardly a wall around, are left out")
+    if space.unreachable >= WORTH_SAYING:
+        radius = config.graph.robot_radius
+        notes.append(f"{space.unreachable:.1f} m2 that a robot of {radius:.2f} m radius cannot get into are left out")
     chosen = 1
     if start is not None:
         chosen, distance = _nearest_part(space, start)

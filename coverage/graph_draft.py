@@ -41,7 +41,10 @@ class GraphDraft:
         key = (int(cell[0]), int(cell[1]))
         if key not in self._at_cell:
             self._at_cell[key] = self.add_vertex(cell.astype(np.float64) + 0.5, kind)
-        return self._at_cell[key]
+        vertex = self._at_cell[key]
+        if self.kinds[vertex] == "detour":
+            self.kinds[vertex] = kind
+        return vertex
 
     def nearest_reachable(self, cell: IntArray) -> IntArray:
         """The nearest cell where the robot can be: of those that the clean map shows in free sight, if there are any.
@@ -87,7 +90,7 @@ class GraphDraft:
         for i, j in pairwise(stops):
             path = self._reachable_path(chain[i : j + 1])
             for u, v in pairwise(pull_taut(path, self.space.reachable)):
-                vertex = self._vertex_at(path[v], "bend")
+                vertex = self._vertex_at(path[v], "bend" if v == len(path) - 1 else "detour")
                 whole = v - u == len(path) - 1
                 self.add_edge(last, vertex, (chain[i : j + 1] if whole else path[u : v + 1]).astype(np.float64) + 0.5)
                 last = vertex

@@ -1,7 +1,9 @@
 """A coverage tour on a map (paper, section 5)."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -108,38 +110,48 @@ def _length(graph: TopologicalGraph, stops: list[int]) -> float:
 def _part_walk(graph: TopologicalGraph, members: list[int], config: TourConfig, start: int) -> _Walk:
     if len(members) == 1:
         return _Walk([start], 0.0, "optimal")
-    blocks = [_block_walk(graph, block, config) for block in find_blocks(graph, members)]
+    found = find_blocks(graph, members)
+    joints = {start} | {vertex for vertex, times in Counter(chain.from_iterable(found)).items() if times > 1}
+    blocks = [_block_walk(graph, block, joints, config) for block in found]
     stops = join_walks([block.stops for block in blocks], start)
     # Rounding must not put the bound above the tour.
     bound = min(sum(block.lower_bound for block in blocks), _length(graph, stops))
     if config.method == "default":
         return _Walk(stops, bound, max((block.end for block in blocks), key=ENDS.index))
+    kinds = graph.kinds
     whole = measure_paths(graph, [start, *(v for v in members if v != start)])
+    places = [place for place, v in enumerate(whole.vertices.tolist()) if v == start or kinds[v] != "detour"]
     paper = config.method == "paper"
     tour, end = tabu_search(
-        whole.distances,
+        whole.distances[np.ix_(places, places)],
         solutions=None if paper else config.solution_limit,
         convergence=config.convergence if paper else None,
         seconds=config.seconds if paper else None,
     )
-    stops = whole.walk(tour)
+    stops = whole.walk([places[stop] for stop in tour])
     optimal = _length(graph, stops) <= bound * (1.0 + 1e-9)
     return _Walk(stops, min(bound, _length(graph, stops)), "optimal" if optimal else end)
 
 
-def _block_walk(graph: TopologicalGraph, block: list[int], config: TourConfig) -> _Walk:
+def _block_walk(graph: TopologicalGraph, block: list[int], joints: set[int], config: TourConfig) -> _Walk:
     """A short closed walk within one block, and a bound of all.
 
-    Few vertices are solved exactly. More: Christofides by OR-Tools, then moves, over the metric of the block, and the
-    bound of Held and Karp.
+    It visits all vertices but detours; those that hold blocks together (``joints``) in any case. Few vertices are
+    solved exactly. More: Christofides by OR-Tools, then moves, over the metric of the block, and the bound of Held and
+    Karp.
     """
     within = measure_paths(graph, block)
-    distances = within.distances
-    if len(block) <= MOST_PLACES:
+    kinds = graph.kinds
+    places = [place for place, v in enumerate(block) if v in joints or kinds[v] != "detour"]
+    distances = within.distances[np.ix_(places, places)]
+    if len(places) <= MOST_PLACES:
         tour = find_shortest_tour(distances)
-        return _Walk(within.walk(tour), float(distances[tour, tour[1:] + tour[:1]].sum()), "optimal")
+        return _Walk(within.walk([places[stop] for stop in tour]), _tour_length(distances, tour), "optimal")
     tour, _ = search_tour(distances, christofides(distances), lower_bound=0.0, kicks=1, patience=1)
-    upper = float(distances[tour, tour[1:] + tour[:1]].sum())
-    bound = held_karp_bound(distances, upper=upper, steps=config.bound_steps)
+    bound = held_karp_bound(distances, upper=_tour_length(distances, tour), steps=config.bound_steps)
     tour, end = search_tour(distances, tour, lower_bound=bound, kicks=config.kicks, patience=config.patience)
-    return _Walk(within.walk(tour), bound, end)
+    return _Walk(within.walk([places[stop] for stop in tour]), bound, end)
+
+
+def _tour_length(distances: FloatArray, tour: list[int]) -> float:
+    return float(distances[tour, tour[1:] + tour[:1]].sum())

@@ -153,8 +153,21 @@ class CoverConfig:
     """Where the robot is, x and y in the map frame [m]: of several parts that are not connected, its own is covered;
     without it, the largest (``--coverage.parts all`` covers every one)."""
 
+    to: Literal["nav2", "path"] | None = None
+    """Also write the tour for ROS 2: ``path`` as a nav_msgs/Path (``path.yaml``), a path around furniture that can be
+    driven; ``nav2`` as that and as the waypoints that nav2's panel loads (``waypoints.yaml``)."""
+
+    robot_radius: float | None = None
+    """Radius of the robot [m] for which every place and path has room; 0.20 m where not given (the same as
+    ``--coverage.graph.robot-radius``)."""
+
     coverage: CoverageConfig = field(default_factory=CoverageConfig)
     """Graph and tour."""
+
+    def __post_init__(self) -> None:
+        if self.robot_radius is not None:
+            graph = replace(self.coverage.graph, robot_radius=self.robot_radius)
+            object.__setattr__(self, "coverage", replace(self.coverage, graph=graph))
 
 
 @dataclass(frozen=True, kw_only=True)

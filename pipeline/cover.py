@@ -8,7 +8,10 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
 from closedrooms.core.geojson import read_doors, write_doors, write_features
+from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.rosmap import read_map, write_map
+from closedrooms.coverage.drivable_path import find_drivable_paths
+from closedrooms.coverage.ros_tour import write_path_message, write_waypoints
 from closedrooms.coverage.tour import CoverageTour
 from closedrooms.coverage.tour_features import tour_features
 from closedrooms.coverage.tour_planner import plan_coverage
@@ -76,7 +79,7 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Cover
     with watch.stage("cover"):
         progress.stage("cover")
         try:
-            tour = plan_coverage(grid, doors, config.coverage, start=config.start)
+            tour = plan_coverage(grid, doors, config.coverage, start=config.start, map_name="closed")
         except InvalidInputError as error:
             raise InvalidInputError(str(error), where=config.map) from error
     missed = {door.id: "no free space to reach it from" for door in doors if door.id not in tour.graph.door_vertices}
@@ -87,6 +90,8 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Cover
         if config.doors:
             write_doors(folder / "doors.geojson", doors)
         write_features(folder / "tour.geojson", tour_features(tour, "closed"))
+        if config.to is not None:
+            _write_for_ros(folder, grid, tour, config)
         from closedrooms.visualization.summary import draw_cover
 
         draw_cover(folder / "summary.png", grid, doors, tour)
@@ -102,3 +107,13 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Cover
         manifest["notes"] = list(tour.notes)
         manifest["durations"] = watch.seconds()
     return CoverResult(config.out, f"{config.map.name}: coverage tour", tour, missed, manifest["durations"])
+
+
+def _write_for_ros(folder: Path, grid: OccupancyGrid, tour: CoverageTour, config: CoverConfig) -> None:
+    """``path.yaml`` and, for nav2, ``waypoints.yaml``; of unconnected parts a pair each, with its number."""
+    paths = find_drivable_paths(grid, tour, config.coverage.graph.robot_radius)
+    for number, path in enumerate(paths):
+        ending = f"-{number}" if len(paths) > 1 else ""
+        write_path_message(folder / f"path{ending}.yaml", path.poses)
+        if config.to == "nav2":
+            write_waypoints(folder / f"waypoints{ending}.yaml", path.poses[list(path.stops)])

@@ -198,7 +198,7 @@ def plan_tours(
         ("truth", truth, ()),
     ):
         try:
-            tours[name] = plan_coverage(grid, doors, config.coverage, start=START)
+            tours[name] = plan_coverage(grid, doors, config.coverage, start=START, map_name=name)
         except InvalidInputError as error:
             notes.append(f"no tour on the {name} map: {error}")
             continue
