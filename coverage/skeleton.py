@@ -1,6 +1,10 @@
 """The Voronoi graph of free space, from its skeleton (paper, section 5.1)."""
 
+import importlib.util
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -33,9 +37,8 @@ def thin(mask: BoolArray) -> BoolArray:
     scikit-image's ``skeletonize``, as the paper. A part that thinning takes away whole keeps one cell.
     """
     import cv2
-    from skimage.morphology import skeletonize
 
-    skeleton: BoolArray = skeletonize(mask)  # type: ignore[no-untyped-call]
+    skeleton: BoolArray = np.asarray(load_skeletonize()(np.ascontiguousarray(mask, dtype=np.bool_)), dtype=np.bool_)
     count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
     lost = np.setdiff1d(np.arange(1, count), labels[skeleton])
     if lost.size:
@@ -44,6 +47,33 @@ def thin(mask: BoolArray) -> BoolArray:
             deepest = np.argmax(np.where(labels == part, depth, -1.0))
             skeleton.flat[deepest] = True
     return skeleton
+
+
+@cache
+def load_skeletonize() -> Callable[[BoolArray], BoolArray]:
+    """scikit-image's ``skeletonize`` of two dimensions.
+
+    Its package imports scipy.ndimage and scipy.spatial for functions beside it, a fifth of the CPU time of
+    ``closedrooms cover``. The compiled function needs none of them, so its file is loaded by itself; where a version
+    keeps it elsewhere, by the package.
+    """
+    package = importlib.util.find_spec("skimage")
+    for folder in (package.submodule_search_locations or ()) if package else ():
+        for path in sorted(Path(folder, "morphology").glob("_skeletonize_various_cy.*")):
+            try:
+                spec = importlib.util.spec_from_file_location("_skeletonize_various_cy", path)
+                if spec is None or spec.loader is None:
+                    continue
+                module = importlib.util.module_from_spec(spec)
+                spec.loader.exec_module(module)
+                thin_fast: Callable[[BoolArray], BoolArray] = module._fast_skeletonize
+            except (ImportError, AttributeError):
+                continue
+            return thin_fast
+    from skimage.morphology import skeletonize
+
+    whole: Callable[[BoolArray], BoolArray] = skeletonize
+    return whole
 
 
 def trace_skeleton(skeleton: BoolArray) -> VoronoiGraph:
