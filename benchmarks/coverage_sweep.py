@@ -19,7 +19,7 @@ import numpy as np
 from closedrooms.core.geojson import write_doors
 from closedrooms.core.random import stream
 from closedrooms.core.rosmap import write_map
-from closedrooms.coverage.estimates import errors_of_lengths
+from closedrooms.coverage.estimates import compare_lengths
 from closedrooms.coverage.tour import CoverageTour
 from closedrooms.coverage.tour_planner import plan_coverage
 from closedrooms.experiments.dataset.erase import Eraser
@@ -90,7 +90,7 @@ def errors(row: Row) -> dict[str, float]:
     """The errors of one row in percent, by kind of estimate."""
     found: dict[str, float | None] = {}
     for preset in PRESETS:
-        figures = errors_of_lengths(
+        figures = compare_lengths(
             float(row["tsp_closed"]), float(row[f"tsp_{preset}"]), float(row["tsp_gt"]),
             n_rooms=int(row["rooms_seen"]), n_doors=int(row["seen"]),
         )  # fmt: skip

@@ -19,12 +19,12 @@ from closedrooms.coverage.graph import TopologicalGraph
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Metric:
-    """Shortest ways over a graph between some of its vertices.
+    """Shortest paths over a graph between some of its vertices.
 
     Attributes:
         vertices: Numbers in the graph, shape (k,).
-        distances: Length of the shortest way along edges [m], shape (k, k).
-        before: Position in ``vertices`` of the last stop before ``[i, j]``, on the way from i to j.
+        distances: Length of the shortest path along edges [m], shape (k, k).
+        before: Position in ``vertices`` of the last stop before j on the shortest path from i to j.
     """
 
     vertices: IntArray
@@ -33,18 +33,18 @@ class Metric:
 
     def walk(self, tour: list[int]) -> list[int]:
         """The closed walk over vertices of the graph that visits the positions of ``tour`` in turn and returns."""
-        return self.way([*tour, tour[0]])
+        return self.trace([*tour, tour[0]])
 
-    def way(self, stops: list[int]) -> list[int]:
+    def trace(self, stops: list[int]) -> list[int]:
         """The walk over vertices of the graph that visits the positions ``stops`` in turn."""
-        way = [stops[0]]
+        path = [stops[0]]
         for a, b in pairwise(stops):
             piece, stop = [], b
             while stop != a:
                 piece.append(stop)
                 stop = int(self.before[a, stop])
-            way += reversed(piece)
-        return [int(self.vertices[stop]) for stop in way]
+            path += reversed(piece)
+        return [int(self.vertices[stop]) for stop in path]
 
 
 def measure_paths(graph: TopologicalGraph, members: list[int]) -> Metric:
@@ -84,11 +84,11 @@ def join_walks(walks: list[list[int]], start: int) -> list[int]:
     used = [False] * number
     stack, joined = [start], []
     while stack:
-        way = steps[stack[-1]]
-        while way and used[way[-1][1]]:
-            way.pop()
-        if way:
-            other, step = way.pop()
+        left = steps[stack[-1]]
+        while left and used[left[-1][1]]:
+            left.pop()
+        if left:
+            other, step = left.pop()
             used[step] = True
             stack.append(other)
         else:

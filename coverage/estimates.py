@@ -30,10 +30,10 @@ class CoverageErrors:
     error_pred: float | None
 
 
-def coverage_errors(
+def compare_tours(
     closed: CoverageTour, predicted: CoverageTour, truth: CoverageTour, n_rooms: int, n_doors: int
 ) -> CoverageErrors:
-    """The estimates and errors of section 5.2 and 5.3.
+    """Compare the estimates of the cost of coverage with the true cost (sections 5.2 and 5.3).
 
     Args:
         closed: Tour on M.
@@ -49,11 +49,11 @@ def coverage_errors(
     methods = {tour.method for tour in (closed, predicted, truth)}
     if len(methods) > 1:
         raise InvalidInputError(f"tours by {', '.join(sorted(methods))}", expected="the same method for all three")
-    return errors_of_lengths(closed.length, predicted.length, truth.length, n_rooms=n_rooms, n_doors=n_doors)
+    return compare_lengths(closed.length, predicted.length, truth.length, n_rooms=n_rooms, n_doors=n_doors)
 
 
-def errors_of_lengths(closed: float, predicted: float, truth: float, *, n_rooms: int, n_doors: int) -> CoverageErrors:
-    """The estimates and errors of :func:`coverage_errors` from the lengths of the three tours [m]."""
+def compare_lengths(closed: float, predicted: float, truth: float, *, n_rooms: int, n_doors: int) -> CoverageErrors:
+    """Compare as :func:`compare_tours` does, from the lengths of the three tours [m]."""
     baseline = closed + closed / max(n_rooms, 1) * n_doors
 
     def error(estimate: float) -> float | None:

@@ -10,7 +10,7 @@ from closedrooms.coverage.line_of_sight import is_clear
 
 DIAGONAL = math.sqrt(2.0)
 STEPS = tuple((row, col, math.hypot(row, col)) for row in (-1, 0, 1) for col in (-1, 0, 1) if row or col)
-# Distances from the chain within which a path is looked for first, in cells: it shall go the way of the chain.
+# Distances from the chain within which a path is looked for first, in cells: it shall follow the chain.
 WIDTHS = (15, 50)
 
 
@@ -18,7 +18,7 @@ def find_path_along(chain: IntArray, start: IntArray, goal: IntArray, cells: Boo
     """A path over some cells, near a chain where there is one.
 
     Args:
-        chain: Cells (row, col) that tell the way, shape (n, 2).
+        chain: Cells (row, col) to follow, shape (n, 2).
         start: First cell of the path, one of ``cells``.
         goal: Its last cell, likewise.
         cells: Where the path may run; its border is not.
@@ -29,13 +29,13 @@ def find_path_along(chain: IntArray, start: IntArray, goal: IntArray, cells: Boo
     """
     import cv2
 
-    way = np.vstack((start, chain, goal))
+    guide = np.vstack((start, chain, goal))
     for width in WIDTHS:
-        low = np.maximum(way.min(axis=0) - width - 1, 0)
-        high = np.minimum(way.max(axis=0) + width + 2, cells.shape)
+        low = np.maximum(guide.min(axis=0) - width - 1, 0)
+        high = np.minimum(guide.max(axis=0) + width + 2, cells.shape)
         window = (slice(low[0], high[0]), slice(low[1], high[1]))
         apart = np.ones(tuple((high - low).tolist()), dtype=np.uint8)
-        apart[way[:, 0] - low[0], way[:, 1] - low[1]] = 0
+        apart[guide[:, 0] - low[0], guide[:, 1] - low[1]] = 0
         near = cv2.distanceTransform(apart, cv2.DIST_L2, 3) <= width
         allowed = np.pad(cells[window] & near, 1)
         path = find_shortest_path(start - low + 1, goal - low + 1, allowed)

@@ -159,7 +159,7 @@ def _walk(
     """Chains from group to group, then rings that touch none (each gets a vertex: ``centres`` grows)."""
     edges: list[tuple[int, int]] = []
     chains: list[list[int]] = []
-    ways = [_ways(links, group, members[g], centres[g]) for g in range(len(members))]
+    paths = [_paths_to_centre(links, group, members[g], centres[g]) for g in range(len(members))]
     seen = [False] * len(degree)
     for g, pixels in enumerate(members):
         for pixel in pixels:
@@ -169,7 +169,7 @@ def _walk(
                 chain = _follow(pixel, first, links, group, seen)
                 other = group[chain[-1]]
                 edges.append((g, other))
-                chains.append(ways[g][pixel][::-1] + chain[1:-1] + ways[other][chain[-1]])
+                chains.append(paths[g][pixel][::-1] + chain[1:-1] + paths[other][chain[-1]])
     for pixel, own in enumerate(degree):
         if own == 2 and not seen[pixel]:
             centres.append(pixel)
@@ -179,16 +179,16 @@ def _walk(
     return edges, chains
 
 
-def _ways(links: list[list[int]], group: list[int], members: list[int], centre: int) -> dict[int, list[int]]:
+def _paths_to_centre(links: list[list[int]], group: list[int], members: list[int], centre: int) -> dict[int, list[int]]:
     """From each cell of a group the cells to the group's centre, both included."""
-    ways = {centre: [centre]}
+    paths = {centre: [centre]}
     reached = [centre]
     for pixel in reached:
         for other in links[pixel]:
-            if other not in ways and group[other] == group[centre] and len(members) > 1:
-                ways[other] = [other, *ways[pixel]]
+            if other not in paths and group[other] == group[centre] and len(members) > 1:
+                paths[other] = [other, *paths[pixel]]
                 reached.append(other)
-    return ways
+    return paths
 
 
 def _follow(start: int, first: int, links: list[list[int]], group: list[int], seen: list[bool]) -> list[int]:

@@ -17,7 +17,7 @@ class CoverageTour:
     Attributes:
         graph: What it runs over.
         order: Vertices in the order of their visit, each once, shape (n,); the return to the first is implied.
-        length: Length along the graph, the way back included [m].
+        length: Length along the graph, the return included [m].
         lower_bound: No tour over this graph is shorter [m] (Held and Karp).
         status: ``complete``, or ``partial`` when a closed door cannot be reached.
         path: Points of the walk along the graph, map frame [m], shape (k, 2), closed. Between the tours of unconnected

@@ -16,8 +16,8 @@ from closedrooms.coverage.exact_tour import MOST_PLACES, find_shortest_tour
 from closedrooms.coverage.graph import TopologicalGraph
 from closedrooms.coverage.graph_builder import build_graph
 from closedrooms.coverage.local_search import search_tour
-from closedrooms.coverage.lower_bound import held_karp_bound
-from closedrooms.coverage.routing import christofides, tabu_search
+from closedrooms.coverage.lower_bound import find_lower_bound
+from closedrooms.coverage.routing import find_christofides_tour, run_tabu_search
 from closedrooms.coverage.tour import CoverageTour, SearchStatus
 
 # From the best end of a search to the worst: a tour of several blocks is as good as its worst.
@@ -122,7 +122,7 @@ def _part_walk(graph: TopologicalGraph, members: list[int], config: TourConfig, 
     whole = measure_paths(graph, [start, *(v for v in members if v != start)])
     places = [place for place, v in enumerate(whole.vertices.tolist()) if v == start or kinds[v] != "detour"]
     paper = config.method == "paper"
-    tour, end = tabu_search(
+    tour, end = run_tabu_search(
         whole.distances[np.ix_(places, places)],
         solutions=None if paper else config.solution_limit,
         convergence=config.convergence if paper else None,
@@ -147,8 +147,8 @@ def _block_walk(graph: TopologicalGraph, block: list[int], joints: set[int], con
     if len(places) <= MOST_PLACES:
         tour = find_shortest_tour(distances)
         return _Walk(within.walk([places[stop] for stop in tour]), _tour_length(distances, tour), "optimal")
-    tour, _ = search_tour(distances, christofides(distances), lower_bound=0.0, kicks=1, patience=1)
-    bound = held_karp_bound(distances, upper=_tour_length(distances, tour), steps=config.bound_steps)
+    tour, _ = search_tour(distances, find_christofides_tour(distances), lower_bound=0.0, kicks=1, patience=1)
+    bound = find_lower_bound(distances, upper=_tour_length(distances, tour), steps=config.bound_steps)
     tour, end = search_tour(distances, tour, lower_bound=bound, kicks=config.kicks, patience=config.patience)
     return _Walk(within.walk([places[stop] for stop in tour]), bound, end)
 

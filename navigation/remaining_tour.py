@@ -12,7 +12,7 @@ from closedrooms.coverage.biconnected import measure_paths
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.graph_builder import build_graph
 from closedrooms.coverage.local_search import search_tour
-from closedrooms.coverage.routing import christofides
+from closedrooms.coverage.routing import find_christofides_tour
 from closedrooms.coverage.tour import CoverageTour
 
 # A stop counts as visited when the robot comes so close [m]: it stands for what is seen from there.
@@ -82,7 +82,7 @@ class Itinerary:
         """The way over all stops and home along the edges of the graph, shape (k, 2) [m]."""
         at = {int(vertex): position for position, vertex in enumerate(self._metric.vertices)}
         stops = [at[int(vertex)] for vertex in (*self._stops, self._last)]
-        way: FloatArray = self._places[self._metric.way(stops)]
+        way: FloatArray = self._places[self._metric.trace(stops)]
         return way
 
     def solve_again(
@@ -130,7 +130,7 @@ def open_tour(distances: FloatArray, config: CoverageConfig) -> list[int]:
     lengthened = distances + float(distances.max())
     np.fill_diagonal(lengthened, 0.0)
     lengthened[0, 1] = lengthened[1, 0] = 0.0
-    order = christofides(lengthened)
+    order = find_christofides_tour(lengthened)
     if count > 3:
         order, _ = search_tour(
             lengthened, order, lower_bound=0.0, kicks=config.tour.kicks, patience=config.tour.patience

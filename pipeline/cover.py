@@ -13,7 +13,7 @@ from closedrooms.core.rosmap import read_map, write_map
 from closedrooms.coverage.drivable_path import find_drivable_paths
 from closedrooms.coverage.ros_tour import write_path_message, write_waypoints
 from closedrooms.coverage.tour import CoverageTour
-from closedrooms.coverage.tour_features import tour_features
+from closedrooms.coverage.tour_features import make_tour_features
 from closedrooms.coverage.tour_planner import plan_coverage
 from closedrooms.pipeline.config import CoverConfig
 from closedrooms.pipeline.manifest import resolved, versions
@@ -89,7 +89,7 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Cover
         write_map(folder / "map", grid)
         if config.doors:
             write_doors(folder / "doors.geojson", doors)
-        write_features(folder / "tour.geojson", tour_features(tour, "closed"))
+        write_features(folder / "tour.geojson", make_tour_features(tour, "closed"))
         if config.to is not None:
             _write_for_ros(folder, grid, tour, config)
         from closedrooms.visualization.summary import draw_cover

@@ -13,9 +13,9 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
 from closedrooms.core.rosmap import write_map
 from closedrooms.core.tum import write_trajectory
-from closedrooms.coverage.estimates import coverage_errors
+from closedrooms.coverage.estimates import compare_tours
 from closedrooms.coverage.tour import CoverageTour
-from closedrooms.coverage.tour_features import tour_features
+from closedrooms.coverage.tour_features import make_tour_features
 from closedrooms.coverage.tour_planner import plan_coverage
 from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.mapper import Mapper
@@ -275,7 +275,7 @@ def _metrics(
             "status": tour.status,
         }
     if {"closed", "predicted", "truth"} <= tours.keys():
-        errors = coverage_errors(
+        errors = compare_tours(
             tours["closed"], tours["predicted"], tours["truth"], metrics["rooms_seen"], len(survey.doors)
         )
         metrics["tour"]["errors_percent"] = {
@@ -308,7 +308,7 @@ def _write(
     write_rooms(folder / "truth_rooms.geojson", truth.rooms)
     write_trajectory(folder / "trajectory.tum", survey.stamps, survey.estimate)
     write_trajectory(folder / "trajectory_truth.tum", survey.stamps, survey.truth)
-    features = [f for name, tour in tours.items() for f in tour_features(tour, name)]
+    features = [f for name, tour in tours.items() for f in make_tour_features(tour, name)]
     write_features(folder / "tour.geojson", features + ([] if driven is None else drive_features(driven)))
     if driven is not None:
         draw_drive(folder / "drive.png", driven, truth.rooms)

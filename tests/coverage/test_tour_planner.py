@@ -11,9 +11,9 @@ from closedrooms.core.geojson import read_doors, read_features, write_features
 from closedrooms.core.grid import OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.rosmap import read_map
 from closedrooms.coverage.config import CoverageConfig, TourConfig
-from closedrooms.coverage.estimates import coverage_errors
+from closedrooms.coverage.estimates import compare_tours
 from closedrooms.coverage.room_count import count_rooms
-from closedrooms.coverage.tour_features import tour_features
+from closedrooms.coverage.tour_features import make_tour_features
 from closedrooms.coverage.tour_planner import plan_coverage
 
 AUTHORS = Path(__file__).parents[2].parent / "shared" / "data" / "authors"
@@ -89,7 +89,7 @@ def test_an_empty_map_is_refused():
 
 def test_features_carry_the_map_and_survive_a_file(corridor_with_rooms, plain, tmp_path):
     tour = plan_coverage(corridor_with_rooms(2), [ClosedDoor("d", (5.0, 0.95))], plain)
-    features = tour_features(tour, "closed")
+    features = make_tour_features(tour, "closed")
     write_features(tmp_path / "tour.geojson", features)
     read = read_features(tmp_path / "tour.geojson")
     assert {properties["map"] for _, properties in read} == {"closed"}
@@ -103,14 +103,14 @@ def test_features_carry_the_map_and_survive_a_file(corridor_with_rooms, plain, t
 
 
 def test_a_tour_of_one_vertex_is_a_point_feature(draw, plain):
-    features = tour_features(plan_coverage(draw(6.0, 6.0, [(1.0, 1.0, 5.0, 5.0)]), config=plain), "truth")
+    features = make_tour_features(plan_coverage(draw(6.0, 6.0, [(1.0, 1.0, 5.0, 5.0)]), config=plain), "truth")
     assert [geometry.geom_type for geometry, _ in features] == ["Point", "Point"]
 
 
 def test_errors_follow_the_paper(corridor_with_rooms, plain):
     tour = plan_coverage(corridor_with_rooms(2), config=plain)
     closed, predicted, truth = (replace(tour, length=length) for length in (60.0, 95.0, 100.0))
-    errors = coverage_errors(closed, predicted, truth, n_rooms=6, n_doors=3)
+    errors = compare_tours(closed, predicted, truth, n_rooms=6, n_doors=3)
     assert (errors.tsp_closed, errors.tsp_pred, errors.tsp_gt) == (60.0, 95.0, 100.0)
     assert errors.tsp_baseline == pytest.approx(90.0)
     assert (errors.error_closed, errors.error_baseline, errors.error_pred) == pytest.approx((40.0, 10.0, 5.0))
@@ -119,12 +119,12 @@ def test_errors_follow_the_paper(corridor_with_rooms, plain):
 def test_tours_of_different_methods_are_not_compared(corridor_with_rooms, plain):
     tour = plan_coverage(corridor_with_rooms(2), config=plain)
     with pytest.raises(InvalidInputError, match="same method"):
-        coverage_errors(tour, replace(tour, method="paper"), tour, 1, 1)
+        compare_tours(tour, replace(tour, method="paper"), tour, 1, 1)
 
 
 def test_there_is_no_error_where_the_true_tour_has_no_length(corridor_with_rooms, plain):
     tour = plan_coverage(corridor_with_rooms(2), config=plain)
-    errors = coverage_errors(tour, tour, replace(tour, length=0.0), 1, 1)
+    errors = compare_tours(tour, tour, replace(tour, length=0.0), 1, 1)
     assert (errors.error_closed, errors.error_baseline, errors.error_pred) == (None, None, None)
     assert errors.tsp_closed == tour.length
 
@@ -153,6 +153,6 @@ def test_on_an_authors_map_all_doors_are_reached_and_the_prediction_helps():
     predicted, truth = (plan_coverage(read_map(folder / f"{name}.yaml")) for name in ("authors", "truth"))
     assert closed.status == "complete"
     assert set(closed.graph.door_vertices) == {door.id for door in doors}
-    errors = coverage_errors(closed, predicted, truth, 6, len(doors))
+    errors = compare_tours(closed, predicted, truth, 6, len(doors))
     assert errors.error_pred < errors.error_closed
     assert max(tour.gap for tour in (closed, predicted, truth)) < 0.01
