@@ -143,7 +143,7 @@ def _without_specks(free: BoolArray, cells: float) -> BoolArray:
     import cv2
 
     _, labels, stats, _ = cv2.connectedComponentsWithStats((~free).astype(np.uint8), connectivity=8)
-    speck = stats[:, cv2.CC_STAT_AREA] <= cells
+    speck = stats[:, cv2.CC_STAT_AREA] <= cells + 1e-6  # forty cells of 0.05 m are 0.1 m2 but for rounding
     speck[labels[0, 0]] = False  # what lies around the map, whatever its size
     filled: BoolArray = free | speck[labels]
     return filled

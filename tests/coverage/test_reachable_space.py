@@ -1,5 +1,8 @@
 """Vertices and edges lie where a robot can be, whatever the map holds."""
 
+from itertools import pairwise
+
+import networkx as nx
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -7,7 +10,10 @@ from hypothesis import strategies as st
 
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.coverage.config import CoverageConfig, GraphConfig
+from closedrooms.coverage.free_space import _without_corner_contacts, clean_free_space
 from closedrooms.coverage.graph_builder import build_graph
+from closedrooms.coverage.grid_path import find_path_along, find_shortest_path, pull_taut
+from closedrooms.coverage.line_of_sight import is_clear
 from closedrooms.coverage.reachable_space import find_outside, find_reachable, part_where_labels_meet
 
 CELL = 0.05
@@ -200,3 +206,127 @@ def test_a_map_that_no_robot_fits_into_is_refused_with_the_width():
     config = CoverageConfig(graph=GraphConfig(clutter_filter=False, robot_radius=0.35))
     with pytest.raises(Exception, match=r"free space wider than 0\.70 m"):
         build_graph(grid, config=config)
+
+
+def _drawn(rows, **legend):
+    """Masks from a drawing, one for each letter."""
+    return {name: np.array([[cell == letter for cell in row] for row in rows]) for name, letter in legend.items()}
+
+
+def test_the_window_leaves_room_for_the_leaves_of_doors_and_one_cell_more():
+    """0.35 m of wall are seven cells; at every side one more is outside."""
+    cells = np.full((120, 160), UNKNOWN, dtype=np.int8)
+    cells[30:90, 40:130] = FREE
+    grid = OccupancyGrid(GridFrame(CELL, 1.0, -2.0, 120, 160), cells)
+    for thickness, margin in ((0.35, 8), (0.32, 8), (0.0, 1)):
+        config = GraphConfig(clutter_filter=False, wall_thickness=thickness)
+        space = clean_free_space(grid, config)
+        assert space.frame.shape == (60 + 2 * margin, 90 + 2 * margin)
+        assert space.frame.origin_x == pytest.approx(1.0 + (40 - margin) * CELL)
+        assert space.frame.origin_y == pytest.approx(-2.0 + (30 - margin) * CELL)
+        rows, cols = np.nonzero(space.mask)
+        assert (rows.min(), cols.min()) == (margin, margin)
+        assert (rows.max(), cols.max()) == (margin + 59, margin + 89)
+
+
+@pytest.mark.parametrize(("streak", "filled"), [(1, True), (2, True), (3, False)])
+def test_streaks_of_unknown_up_to_the_gap_width_are_filled(streak, filled):
+    cells = np.full((120, 160), UNKNOWN, dtype=np.int8)
+    cells[30:90, 40:130] = FREE
+    cells[30:90, 80 : 80 + streak] = UNKNOWN
+    config = GraphConfig(clutter_filter=False, gap_width=0.10, speck_area=0.0)
+    space = clean_free_space(OccupancyGrid(GridFrame(CELL, 0.0, 0.0, 120, 160), cells), config)
+    row, col = space.frame.to_cells(np.array([80.5 * CELL, 60.5 * CELL]))
+    assert space.clean[row, col] == filled
+    assert not space.clean[[0, -1]].any()
+    assert not space.clean[:, [0, -1]].any()
+
+
+def test_streaks_with_an_occupied_cell_keep_that_cell():
+    cells = np.full((120, 160), UNKNOWN, dtype=np.int8)
+    cells[30:90, 40:130] = FREE
+    cells[30:90, 80] = UNKNOWN
+    cells[60, 80] = OCCUPIED
+    config = GraphConfig(clutter_filter=False, speck_area=0.0)
+    space = clean_free_space(OccupancyGrid(GridFrame(CELL, 0.0, 0.0, 120, 160), cells), config)
+    row, col = space.frame.to_cells(np.array([80.5 * CELL, 60.5 * CELL]))
+    assert not space.clean[row, col]
+    assert space.clean[row + 1, col]
+    assert space.clean[row - 1, col]
+
+
+@pytest.mark.parametrize(("cells_of_speck", "filled"), [(40, True), (41, False)])
+def test_specks_up_to_their_area_are_filled(cells_of_speck, filled):
+    """0.1 m2 are forty cells."""
+    cells = np.full((120, 160), UNKNOWN, dtype=np.int8)
+    cells[30:90, 40:130] = FREE
+    cells[50:54, 80:90] = OCCUPIED
+    if cells_of_speck == 41:
+        cells[54, 80] = OCCUPIED
+    config = GraphConfig(clutter_filter=False)
+    space = clean_free_space(OccupancyGrid(GridFrame(CELL, 0.0, 0.0, 120, 160), cells), config)
+    row, col = space.frame.to_cells(np.array([85.5 * CELL, 52.5 * CELL]))
+    assert space.clean[row, col] == filled
+
+
+def test_parts_below_a_doorway_squared_are_none_and_areas_add_up():
+    cells = np.full((200, 200), OCCUPIED, dtype=np.int8)
+    cells[10:70, 10:70] = FREE  # 9 m2
+    cells[100:116, 100:116] = FREE  # 0.64 m2, a doorway squared
+    cells[100:115, 150:166] = FREE  # 0.6 m2
+    space = clean_free_space(
+        OccupancyGrid(GridFrame(CELL, 0.0, 0.0, 200, 200), cells),
+        GraphConfig(clutter_filter=False, opening_radius=0.0, alcove_width=0.0),
+    )
+    assert space.areas == pytest.approx([0.0, 9.0, 0.64])
+    assert np.bincount(space.parts.ravel())[1:].tolist() == [3600, 256]
+    assert space.unreachable == pytest.approx(0.6)
+    assert space.clearance.max() == pytest.approx(30 * CELL)
+
+
+def test_corners_that_touch_are_parted_in_both_directions():
+    falling = _drawn(["##..", "##..", "..##", "..##"], free="#")["free"]
+    for free in (falling, falling[::-1]):
+        parted = _without_corner_contacts(free)
+        assert parted.sum() == free.sum() - 1
+        assert (parted <= free).all()
+
+
+def test_the_path_around_a_table_is_the_shortest():
+    cells = np.zeros((40, 60), dtype=bool)
+    cells[1:-1, 1:-1] = True
+    cells[10:30, 25:35] = False
+    start, goal = np.array([20, 5]), np.array([20, 54])
+    path = find_shortest_path(start, goal, cells)
+    steps = np.hypot(*np.diff(path, axis=0).T)
+    assert steps.max() <= np.sqrt(2.0) + 1e-9
+    assert cells[path[:, 0], path[:, 1]].all()
+    links = nx.Graph()
+    for row, col in np.argwhere(cells).tolist():
+        for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            if cells[row + down, col + right]:
+                links.add_edge((row, col), (row + down, col + right), weight=float(np.hypot(down, right)))
+    assert steps.sum() == pytest.approx(nx.dijkstra_path_length(links, tuple(start), tuple(goal)))
+    stops = pull_taut(path, cells)
+    assert stops[0] == 0
+    assert stops[-1] == len(path) - 1
+    assert len(stops) <= 5
+    for i, j in pairwise(stops):
+        assert is_clear(cells, path[i] + 0.5, path[j] + 0.5)
+    assert find_shortest_path(start, np.array([20, 30]), cells) is None
+    cells[:, 30] = False
+    assert find_shortest_path(start, goal, cells) is None
+
+
+def test_a_path_keeps_near_the_chain_that_it_follows_where_it_can():
+    """Two ways around a block: the one beside the chain is longer, and taken."""
+    cells = np.zeros((80, 120), dtype=bool)
+    cells[1:-1, 1:-1] = True
+    cells[10:60, 30:90] = False
+    start, goal = np.array([12, 20]), np.array([12, 100])
+    down = [(12 + step, 20) for step in range(56)]
+    below = np.array(down + [(67, col) for col in range(20, 101)] + [(row, 100) for row, _ in reversed(down)])
+    along = find_path_along(below, start, goal, cells)
+    assert along[:, 0].max() >= 60
+    shortest = find_shortest_path(start, goal, cells)
+    assert shortest[:, 0].max() < 20
