@@ -117,6 +117,17 @@ def test_where_moves_end_none_of_them_shortens_the_tour(seed, n):
     assert min(_length(distances, tour) for tour in _or_opt_moves(search.tour)) > length - 1e-8
 
 
+@given(seed=st.integers(0, 10_000), n=st.integers(8, 11))
+@settings(max_examples=40, deadline=None)
+def test_two_opt_alone_ends_where_no_exchange_of_two_edges_helps(seed, n):
+    distances = _distances(_points(seed, n))
+    search = LocalSearch(distances, np.random.default_rng(seed).permutation(n).tolist())
+    while any([search._two_opt(vertex) for vertex in range(n)]):
+        pass
+    shortest = min(_length(distances, tour) for tour in _two_opt_moves(search.tour))
+    assert shortest > _length(distances, search.tour) - 1e-8
+
+
 @given(seed=st.integers(0, 10_000), n=st.integers(5, 25))
 @settings(max_examples=60, deadline=None)
 def test_every_single_move_shortens_the_tour(seed, n):
