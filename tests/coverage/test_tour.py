@@ -122,7 +122,7 @@ def test_where_moves_end_none_of_them_shortens_the_tour(seed, n):
 def test_two_opt_alone_ends_where_no_exchange_of_two_edges_helps(seed, n):
     distances = _distances(_points(seed, n))
     search = LocalSearch(distances, np.random.default_rng(seed).permutation(n).tolist())
-    while any([search._two_opt(vertex) for vertex in range(n)]):
+    while sum(bool(search._two_opt(vertex)) for vertex in range(n)):
         pass
     shortest = min(_length(distances, tour) for tour in _two_opt_moves(search.tour))
     assert shortest > _length(distances, search.tour) - 1e-8
