@@ -21,7 +21,7 @@ from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.core.random import stream
 from closedrooms.core.rosmap import read_map
-from closedrooms.coverage.biconnected import metric
+from closedrooms.coverage.biconnected import measure_paths
 from closedrooms.coverage.config import CoverageConfig, TourConfig
 from closedrooms.coverage.free_space import clean_free_space
 from closedrooms.coverage.graph import TopologicalGraph
@@ -147,7 +147,7 @@ def speed() -> None:
 
 def solvers(name: str, graph: TopologicalGraph) -> None:
     members = np.flatnonzero(graph.parts == graph.parts[0]).tolist()
-    distances = metric(graph, members).distances
+    distances = measure_paths(graph, members).distances
     # fast-tsp takes whole numbers below 65,536.
     units = np.rint(distances * (60_000.0 / distances.max())).astype(int).tolist()
     rows: list[tuple[str, float, float]] = []

@@ -19,7 +19,7 @@ import numpy as np
 from closedrooms.core.geojson import write_doors
 from closedrooms.core.random import stream
 from closedrooms.core.rosmap import write_map
-from closedrooms.coverage.estimates import errors_of_lengths
+from closedrooms.coverage.estimates import compare_lengths
 from closedrooms.coverage.tour import CoverageTour
 from closedrooms.coverage.tour_planner import plan_coverage
 from closedrooms.experiments.dataset.erase import Eraser
@@ -87,14 +87,14 @@ def samples(world: str, seed: int, done: set[int], out: Path, noise: str) -> Ite
 
 def errors(row: Row) -> dict[str, float]:
     """The errors of one row in percent, by kind of estimate."""
-    found = {}
+    found: dict[str, float | None] = {}
     for method in METHODS:
-        figures = errors_of_lengths(
+        figures = compare_lengths(
             float(row["tsp_closed"]), float(row[f"tsp_{method}"]), float(row["tsp_gt"]),
             n_rooms=int(row["rooms_seen"]), n_doors=int(row["seen"]),
         )  # fmt: skip
         found |= {"closed": figures.error_closed, "baseline": figures.error_baseline, method: figures.error_pred}
-    return found
+    return {kind: error for kind, error in found.items() if error is not None}
 
 
 def report(rows: list[Row]) -> Iterator[str]:

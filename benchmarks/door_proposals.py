@@ -7,7 +7,8 @@ proposal is right when its middle lies within the tolerance of a closed door's, 
 wrong, also where the wall they lie in hides a room. Doors that the robot never saw are not asked for.
 
 Samples are split by name: every other one of the sorted names, from the first, was used to choose the constants of
-``mapping/proposals.py`` (tuned), the rest was not (held out). ``--fit`` prints the logistic regression on the former.
+``predictor/structure/door_proposals.py`` (tuned), the rest was not (held out). ``--fit`` prints the logistic
+regression on the former.
 """
 
 import argparse
@@ -53,6 +54,9 @@ def measure(folder: Path, tolerance: float) -> Sample:
 
 
 def table(title: str, samples: list[Sample]) -> None:
+    if not samples:
+        print(f"\n{title}: no maps")
+        return
     doors = sum(sample.doors for sample in samples)
     found = [pair for sample in samples for pair in sample.found]
     print(f"\n{title}: {len(samples)} maps, {doors} closed doors, {len(found)} candidates")
@@ -74,7 +78,7 @@ def table(title: str, samples: list[Sample]) -> None:
 
 
 def fit(samples: list[Sample]) -> None:
-    """The regression whose coefficients stand in mapping/proposals.py; features are recovered from the score."""
+    """The regression whose coefficients stand in door_proposals.py."""
     from sklearn.linear_model import LogisticRegression
 
     pairs = [pair for sample in samples for pair in sample.found]

@@ -21,6 +21,10 @@ class GraphConfig:
     """Width of the narrowest passage between two rooms [m] (paper, section 3.7: passages of 0.80 m). Spurs, clusters
     of vertices and loops that are thinner are merged."""
 
+    robot_radius: float = 0.20
+    """Radius of the robot [m]: vertices lie and edges run where its disc touches free cells of the given map only.
+    The simulated robot measures 0.20 m."""
+
     opening_radius: float = 0.15
     """Free space that a disc of this radius [m] cannot enter is left out: the ragged edge that scans leave. A third of
     a doorway of 0.80 m at most, so that no doorway closes."""
@@ -32,11 +36,11 @@ class GraphConfig:
     gap_width: float = 0.10
     """Streaks of unknown up to this width [m] without an occupied cell are gaps between far beams, not walls."""
 
-    nook_width: float = 1.00
+    alcove_width: float = 1.00
     """Dead ends that a disc of this width [m] cannot enter lead nowhere when they are small: what the leaf of an open
     door shuts off in a corner of a room. Leaves measure 0.8 to 1.0 m. 0 keeps them."""
 
-    nook_area: float = 1.20
+    alcove_area: float = 1.20
     """Largest area of such a dead end [m2]; a cabinet of 0.9 m x 1.5 m is larger."""
 
     corner_ratio: float = 0.50

@@ -15,7 +15,8 @@ class CoverageErrors:
         tsp_baseline: ``tsp_closed + tsp_closed / |R| * |D|`` [m].
         tsp_pred: Tour on M_pred [m].
         tsp_gt: Tour on M_GT [m].
-        error_closed: ``|tsp_gt - tsp_closed| / tsp_gt`` in percent.
+        error_closed: ``|tsp_gt - tsp_closed| / tsp_gt`` in percent; ``None`` where the true tour has no length: a
+            building with a single place to visit.
         error_baseline: Likewise for the baseline, percent.
         error_pred: Likewise for the prediction, percent.
     """
@@ -24,15 +25,15 @@ class CoverageErrors:
     tsp_baseline: float
     tsp_pred: float
     tsp_gt: float
-    error_closed: float
-    error_baseline: float
-    error_pred: float
+    error_closed: float | None
+    error_baseline: float | None
+    error_pred: float | None
 
 
-def coverage_errors(
+def compare_tours(
     closed: CoverageTour, predicted: CoverageTour, truth: CoverageTour, n_rooms: int, n_doors: int
 ) -> CoverageErrors:
-    """The estimates and errors of section 5.2 and 5.3.
+    """Compare the estimates of the cost of coverage with the true cost (sections 5.2 and 5.3).
 
     Args:
         closed: Tour on M.
@@ -43,25 +44,19 @@ def coverage_errors(
         n_doors: |D|, the closed doors in M.
 
     Raises:
-        InvalidInputError: Tours of different methods, or a true tour of length 0.
+        InvalidInputError: Tours of different methods.
     """
     methods = {tour.method for tour in (closed, predicted, truth)}
     if len(methods) > 1:
         raise InvalidInputError(f"tours by {', '.join(sorted(methods))}", expected="the same method for all three")
-    return errors_of_lengths(closed.length, predicted.length, truth.length, n_rooms=n_rooms, n_doors=n_doors)
+    return compare_lengths(closed.length, predicted.length, truth.length, n_rooms=n_rooms, n_doors=n_doors)
 
 
-def errors_of_lengths(closed: float, predicted: float, truth: float, *, n_rooms: int, n_doors: int) -> CoverageErrors:
-    """The estimates and errors of :func:`coverage_errors` from the lengths of the three tours [m].
-
-    Raises:
-        InvalidInputError: A true tour of length 0.
-    """
-    if truth <= 0.0:
-        raise InvalidInputError("a true tour of length 0", expected="a building with more than one place to visit")
+def compare_lengths(closed: float, predicted: float, truth: float, *, n_rooms: int, n_doors: int) -> CoverageErrors:
+    """Compare as :func:`compare_tours` does, from the lengths of the three tours [m]."""
     baseline = closed + closed / max(n_rooms, 1) * n_doors
 
-    def error(estimate: float) -> float:
-        return abs(truth - estimate) / truth * 100.0
+    def error(estimate: float) -> float | None:
+        return abs(truth - estimate) / truth * 100.0 if truth > 0.0 else None
 
     return CoverageErrors(closed, baseline, predicted, truth, error(closed), error(baseline), error(predicted))

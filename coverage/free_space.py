@@ -9,6 +9,7 @@ from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.coverage.config import GraphConfig
+from closedrooms.coverage.reachable_space import find_outside, find_reachable, part_where_labels_meet
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -17,23 +18,36 @@ class FreeSpace:
 
     Attributes:
         frame: The window; same lattice as the map.
-        mask: Free, wide enough, and without specks: what is thinned. Shape ``frame.shape``.
-        passable: Cells that an edge may cross: ``mask`` and every cell that the map calls free.
+        mask: Free on the clean map, wide enough, without specks, where the robot gets to: what is thinned. Each
+            connected part holds cells of one connected part of ``reachable``. Shape ``frame.shape``.
+        clean: Cells without a wall: ``mask`` and every cell that the clean map calls free.
+        reachable: Cells where the robot's centre can be on the map as given, furniture and all: vertices lie and edges
+            run on them.
+        labels: Connected part of ``reachable`` that is nearest to each cell.
         clearance: Distance from each cell of ``mask`` to the next cell outside it [m].
         parts: Connected part of each cell of ``mask``, numbered from 1 by falling area; 0 elsewhere.
-        areas: Area of each part with its nooks [m2], ``areas[0]`` is 0.
+        areas: Area of each part with its alcoves [m2], ``areas[0]`` is 0.
+        outside: Area left out because rays got there through windows only [m2].
+        unreachable: Area left out because the robot does not get there [m2].
     """
 
     frame: GridFrame
     mask: BoolArray
-    passable: BoolArray
+    clean: BoolArray
+    reachable: BoolArray
+    labels: IntArray
     clearance: FloatArray
     parts: IntArray
     areas: FloatArray
+    outside: float = 0.0
+    unreachable: float = 0.0
 
 
 def clean_free_space(grid: OccupancyGrid, config: GraphConfig) -> FreeSpace:
     """Filter clutter, fill specks, take off the ragged edge, crop, and tell unconnected parts apart.
+
+    What the clean map calls free decides where there is something to visit; where the robot fits on the map as given
+    decides what is connected.
 
     Args:
         grid: The map.
@@ -46,20 +60,34 @@ def clean_free_space(grid: OccupancyGrid, config: GraphConfig) -> FreeSpace:
     # Door leaves stand in the wall around what is free: they belong to the window.
     margin = math.ceil(config.wall_thickness / grid.frame.resolution) + 1
     free, occupied, frame = _cropped(filtered, margin)
-    resolution = frame.resolution
-    free = _without_hollows(free, occupied, grid.on(frame).occupied & free)
-    free = _without_gaps(free, occupied, config.gap_width / resolution)
-    passable = _without_specks(free, config.speck_area / resolution**2)
-    mask = _without_corner_contacts(_opened(passable, config.opening_radius / resolution))
-    parts, areas = _parts(mask, resolution, least=config.doorway**2)
-    mask = _without_nooks(parts > 0, config.nook_width / 2.0 / resolution, config.nook_area / resolution**2)
+    resolution, given = frame.resolution, grid.on(frame)
+    outside = find_outside(given.free, given.occupied, resolution)
+    reached = find_reachable(given.free & ~outside, config.robot_radius / resolution)
+    free = _without_hollows(free & ~outside, occupied, given.occupied & free)
+    free = _without_gaps(free, occupied, config.gap_width / resolution) & ~outside
+    clean = _without_specks(free, config.speck_area / resolution**2) & ~outside
+    mask = _without_corner_contacts(_opened(clean, config.opening_radius / resolution))
+    mask = part_where_labels_meet(mask, reached.labels)
+    parts, areas = _parts(mask, reached.cells, resolution, least=config.doorway**2)
+    unreachable = float(mask.sum()) * resolution**2 - float(areas.sum())
+    mask = _without_alcoves(parts > 0, config.alcove_width / 2.0 / resolution, config.alcove_area / resolution**2)
     mask = _without_corner_contacts(mask)
     parts[~mask] = 0
     if not mask.any():
-        raise InvalidInputError(
-            "a map without free space to cover", expected=f"free space wider than {2 * config.opening_radius:.2f} m"
-        )
-    return FreeSpace(frame, mask, passable, _clearance(mask) * resolution, parts, areas)
+        width = 2.0 * max(config.opening_radius, config.robot_radius)
+        raise InvalidInputError("a map without free space to cover", expected=f"free space wider than {width:.2f} m")
+    return FreeSpace(
+        frame,
+        mask,
+        clean,
+        reached.cells,
+        reached.labels,
+        _clearance(mask) * resolution,
+        parts,
+        areas,
+        float(outside.sum()) * resolution**2,
+        unreachable,
+    )
 
 
 def _without_clutter(grid: OccupancyGrid) -> OccupancyGrid:
@@ -115,7 +143,7 @@ def _without_specks(free: BoolArray, cells: float) -> BoolArray:
     import cv2
 
     _, labels, stats, _ = cv2.connectedComponentsWithStats((~free).astype(np.uint8), connectivity=8)
-    speck = stats[:, cv2.CC_STAT_AREA] <= cells
+    speck = stats[:, cv2.CC_STAT_AREA] <= cells + 1e-6  # forty cells of 0.05 m are 0.1 m2 but for rounding
     speck[labels[0, 0]] = False  # what lies around the map, whatever its size
     filled: BoolArray = free | speck[labels]
     return filled
@@ -134,7 +162,7 @@ def _opened(free: BoolArray, radius: float) -> BoolArray:
     return opened
 
 
-def _without_nooks(free: BoolArray, radius: float, cells: float) -> BoolArray:
+def _without_alcoves(free: BoolArray, radius: float, cells: float) -> BoolArray:
     """Leave out dead ends of at most ``cells`` cells that a disc of ``radius`` cells cannot enter.
 
     A dead end touches what the disc can reach in one place only; passages, which touch it in two, stay, and so does a
@@ -144,15 +172,15 @@ def _without_nooks(free: BoolArray, radius: float, cells: float) -> BoolArray:
 
     wide = _opened(free, radius)
     count, labels, stats, _ = cv2.connectedComponentsWithStats((free & ~wide).astype(np.uint8), connectivity=8)
-    nook = np.zeros(count, dtype=np.bool_)
+    alcove = np.zeros(count, dtype=np.bool_)
     for piece in (1 + np.flatnonzero(stats[1:, cv2.CC_STAT_AREA] <= cells)).tolist():
         x, y, width, height = stats[piece, :4].tolist()
         window = (slice(y - 1, y + height + 1), slice(x - 1, x + width + 1))
         around = cv2.dilate((labels[window] == piece).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         # Side by side only: through a slanted doorway both its ends may touch at a corner.
         contacts, _ = cv2.connectedComponents((around & wide[window]).astype(np.uint8), connectivity=4)
-        nook[piece] = contacts == 2  # one, and what is none
-    return np.asarray(free & ~nook[labels])
+        alcove[piece] = contacts == 2  # one, and what is none
+    return np.asarray(free & ~alcove[labels])
 
 
 def _without_corner_contacts(free: BoolArray) -> BoolArray:
@@ -170,14 +198,18 @@ def _without_corner_contacts(free: BoolArray) -> BoolArray:
         b[rising] = False
 
 
-def _parts(mask: BoolArray, resolution: float, *, least: float) -> tuple[IntArray, FloatArray]:
-    """Connected parts (8 neighbours, as thinning keeps them) by falling area, those below ``least`` [m2] left out."""
+def _parts(mask: BoolArray, reachable: BoolArray, resolution: float, *, least: float) -> tuple[IntArray, FloatArray]:
+    """Connected parts (8 neighbours, as thinning keeps them) by falling area.
+
+    Those below ``least`` [m2] and those without a reachable cell are left out.
+    """
     import cv2
 
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     areas = stats[1:, cv2.CC_STAT_AREA] * resolution**2
+    entered = np.bincount(labels[reachable & mask], minlength=count)[1:] > 0
     order = np.argsort(-areas, kind="stable")
-    order = order[areas[order] >= least]
+    order = order[(areas[order] >= least) & entered[order]]
     renumbered = np.zeros(len(stats), dtype=np.int64)
     renumbered[order + 1] = np.arange(1, len(order) + 1)
     return renumbered[labels], np.concatenate(([0.0], areas[order]))

@@ -1,7 +1,7 @@
 """A map becomes a topological graph (paper, section 5.1)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from closedrooms.coverage.vertex_merging import merge_thin
 
 # A start farther from all free space than this [m] is worth a note: no robot stands there.
 FAR_START = 1.0
+# So much space is worth a note when it is left out [m2]: about a doorway's square is in every map.
+WORTH_SAYING = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +44,7 @@ def build_graph(
     config: CoverageConfig | None = None,
     *,
     start: Point | None = None,
+    map_name: str | None = None,
 ) -> BuiltGraph:
     """The topological graph of what is free, with a vertex at every closed door.
 
@@ -50,6 +53,7 @@ def build_graph(
         doors: Closed doors of M; none on the other two.
         config: Widths, and which part to cover.
         start: Where the robot is, map frame [m].
+        map_name: Which map it is; the graph remembers it as ``graph["map"]``.
 
     Raises:
         InvalidInputError: A map without free space.
@@ -64,7 +68,7 @@ def build_graph(
     draft = GraphDraft(space, merged, doorway=cells)
     unreached = add_doors(draft, doors, merged, config.graph)
     notes += [f"door {door} cannot be reached from the space that is covered" for door in unreached]
-    return BuiltGraph(draft.finished(), _start_vertex(draft, start), tuple(unreached), tuple(notes))
+    return BuiltGraph(draft.finish(map_name), _start_vertex(draft, start), tuple(unreached), tuple(notes))
 
 
 def _start_vertex(draft: GraphDraft, start: Point | None) -> int:
@@ -73,7 +77,7 @@ def _start_vertex(draft: GraphDraft, start: Point | None) -> int:
     point = draft.space.frame.to_corners(np.array(start))[::-1]
     squared = ((np.array(draft.points) - point) ** 2).sum(axis=1)
     order: list[int] = np.argsort(squared, kind="stable").tolist()
-    return next((v for v in order if is_clear(draft.space.passable, point, draft.points[v])), order[0])
+    return next((v for v in order if is_clear(draft.space.clean, point, draft.points[v])), order[0])
 
 
 def _nearest_part(space: FreeSpace, start: Point) -> tuple[int, float]:
@@ -91,6 +95,11 @@ def _nearest_part(space: FreeSpace, start: Point) -> tuple[int, float]:
 def _chosen_parts(space: FreeSpace, config: CoverageConfig, start: Point | None) -> tuple[FreeSpace, list[str]]:
     """The part with the robot, or all; and a note when there are several."""
     notes = []
+    if space.outside > 0.0:
+        notes.append(f"{space.outside:.1f} m2 that rays saw through windows, with hardly a wall around, are left out")
+    if space.unreachable >= WORTH_SAYING:
+        radius = config.graph.robot_radius
+        notes.append(f"{space.unreachable:.1f} m2 that a robot of {radius:.2f} m radius cannot get into are left out")
     chosen = 1
     if start is not None:
         chosen, distance = _nearest_part(space, start)
@@ -108,12 +117,11 @@ def _chosen_parts(space: FreeSpace, config: CoverageConfig, start: Point | None)
         f"{count} unconnected parts: {which} is covered ({space.areas[chosen]:.1f} m2), {left_out:.1f} m2 left out"
     )
     mask = space.parts == chosen
-    kept = FreeSpace(
-        space.frame,
-        mask,
-        space.passable,
-        np.where(mask, space.clearance, 0.0),
-        np.where(mask, 1, 0),
-        np.array([0.0, space.areas[chosen]]),
+    kept = replace(
+        space,
+        mask=mask,
+        clearance=np.where(mask, space.clearance, 0.0),
+        parts=np.where(mask, 1, 0),
+        areas=np.array([0.0, space.areas[chosen]]),
     )
     return kept, notes

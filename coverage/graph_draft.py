@@ -9,7 +9,8 @@ from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.coverage.config import GraphConfig
 from closedrooms.coverage.free_space import FreeSpace
-from closedrooms.coverage.graph import TopologicalGraph, VertexKind
+from closedrooms.coverage.graph import TopologicalGraph, VertexKind, make_graph
+from closedrooms.coverage.grid_path import find_path_along, pull_taut
 from closedrooms.coverage.line_of_sight import is_clear, split_where_blocked
 from closedrooms.coverage.skeleton import VoronoiGraph
 
@@ -31,7 +32,8 @@ class GraphDraft:
         self._at_cell: dict[tuple[int, int], int] = {}
         degrees = np.bincount(voronoi.edges.ravel(), minlength=len(voronoi.cells)).tolist()
         for cell, degree in zip(voronoi.cells, degrees, strict=True):
-            self._vertex_at(cell, "end" if degree <= 1 else "junction" if degree >= 3 else "bend")
+            kind: VertexKind = "end" if degree <= 1 else "junction" if degree >= 3 else "bend"
+            self._vertex_at(self.nearest_reachable(cell), kind)
         for chain in voronoi.chains:
             self.follow(chain)
 
@@ -39,7 +41,34 @@ class GraphDraft:
         key = (int(cell[0]), int(cell[1]))
         if key not in self._at_cell:
             self._at_cell[key] = self.add_vertex(cell.astype(np.float64) + 0.5, kind)
-        return self._at_cell[key]
+        vertex = self._at_cell[key]
+        if self.kinds[vertex] == "detour":
+            self.kinds[vertex] = kind
+        return vertex
+
+    def nearest_reachable(self, cell: IntArray) -> IntArray:
+        """The nearest cell where the robot can be: of those that the clean map shows in free sight, if there are any.
+
+        A vertex in the middle of a table moves beside it.
+        """
+        row, col = cell.tolist()
+        reachable, labels = self.space.reachable, self.space.labels
+        if reachable[row, col]:
+            return cell
+        label, reach = labels[row, col], 8
+        while True:
+            low = np.maximum(cell - reach, 0)
+            window = np.s_[low[0] : row + reach + 1, low[1] : col + reach + 1]
+            found = np.argwhere(reachable[window] & (labels[window] == label)) + low
+            apart = np.hypot(*(found - cell).T)
+            found = found[np.argsort(apart, kind="stable")]
+            # Only what lies within the reach is certainly the nearest.
+            if (apart <= reach).any() or reach > max(reachable.shape):
+                break
+            reach *= 2
+        centre = cell + 0.5
+        seen = (place for place in found[:LOOKS] if is_clear(self.space.clean, centre, place + 0.5))
+        return np.asarray(next(seen, found[0]))
 
     def add_vertex(self, point: FloatArray, kind: VertexKind) -> int:
         """Number of a new vertex."""
@@ -50,14 +79,32 @@ class GraphDraft:
     def follow(self, chain: IntArray) -> int:
         """Edges along a chain of cells, with bends where a straight one would cross an obstacle.
 
+        Walls decide at which cells of the chain it bends. Where a robot has to keep clear of something else between
+        two of them, a doorpost or a table, the edge goes around it.
+
         Returns:
             The vertex at the chain's first cell.
         """
-        stops = split_where_blocked(chain, self.space.passable, around=self._around)
-        vertices = [self._vertex_at(chain[stop], "bend") for stop in stops]
-        for (u, v), (i, j) in zip(pairwise(vertices), pairwise(stops), strict=True):
-            self.add_edge(u, v, chain[i : j + 1].astype(np.float64) + 0.5)
-        return vertices[0]
+        stops = split_where_blocked(chain, self.space.clean, around=self._around)
+        first = last = self._vertex_at(self.nearest_reachable(chain[0]), "bend")
+        for i, j in pairwise(stops):
+            path = self._reachable_path(chain[i : j + 1])
+            for u, v in pairwise(pull_taut(path, self.space.reachable)):
+                vertex = self._vertex_at(path[v], "bend" if v == len(path) - 1 else "detour")
+                whole = v - u == len(path) - 1
+                self.add_edge(last, vertex, (chain[i : j + 1] if whole else path[u : v + 1]).astype(np.float64) + 0.5)
+                last = vertex
+        return first
+
+    def _reachable_path(self, chain: IntArray) -> IntArray:
+        """Cells from end to end of a chain: straight where the robot can go straight, else around what stands there."""
+        reachable = self.space.reachable
+        start, goal = (self.nearest_reachable(chain[end]) for end in (0, -1))
+        if is_clear(reachable, start + 0.5, goal + 0.5):
+            return np.array([start, goal])
+        path = find_path_along(chain, start, goal, reachable)
+        # Never: a chain stays beside one connected part. Then there is no edge.
+        return start[None] if path is None else path
 
     def add_edge(self, u: int, v: int, polyline: FloatArray) -> None:
         """An edge from ``u`` to ``v``; of two between the same vertices the first stays."""
@@ -74,24 +121,17 @@ class GraphDraft:
         self.add_edge(vertex, v, np.vstack((point, polyline[middle:])))
         return vertex
 
-    def finished(self) -> TopologicalGraph:
+    def finish(self, map_name: str | None = None) -> TopologicalGraph:
         """The graph in the map frame."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
         frame = self.space.frame
         origin, resolution = np.array([frame.origin_x, frame.origin_y]), frame.resolution
-        vertices = origin + np.array(self.points).reshape(-1, 2)[:, ::-1] * resolution
-        edges = np.array(list(self.edges), dtype=np.int64).reshape(-1, 2)
-        count = len(vertices)
-        links = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
-        return TopologicalGraph(
-            vertices,
-            edges,
-            dict(self.doors),
-            tuple(self.kinds),
-            tuple(origin + polyline[:, ::-1] * resolution for polyline in self.edges.values()),
-            connected_components(links, directed=False)[1].astype(np.int64),
+        return make_graph(
+            origin + np.array(self.points).reshape(-1, 2)[:, ::-1] * resolution,
+            np.array(list(self.edges), dtype=np.int64).reshape(-1, 2),
+            kinds=self.kinds,
+            door_vertices=self.doors,
+            polylines=[origin + polyline[:, ::-1] * resolution for polyline in self.edges.values()],
+            map_name=map_name,
         )
 
 
@@ -129,27 +169,30 @@ def add_doors(draft: GraphDraft, doors: Sequence[ClosedDoor], voronoi: VoronoiGr
 
 
 def _beside_leaf(space: FreeSpace, door: ClosedDoor, config: GraphConfig) -> BoolArray:
-    """What is passable for the edge of ``door``: free cells and those of its own leaf and wall."""
+    """What the edge of ``door`` may cross: where the robot can be, the door's leaf and wall, what is free before it."""
     frame = space.frame
-    reach = config.wall_thickness + (door.width or config.doorway)
+    before = config.wall_thickness + config.robot_radius + frame.resolution
+    reach = before + (door.width or config.doorway)
     low = frame.to_cells(np.array(door.midpoint) - reach)
     high = frame.to_cells(np.array(door.midpoint) + reach) + 1
     (r0, c0), (r1, c1) = (np.clip(cells, 0, frame.shape).tolist() for cells in (low, high))
     if r1 <= r0 or c1 <= c0:
-        return space.passable
+        return space.reachable
     cells = np.moveaxis(np.mgrid[r0:r1, c0:c1], 0, -1)
     offset = frame.to_points(cells) - np.array(door.midpoint)
     slack = frame.resolution / 2.0
     if door.segment is None:
-        own = np.hypot(offset[..., 0], offset[..., 1]) <= config.wall_thickness + slack
+        across = np.hypot(offset[..., 0], offset[..., 1])
+        beside = np.zeros(across.shape, dtype=np.bool_)
     else:
         leaf = np.array(door.segment[1]) - np.array(door.segment[0])
         length = float(np.hypot(leaf[0], leaf[1]))
-        along = offset @ leaf / length
-        across = offset @ np.array([-leaf[1], leaf[0]]) / length
-        own = (np.abs(along) <= length / 2.0) & (np.abs(across) <= config.wall_thickness + slack)
-    passable = space.passable.copy()
-    passable[r0:r1, c0:c1] |= own
+        across = np.abs(offset @ np.array([-leaf[1], leaf[0]])) / length
+        beside = np.abs(offset @ leaf) / length > length / 2.0
+    own = ~beside & (across <= config.wall_thickness + slack)
+    in_front = ~beside & (across <= before + slack) & space.clean[r0:r1, c0:c1]
+    passable = space.reachable.copy()
+    passable[r0:r1, c0:c1] |= own | in_front
     return passable
 
 
@@ -185,7 +228,8 @@ def _visible_cell(
     """Vertex at the nearest visible cell of the skeleton, joined to the graph along it."""
     distances = ((cells + 0.5 - point) ** 2).sum(axis=1)
     for number in np.argsort(distances, kind="stable")[: 10 * LOOKS : 5].tolist():
-        if is_clear(passable, point, cells[number] + 0.5):
+        row, col = cells[number].tolist()
+        if draft.space.reachable[row, col] and is_clear(passable, point, cells[number] + 0.5):
             chain, position = where[number]
             ends = (chain[position::-1], chain[position:])
             return draft.follow(min(ends, key=len))

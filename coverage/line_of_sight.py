@@ -1,11 +1,12 @@
 """Whether a straight segment crosses an obstacle, cell by cell."""
 
 import numpy as np
+import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 
 
-def cells_between(a: FloatArray, b: FloatArray) -> IntArray:
+def find_cells_between(a: FloatArray, b: FloatArray) -> IntArray:
     """Cells (row, col) whose inside the segment from ``a`` to ``b`` crosses, exact.
 
     Args:
@@ -29,9 +30,9 @@ def cells_between(a: FloatArray, b: FloatArray) -> IntArray:
     return cells
 
 
-def is_clear(passable: BoolArray, a: FloatArray, b: FloatArray) -> bool:
+def is_clear(passable: BoolArray, a: npt.ArrayLike, b: npt.ArrayLike) -> bool:
     """Whether all cells between two points (row, col; continuous cells) are passable and inside the grid."""
-    cells = cells_between(np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64))
+    cells = find_cells_between(np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64))
     rows, cols = cells[:, 0], cells[:, 1]
     if (cells < 0).any() or (rows >= passable.shape[0]).any() or (cols >= passable.shape[1]).any():
         return False
@@ -42,9 +43,9 @@ def split_where_blocked(chain: IntArray, passable: BoolArray, *, around: float =
     """Indices of a chain, first and last included, between which straight segments cross no obstacle.
 
     Where the segment between two ends is blocked, the cell of the chain farthest from it becomes a vertex, and both
-    halves are asked again; a step from cell to neighbouring cell is never split. So it does where the segment goes
-    another way than the chain, with a wall between the two: a chain that leads through a room with two doors is not the
-    corridor from one to the other. A closed chain is split at the cell farthest from its end.
+    halves are asked again; a step from cell to neighbouring cell is never split. So it does where the segment takes
+    another route than the chain, with a wall between the two: a chain that leads through a room with two doors is not
+    the corridor from one to the other. A closed chain is split at the cell farthest from its end.
 
     Args:
         chain: Cells (row, col), each a neighbour of the one before, shape (n, 2).

@@ -23,6 +23,8 @@ class LocalSearch:
         nearest = np.argsort(distances, axis=1, kind="stable")[:, : NEIGHBOURS + 1].tolist()
         self.near = [[w for w in row if w != v][:NEIGHBOURS] for v, row in enumerate(nearest)]
         self.tour: list[int] = []
+        # Whether a piece may also move to a vertex that is farther than what its leaving saves, beside a long edge.
+        self.thorough = False
         self.position = [0] * self.n
         self.take(list(tour))
 
@@ -50,6 +52,14 @@ class LocalSearch:
                 if other not in queued:
                     queued.add(other)
                     queue.append(other)
+
+    def improve_fully(self) -> None:
+        """Moves from everywhere, until none shortens the tour: where an edge is new, others may move to it."""
+        before, self.thorough = np.inf, True
+        while self.length() < before - 1e-9:
+            before = self.length()
+            self.improve(list(reversed(self.tour)))
+        self.thorough = False
 
     def _two_opt(self, a: int) -> tuple[int, ...]:
         """Replace edges (a, b), (c, e) by (a, c), (b, e), where b and e follow (or precede) a and c."""
@@ -96,15 +106,14 @@ class LocalSearch:
                 after = tour[(position[last] + step) % n]
                 saved = d[before][a] + d[last][after] - d[before][after]
                 for c in self.near[a]:
-                    if d[a][c] >= saved:
+                    if d[a][c] >= saved and not self.thorough:
                         break
                     if c in piece:
                         continue
+                    rest = saved - d[a][c]
                     for side in (1, -1):
                         e = tour[(position[c] + side) % n]
-                        if e in piece:
-                            continue
-                        if saved - d[a][c] - d[last][e] + d[c][e] > 1e-9:
+                        if rest + d[c][e] - d[last][e] > 1e-9 and e not in piece:
                             self._shift(piece, c, e)
                             return (a, last, before, after, c, e)
         return ()
@@ -139,7 +148,7 @@ def search_tour(
     n = search.n
     if n <= 3:
         return search.tour, "optimal"
-    search.improve(list(reversed(search.tour)))
+    search.improve_fully()
     best, length = list(search.tour), search.length()
     if n < 8:
         return best, "optimal" if length - lower_bound <= 1e-6 else "converged"

@@ -5,7 +5,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray, IntArray
 
 
-def held_karp_bound(distances: FloatArray, *, upper: float, steps: int) -> float:
+def find_lower_bound(distances: FloatArray, *, upper: float, steps: int) -> float:
     """Largest weight of a minimum 1-tree over penalties that the subgradient method finds.
 
     Step sizes after Held, Wolfe and Crowder, 1974: a share of the gap to ``upper`` over the squared norm of the

@@ -13,7 +13,7 @@ from closedrooms.coverage.tour import SearchStatus
 UNITS_PER_METRE = 10_000
 
 
-def christofides(distances: FloatArray) -> list[int]:
+def find_christofides_tour(distances: FloatArray) -> list[int]:
     """OR-Tools' Christofides tour from vertex 0, without any search after it.
 
     Args:
@@ -28,7 +28,7 @@ def christofides(distances: FloatArray) -> list[int]:
     return _solve(distances, first_only)
 
 
-def tabu_search(
+def run_tabu_search(
     distances: FloatArray, *, solutions: int | None, convergence: int | None, seconds: float | None
 ) -> tuple[list[int], SearchStatus]:
     """OR-Tools' Christofides tour, then its tabu search; the best tour met.

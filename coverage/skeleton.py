@@ -1,6 +1,10 @@
 """The Voronoi graph of free space, from its skeleton (paper, section 5.1)."""
 
+import importlib.util
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -33,9 +37,8 @@ def thin(mask: BoolArray) -> BoolArray:
     scikit-image's ``skeletonize``, as the paper. A part that thinning takes away whole keeps one cell.
     """
     import cv2
-    from skimage.morphology import skeletonize
 
-    skeleton: BoolArray = skeletonize(mask)  # type: ignore[no-untyped-call]
+    skeleton: BoolArray = np.asarray(load_skeletonize()(np.ascontiguousarray(mask, dtype=np.bool_)), dtype=np.bool_)
     count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
     lost = np.setdiff1d(np.arange(1, count), labels[skeleton])
     if lost.size:
@@ -44,6 +47,33 @@ def thin(mask: BoolArray) -> BoolArray:
             deepest = np.argmax(np.where(labels == part, depth, -1.0))
             skeleton.flat[deepest] = True
     return skeleton
+
+
+@cache
+def load_skeletonize() -> Callable[[BoolArray], BoolArray]:
+    """scikit-image's ``skeletonize`` of two dimensions.
+
+    Its package imports scipy.ndimage and scipy.spatial for functions beside it, a fifth of the CPU time of
+    ``closedrooms cover``. The compiled function needs none of them, so its file is loaded by itself; where a version
+    keeps it elsewhere, by the package.
+    """
+    package = importlib.util.find_spec("skimage")
+    for folder in (package.submodule_search_locations or ()) if package else ():
+        for path in sorted(Path(folder, "morphology").glob("_skeletonize_various_cy.*")):
+            try:
+                spec = importlib.util.spec_from_file_location("_skeletonize_various_cy", path)
+                if spec is None or spec.loader is None:
+                    continue
+                module = importlib.util.module_from_spec(spec)
+                spec.loader.exec_module(module)
+                thin_fast: Callable[[BoolArray], BoolArray] = module._fast_skeletonize
+            except (ImportError, AttributeError):
+                continue
+            return thin_fast
+    from skimage.morphology import skeletonize
+
+    whole: Callable[[BoolArray], BoolArray] = skeletonize
+    return whole
 
 
 def trace_skeleton(skeleton: BoolArray) -> VoronoiGraph:
@@ -129,7 +159,7 @@ def _walk(
     """Chains from group to group, then rings that touch none (each gets a vertex: ``centres`` grows)."""
     edges: list[tuple[int, int]] = []
     chains: list[list[int]] = []
-    ways = [_ways(links, group, members[g], centres[g]) for g in range(len(members))]
+    paths = [_paths_to_centre(links, group, members[g], centres[g]) for g in range(len(members))]
     seen = [False] * len(degree)
     for g, pixels in enumerate(members):
         for pixel in pixels:
@@ -139,7 +169,7 @@ def _walk(
                 chain = _follow(pixel, first, links, group, seen)
                 other = group[chain[-1]]
                 edges.append((g, other))
-                chains.append(ways[g][pixel][::-1] + chain[1:-1] + ways[other][chain[-1]])
+                chains.append(paths[g][pixel][::-1] + chain[1:-1] + paths[other][chain[-1]])
     for pixel, own in enumerate(degree):
         if own == 2 and not seen[pixel]:
             centres.append(pixel)
@@ -149,16 +179,16 @@ def _walk(
     return edges, chains
 
 
-def _ways(links: list[list[int]], group: list[int], members: list[int], centre: int) -> dict[int, list[int]]:
+def _paths_to_centre(links: list[list[int]], group: list[int], members: list[int], centre: int) -> dict[int, list[int]]:
     """From each cell of a group the cells to the group's centre, both included."""
-    ways = {centre: [centre]}
+    paths = {centre: [centre]}
     reached = [centre]
     for pixel in reached:
         for other in links[pixel]:
-            if other not in ways and group[other] == group[centre] and len(members) > 1:
-                ways[other] = [other, *ways[pixel]]
+            if other not in paths and group[other] == group[centre] and len(members) > 1:
+                paths[other] = [other, *paths[pixel]]
                 reached.append(other)
-    return ways
+    return paths
 
 
 def _follow(start: int, first: int, links: list[list[int]], group: list[int], seen: list[bool]) -> list[int]:

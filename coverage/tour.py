@@ -12,12 +12,12 @@ SearchStatus = Literal["optimal", "converged", "bounded", "time"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoverageTour:
-    """A closed walk along the edges of a graph that visits every vertex.
+    """A closed walk along the edges of a graph that visits every vertex but detours that lead nowhere else.
 
     Attributes:
         graph: What it runs over.
-        order: Vertices in the order of their visit, each once, shape (n,); the way back to the first is implied.
-        length: Length along the graph, the way back included [m].
+        order: Vertices in the order of their visit, each once, shape (n,); the return to the first is implied.
+        length: Length along the graph, the return included [m].
         lower_bound: No tour over this graph is shorter [m] (Held and Karp).
         status: ``complete``, or ``partial`` when a closed door cannot be reached.
         path: Points of the walk along the graph, map frame [m], shape (k, 2), closed. Between the tours of unconnected

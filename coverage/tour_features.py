@@ -7,7 +7,7 @@ from closedrooms.core.geojson import Feature
 from closedrooms.coverage.tour import CoverageTour
 
 
-def tour_features(tour: CoverageTour, map_name: str) -> list[Feature]:
+def make_tour_features(tour: CoverageTour, map_name: str) -> list[Feature]:
     """Vertices, edges, and the tour, each with ``map`` and ``type``.
 
     Args:
@@ -30,7 +30,7 @@ def tour_features(tour: CoverageTour, map_name: str) -> list[Feature]:
         if number in doors:
             properties["door"] = doors[number]
         features.append((Point(point), properties))
-    for (u, v), length in zip(graph.edges.tolist(), graph.lengths.tolist(), strict=True):
+    for (u, v), length in zip(graph.pairs.tolist(), graph.lengths.tolist(), strict=True):
         line = LineString(graph.vertices[[u, v]])
         features.append((line, {"map": map_name, "type": "edge", "vertices": [u, v], "length": round(length, 4)}))
     features.append(
@@ -56,7 +56,7 @@ def tour_features(tour: CoverageTour, map_name: str) -> list[Feature]:
 def _geometry(tour: CoverageTour) -> LineString | MultiLineString | Point:
     breaks = np.flatnonzero(np.isnan(tour.path[:, 0]))
     pieces = [piece[~np.isnan(piece[:, 0])] for piece in np.split(tour.path, breaks)]
-    # A part with a single vertex: a way of length 0 from it to itself.
+    # A part with a single vertex: a line of length 0 from it to itself.
     lines = [piece if len(piece) > 1 else np.repeat(piece, 2, axis=0) for piece in pieces]
     if len(lines) > 1:
         return MultiLineString(lines)

@@ -1,20 +1,23 @@
 """A coverage tour on a map (paper, section 5)."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.coverage.biconnected import find_blocks, join_walks, metric
+from closedrooms.coverage.biconnected import find_blocks, join_walks, measure_paths
 from closedrooms.coverage.config import CoverageConfig, TourConfig
+from closedrooms.coverage.exact_tour import MOST_PLACES, find_shortest_tour
 from closedrooms.coverage.graph import TopologicalGraph
 from closedrooms.coverage.graph_builder import build_graph
 from closedrooms.coverage.local_search import search_tour
-from closedrooms.coverage.lower_bound import held_karp_bound
-from closedrooms.coverage.routing import christofides, tabu_search
+from closedrooms.coverage.lower_bound import find_lower_bound
+from closedrooms.coverage.routing import find_christofides_tour, run_tabu_search
 from closedrooms.coverage.tour import CoverageTour, SearchStatus
 
 # From the best end of a search to the worst: a tour of several blocks is as good as its worst.
@@ -36,6 +39,7 @@ def plan_coverage(
     config: CoverageConfig | None = None,
     *,
     start: Point | None = None,
+    map_name: str | None = None,
 ) -> CoverageTour:
     """Clean the map, build its topological graph, and find a short closed tour over all vertices.
 
@@ -45,12 +49,13 @@ def plan_coverage(
         config: Options.
         start: Where the robot is, map frame [m]; the tour begins at the nearest vertex in sight. Without it the
             largest connected part is covered.
+        map_name: Which map it is, for the graph to remember (``tour.graph.graph["map"]``).
 
     Raises:
         InvalidInputError: A map without free space.
     """
     config = config or CoverageConfig()
-    built = build_graph(grid, doors, config, start=start)
+    built = build_graph(grid, doors, config, start=start, map_name=map_name)
     tour = solve_tour(built.graph, config.tour, start=built.start)
     return CoverageTour(
         tour.graph,
@@ -105,33 +110,48 @@ def _length(graph: TopologicalGraph, stops: list[int]) -> float:
 def _part_walk(graph: TopologicalGraph, members: list[int], config: TourConfig, start: int) -> _Walk:
     if len(members) == 1:
         return _Walk([start], 0.0, "optimal")
-    blocks = [_block_walk(graph, block, config) for block in find_blocks(graph, members)]
+    found = find_blocks(graph, members)
+    joints = {start} | {vertex for vertex, times in Counter(chain.from_iterable(found)).items() if times > 1}
+    blocks = [_block_walk(graph, block, joints, config) for block in found]
     stops = join_walks([block.stops for block in blocks], start)
     # Rounding must not put the bound above the tour.
     bound = min(sum(block.lower_bound for block in blocks), _length(graph, stops))
     if config.method == "default":
         return _Walk(stops, bound, max((block.end for block in blocks), key=ENDS.index))
-    whole = metric(graph, [start, *(v for v in members if v != start)])
+    kinds = graph.kinds
+    whole = measure_paths(graph, [start, *(v for v in members if v != start)])
+    places = [place for place, v in enumerate(whole.vertices.tolist()) if v == start or kinds[v] != "detour"]
     paper = config.method == "paper"
-    tour, end = tabu_search(
-        whole.distances,
+    tour, end = run_tabu_search(
+        whole.distances[np.ix_(places, places)],
         solutions=None if paper else config.solution_limit,
         convergence=config.convergence if paper else None,
         seconds=config.seconds if paper else None,
     )
-    stops = whole.walk(tour)
+    stops = whole.walk([places[stop] for stop in tour])
     optimal = _length(graph, stops) <= bound * (1.0 + 1e-9)
     return _Walk(stops, min(bound, _length(graph, stops)), "optimal" if optimal else end)
 
 
-def _block_walk(graph: TopologicalGraph, block: list[int], config: TourConfig) -> _Walk:
-    """Christofides by OR-Tools, then moves, over the metric of one block, and the bound of Held and Karp."""
-    within = metric(graph, block)
-    distances = within.distances
-    if len(block) == 2:
-        return _Walk([block[0], block[1], block[0]], 2.0 * float(distances[0, 1]), "optimal")
-    tour, _ = search_tour(distances, christofides(distances), lower_bound=0.0, kicks=1, patience=1)
-    upper = float(distances[tour, tour[1:] + tour[:1]].sum())
-    bound = held_karp_bound(distances, upper=upper, steps=config.bound_steps)
+def _block_walk(graph: TopologicalGraph, block: list[int], joints: set[int], config: TourConfig) -> _Walk:
+    """A short closed walk within one block, and a bound of all.
+
+    It visits all vertices but detours; those that hold blocks together (``joints``) in any case. Few vertices are
+    solved exactly. More: Christofides by OR-Tools, then moves, over the metric of the block, and the bound of Held and
+    Karp.
+    """
+    within = measure_paths(graph, block)
+    kinds = graph.kinds
+    places = [place for place, v in enumerate(block) if v in joints or kinds[v] != "detour"]
+    distances = within.distances[np.ix_(places, places)]
+    if len(places) <= MOST_PLACES:
+        tour = find_shortest_tour(distances)
+        return _Walk(within.walk([places[stop] for stop in tour]), _tour_length(distances, tour), "optimal")
+    tour, _ = search_tour(distances, find_christofides_tour(distances), lower_bound=0.0, kicks=1, patience=1)
+    bound = find_lower_bound(distances, upper=_tour_length(distances, tour), steps=config.bound_steps)
     tour, end = search_tour(distances, tour, lower_bound=bound, kicks=config.kicks, patience=config.patience)
-    return _Walk(within.walk(tour), bound, end)
+    return _Walk(within.walk([places[stop] for stop in tour]), bound, end)
+
+
+def _tour_length(distances: FloatArray, tour: list[int]) -> float:
+    return float(distances[tour, tour[1:] + tour[:1]].sum())

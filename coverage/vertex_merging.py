@@ -138,9 +138,9 @@ def _move_ends(graph: _Multigraph, doorway: float, corner_ratio: float) -> bool:
         branch = graph.remove(graph.at[leaf][0])
         chain = branch.towards(leaf)[::-1]
         steps = np.diff(chain, axis=0)
-        way = np.concatenate(([0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))))
+        travelled = np.concatenate(([0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))))
         clear = graph.everywhere[chain[:, 0], chain[:, 1]]
-        within = way + clear[0] - clear < np.maximum(doorway, corner_ratio * clear)
+        within = travelled + clear[0] - clear < np.maximum(doorway, corner_ratio * clear)
         to = int(np.argmax(np.where(within, clear, -1.0)))
         graph.cells[leaf], graph.clearance[leaf] = chain[to], clear[to]
         graph.add((leaf, branch.other(leaf)), chain[to:])

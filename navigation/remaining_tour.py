@@ -8,11 +8,11 @@ from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.door import Point
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.coverage.biconnected import metric
+from closedrooms.coverage.biconnected import measure_paths
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.graph_builder import build_graph
 from closedrooms.coverage.local_search import search_tour
-from closedrooms.coverage.routing import christofides
+from closedrooms.coverage.routing import find_christofides_tour
 from closedrooms.coverage.tour import CoverageTour
 
 # A stop counts as visited when the robot comes so close [m]: it stands for what is seen from there.
@@ -32,7 +32,7 @@ class RemainingTour:
         parts = tour.graph.parts
         # Stops of other parts cannot be driven to.
         own = parts == parts[tour.order[0]]
-        self._metric = metric(tour.graph, np.flatnonzero(own).tolist())
+        self._metric = measure_paths(tour.graph, np.flatnonzero(own).tolist())
         self._stops: IntArray = tour.order[own[tour.order]]
         self._last = int(tour.order[0])
         self.home: Point = _point(self._places[self._last])
@@ -82,7 +82,7 @@ class RemainingTour:
         """The path over all stops and home along the edges of the graph, shape (k, 2) [m]."""
         at = {int(vertex): position for position, vertex in enumerate(self._metric.vertices)}
         stops = [at[int(vertex)] for vertex in (*self._stops, self._last)]
-        path: FloatArray = self._places[self._metric.way(stops)]
+        path: FloatArray = self._places[self._metric.trace(stops)]
         return path
 
     def solve_again(
@@ -109,7 +109,7 @@ class RemainingTour:
         home = members[int(np.argmin(np.hypot(*(graph.vertices[members] - np.array(self.home)).T)))]
         others = [v for v in members if v not in {built.start, home}]
         others = [v for v in others if not _was_near(graph.vertices[v], done, reach, grid)]
-        shortest = metric(graph, members)
+        shortest = measure_paths(graph, members)
         at = np.searchsorted(members, [built.start, home, *others])
         order = open_tour(shortest.distances[np.ix_(at, at)], config)
         # At the first the robot is already, and home, the last, is driven to anyway.
@@ -130,7 +130,7 @@ def open_tour(distances: FloatArray, config: CoverageConfig) -> list[int]:
     lengthened = distances + float(distances.max())
     np.fill_diagonal(lengthened, 0.0)
     lengthened[0, 1] = lengthened[1, 0] = 0.0
-    order = christofides(lengthened)
+    order = find_christofides_tour(lengthened)
     if count > 3:
         order, _ = search_tour(
             lengthened, order, lower_bound=0.0, kicks=config.tour.kicks, patience=config.tour.patience

@@ -1,6 +1,6 @@
 """Options of every command. Nothing heavy is imported, so that ``--help`` is quick."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -146,8 +146,21 @@ class CoverConfig:
     allow_outside: bool = False
     """Open the picture that the map's ``image:`` names also outside the folder of the YAML."""
 
+    to: Literal["nav2", "path"] | None = None
+    """Also write the tour for ROS 2: ``path`` as a nav_msgs/Path (``path.yaml``), a path around furniture that can be
+    driven; ``nav2`` as that and as the waypoints that nav2's panel loads (``waypoints.yaml``)."""
+
+    robot_radius: float | None = None
+    """Radius of the robot [m] for which every place and path has room; 0.20 m where not given (the same as
+    ``--coverage.graph.robot-radius``)."""
+
     coverage: CoverageConfig = field(default_factory=CoverageConfig)
     """Graph and tour."""
+
+    def __post_init__(self) -> None:
+        if self.robot_radius is not None:
+            graph = replace(self.coverage.graph, robot_radius=self.robot_radius)
+            object.__setattr__(self, "coverage", replace(self.coverage, graph=graph))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,5 +1,6 @@
 """``closedrooms cover``: a coverage tour on anybody's map."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,10 @@ from closedrooms.core.files import check_output_folder, output_folder
 from closedrooms.core.geojson import read_doors, write_doors, write_features
 from closedrooms.core.report import Report
 from closedrooms.core.rosmap import RosMap, read_ros_map, write_map
+from closedrooms.coverage.drivable_path import find_drivable_paths
+from closedrooms.coverage.ros_tour import write_path_message, write_waypoints
 from closedrooms.coverage.tour import CoverageTour
-from closedrooms.coverage.tour_features import tour_features
+from closedrooms.coverage.tour_features import make_tour_features
 from closedrooms.coverage.tour_planner import plan_coverage
 from closedrooms.pipeline.config import CoverConfig
 from closedrooms.pipeline.manifest import input_path, resolved, versions
@@ -47,7 +50,7 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Repor
     with watch.stage("cover"):
         progress.stage("cover")
         try:
-            tour = plan_coverage(grid, doors, config.coverage, start=start)
+            tour = plan_coverage(grid, doors, config.coverage, start=start, map_name="closed")
         except InvalidInputError as error:
             raise InvalidInputError(str(error), where=config.map) from error
     missed = {door.id: "no free space to reach it from" for door in doors if door.id not in tour.graph.door_vertices}
@@ -57,8 +60,10 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Repor
         write_map(folder / "map", grid, map_T_grid=read.map_T_grid)
         if config.doors:
             write_doors(folder / "doors.geojson", given)
-        features = [(read.on_map(geometry), properties) for geometry, properties in tour_features(tour, "closed")]
+        features = [(read.on_map(geometry), properties) for geometry, properties in make_tour_features(tour, "closed")]
         write_features(folder / "tour.geojson", features)
+        if config.to is not None:
+            _write_for_ros(folder, read, tour, config)
         from closedrooms.visualization.summary import draw_cover
 
         draw_cover(folder / "summary.png", grid, doors, tour)
@@ -102,3 +107,16 @@ def _on_grid(read: RosMap, point: tuple[float, float]) -> tuple[float, float]:
     """A point of the map frame in the frame of the grid [m]."""
     x, y = read.map_T_grid.inverse().transform(np.array(point)).tolist() if read.turned else point
     return x, y
+
+
+def _write_for_ros(folder: Path, read: RosMap, tour: CoverageTour, config: CoverConfig) -> None:
+    """``path.yaml`` and, for nav2, ``waypoints.yaml``; of unconnected parts a pair each, with its number."""
+    paths = find_drivable_paths(read.grid, tour, config.coverage.graph.robot_radius)
+    for number, path in enumerate(paths):
+        poses = np.column_stack(
+            (read.map_T_grid.transform(path.poses[:, :2]), path.poses[:, 2] + read.map_T_grid.theta)
+        )
+        ending = f"-{number}" if len(paths) > 1 else ""
+        write_path_message(folder / f"path{ending}.yaml", poses)
+        if config.to == "nav2":
+            write_waypoints(folder / f"waypoints{ending}.yaml", poses[list(path.stops)])

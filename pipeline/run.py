@@ -16,8 +16,9 @@ from closedrooms.core.random import stream
 from closedrooms.core.report import Report
 from closedrooms.core.rosmap import write_map
 from closedrooms.core.tum import write_trajectory
+from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.tour import CoverageTour
-from closedrooms.coverage.tour_features import tour_features
+from closedrooms.coverage.tour_features import make_tour_features
 from closedrooms.coverage.tour_planner import plan_coverage
 from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.mapper import Mapper
@@ -166,7 +167,7 @@ def _find_out(
             navigation=config.navigation.for_robot(config.sim.robot),
             mapper=config.mapper,
             predictor=partial(predict, method=config.method, config=config.predictor),
-            coverage=config.coverage,
+            coverage=_coverage(config),
         )
         return replace(found, driven=drive_tour(log, mapper, tour, closed, settings, recorder))
 
@@ -197,18 +198,24 @@ def plan_tours(
     tours: dict[str, CoverageTour] = {}
     missing: dict[str, str] = {}
     notes: list[str] = []
+    coverage = _coverage(config)
     for name, grid, doors in (
         ("closed", survey.grid, survey.doors),
         ("predicted", prediction.grid, ()),
         ("truth", truth, ()),
     ):
         try:
-            tours[name] = plan_coverage(grid, doors, config.coverage, start=START)
+            tours[name] = plan_coverage(grid, doors, coverage, start=START, map_name=name)
         except InvalidInputError as error:
             missing[name] = f"no tour on the {name} map: {error}"
             continue
         notes += [f"tour on the {name} map: {note}" for note in tours[name].notes]
     return tours, missing, notes
+
+
+def _coverage(config: RunConfig) -> CoverageConfig:
+    """Settings of the tours, for the robot that is simulated."""
+    return replace(config.coverage, graph=replace(config.coverage.graph, robot_radius=config.sim.robot.radius))
 
 
 def _figures(plan: FloorPlan, closed: Sequence[str], map_T_world: Pose2, found: Finding) -> dict[str, Any]:
@@ -253,7 +260,7 @@ def _write(folder: Path, found: Finding, metrics: Mapping[str, Any]) -> None:
     write_rooms(folder / "truth_rooms.geojson", truth.rooms)
     write_trajectory(folder / "trajectory.tum", survey.stamps, survey.estimate)
     write_trajectory(folder / "trajectory_truth.tum", survey.stamps, survey.truth)
-    features = [f for name, tour in found.tours.items() for f in tour_features(tour, name)]
+    features = [f for name, tour in found.tours.items() for f in make_tour_features(tour, name)]
     write_features(folder / "tour.geojson", features + ([] if driven is None else drive_features(driven)))
     if driven is not None:
         draw_drive(folder / "drive.png", driven, truth.rooms)

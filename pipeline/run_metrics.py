@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from closedrooms.core.pose import Pose2
-from closedrooms.coverage.estimates import coverage_errors
+from closedrooms.coverage.estimates import compare_tours
 from closedrooms.coverage.tour import CoverageTour
 from closedrooms.mapping.trajectory import ate
 from closedrooms.pipeline.scores import area_mapped, mean, room_iou, rooms_seen, rounded
@@ -66,11 +66,8 @@ def _tour_metrics(tours: Mapping[str, CoverageTour], n_rooms: int, n_doors: int)
         for name, tour in tours.items()
     }
     metrics["errors_percent"] = dict.fromkeys(("closed", "baseline", "predicted"))
-    if {"closed", "predicted", "truth"} <= tours.keys() and tours["truth"].length > 0.0:
-        errors = coverage_errors(tours["closed"], tours["predicted"], tours["truth"], n_rooms, n_doors)
-        metrics["errors_percent"] = {
-            "closed": round(errors.error_closed, 4),
-            "baseline": round(errors.error_baseline, 4),
-            "predicted": round(errors.error_pred, 4),
-        }
+    if {"closed", "predicted", "truth"} <= tours.keys():
+        errors = compare_tours(tours["closed"], tours["predicted"], tours["truth"], n_rooms, n_doors)
+        told = {"closed": errors.error_closed, "baseline": errors.error_baseline, "predicted": errors.error_pred}
+        metrics["errors_percent"] = {name: None if error is None else round(error, 4) for name, error in told.items()}
     return metrics

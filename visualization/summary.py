@@ -156,7 +156,7 @@ def _tour_panel(
     canvas = _canvas(bounds)
     canvas.grid(grid)
     graph, path = tour.graph, np.asarray(tour.path, dtype=np.float64).reshape(-1, 2)
-    for edge in np.asarray(graph.edges).reshape(-1, 2):
+    for edge in graph.pairs:
         canvas.line(np.asarray(graph.vertices)[edge], (175, 175, 185), width=1)
     canvas.course(path, width=2)
     canvas.dots(graph.vertices, colours.INK, radius=2.5)

@@ -181,6 +181,6 @@ def _dots(axes: Any, sample: Sample) -> None:
 def _show_tour(axes: Any, tour: Any) -> None:
     from matplotlib.collections import LineCollection
 
-    edges = np.asarray(tour.graph.vertices)[np.asarray(tour.graph.edges).reshape(-1, 2)]
+    edges = np.asarray(tour.graph.vertices)[tour.graph.pairs]
     axes.add_collection(LineCollection(list(edges), colors=[[v / 255 for v in ROOM_COLOURS[0]]], linewidths=1.0))
     axes.plot(*np.asarray(tour.graph.vertices).T, ".", color=OUTLINE, markersize=3)

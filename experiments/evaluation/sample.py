@@ -251,14 +251,16 @@ def _score(
 
 def _tours(sample: Sample, predicted: OccupancyGrid, rooms_seen: int, out: Path) -> Tour:
     """The three tours and the errors of the three estimates in percent (paper, sections 5.2 and 5.3)."""
-    from closedrooms.coverage.estimates import errors_of_lengths
+    from closedrooms.coverage.estimates import compare_lengths
 
     closed = kept_tour(out, sample.observed, sample.doors)
     truth = kept_tour(out, sample.truth)
     own = tour_figures(plan_tour(predicted))
-    errors = errors_of_lengths(
+    errors = compare_lengths(
         closed["length_m"], own["length_m"], truth["length_m"], n_rooms=rooms_seen, n_doors=len(sample.doors)
     )
+    if errors.error_closed is None or errors.error_baseline is None or errors.error_pred is None:
+        raise InvalidInputError("a true tour of length 0", expected="a building with more than one place to visit")
     return {
         "rooms_seen": rooms_seen,
         "closed": closed,

@@ -150,7 +150,7 @@ class Building:
         return row
 
     def _tours(self, grid: OccupancyGrid, doors: Sequence[ClosedDoor], prediction: Prediction, closing: Closing) -> Row:
-        from closedrooms.coverage.estimates import errors_of_lengths
+        from closedrooms.coverage.estimates import compare_lengths
 
         try:
             truth = kept_tour(self._config.out, closing.truth.grid)["length_m"]
@@ -159,11 +159,14 @@ class Building:
             return {"error_closed": None, "error_baseline": None, "error_predicted": None}
         world_T_map = self._drive(0.0).world_T_map
         seen = rooms_seen(self._plan, grid, world_T_map.inverse())
-        errors = errors_of_lengths(lengths[0], lengths[1], truth, n_rooms=seen, n_doors=len(doors))
+        errors = compare_lengths(lengths[0], lengths[1], truth, n_rooms=seen, n_doors=len(doors))
         return {
-            "error_closed": _rounded(errors.error_closed),
-            "error_baseline": _rounded(errors.error_baseline),
-            "error_predicted": _rounded(errors.error_pred),
+            name: None if error is None else _rounded(error)
+            for name, error in (
+                ("error_closed", errors.error_closed),
+                ("error_baseline", errors.error_baseline),
+                ("error_predicted", errors.error_pred),
+            )
         }
 
     def _predict(self, grid: OccupancyGrid, doors: Sequence[ClosedDoor]) -> Prediction:

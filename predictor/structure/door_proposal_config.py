@@ -31,6 +31,9 @@ class ProposalConfig:
     min_unknown: float = 0.50
     """Share of unknown cells behind the leaf below which it leads to no closed room."""
 
+    min_room: float = 1.20
+    """Side of the smallest room [m]: a square of it must fit into the unknown behind the leaf. 0 asks for none."""
+
     min_score: float = 0.50
     """Proposals below this score (0..1) are left out."""
 

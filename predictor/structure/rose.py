@@ -11,6 +11,7 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.config import LinesConfig
 from closedrooms.predictor.paper.directions import Directions, angle_between
 from closedrooms.predictor.paper.segments import angles_of, lengths_of
+from closedrooms.predictor.structure.peaks import find_circular_peaks
 
 Spectrum = npt.NDArray[np.complex64]
 # As published: a peak's prominence in the range of the profile; how far from pi apart a pair of opposite peaks may
@@ -92,7 +93,6 @@ def _centred(spectrum: Spectrum) -> npt.NDArray[np.float32]:
 def _dominant(spectrum: Spectrum) -> FloatArray:
     """Directions in [0, pi) [rad] along which the magnitude sums to a peak, strongest first, shape (k,)."""
     import cv2
-    from scipy.signal import find_peaks
 
     size = spectrum.shape[0]
     centre = float(size // 2)
@@ -100,9 +100,7 @@ def _dominant(spectrum: Spectrum) -> FloatArray:
     profile = polar[:, 2:].sum(axis=1).astype(np.float64)  # (BINS,); the centre itself has no direction
     if np.ptp(profile) < FLAT * profile.max():
         return np.zeros(0)
-    turns = np.concatenate((profile, profile, profile))
-    peaks, _ = find_peaks(turns, prominence=PROMINENCE * float(np.ptp(profile)))
-    peaks = np.unique(peaks[(peaks >= BINS) & (peaks < 2 * BINS)] - BINS)
+    peaks = find_circular_peaks(profile, PROMINENCE * float(np.ptp(profile)))
     refined = np.array([_between(profile, int(p)) for p in peaks]) * 2 * np.pi / BINS
     directions: list[float] = []
     for i in np.argsort(-profile[peaks], kind="stable"):

@@ -57,3 +57,35 @@ def corridor_with_rooms():
 def ring():
     """A corridor of 2 m around a block of 6 x 4 m."""
     return _draw(12.0, 10.0, [(1.0, 1.0, 11.0, 9.0)], occupied=[(3.0, 3.0, 9.0, 7.0)])
+
+
+def _scan(solid, places, *, beams=720, reach=12.0, hit=lambda n: np.ones(n, dtype=bool)):
+    """The map that a lidar makes of solid cells: free along its beams, occupied where they end on something.
+
+    Args:
+        solid: True walls, bool.
+        places: Where the robot stood, (row, col) each.
+        beams: Beams of a turn.
+        reach: Of the lidar [m]; beams that end nowhere are free up to there.
+        hit: Which of so many end points are kept: the others stay unknown.
+    """
+    cells = np.full(solid.shape, UNKNOWN, dtype=np.int8)
+    walls = np.zeros_like(solid)
+    steps = np.arange(0.0, reach / RESOLUTION, 0.4)[:, None]
+    angles = np.arange(beams) * 2.0 * np.pi / beams
+    for row, col in places:
+        rows = np.clip(np.floor(row + 0.5 + steps * np.sin(angles)), 0, solid.shape[0] - 1).astype(int)
+        cols = np.clip(np.floor(col + 0.5 + steps * np.cos(angles)), 0, solid.shape[1] - 1).astype(int)
+        ended = np.maximum.accumulate(solid[rows, cols], axis=0)
+        cells[rows[~ended], cols[~ended]] = FREE
+        beam = np.flatnonzero(ended[-1])
+        beam = beam[hit(len(beam))]
+        first = ended[:, beam].argmax(axis=0)
+        walls[rows[first, beam], cols[first, beam]] = True
+    cells[walls] = OCCUPIED
+    return OccupancyGrid(GridFrame(RESOLUTION, 0.0, 0.0, *solid.shape), cells)
+
+
+@pytest.fixture(scope="session")
+def scan():
+    return _scan

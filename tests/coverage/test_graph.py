@@ -16,12 +16,12 @@ from closedrooms.coverage.line_of_sight import is_clear
 
 
 def _blocked_edges(grid, graph):
-    """Edges that cross a cell that is neither free nor a filled speck, but for door edges."""
+    """Edges that cross a cell where the robot cannot be, but for door edges."""
     doors = set(graph.door_vertices.values())
     space = clean_free_space(grid, GraphConfig(clutter_filter=False))
     corners = space.frame.to_corners(graph.vertices)[:, ::-1]
-    edges = [edge for edge in graph.edges.tolist() if not doors & set(edge)]
-    return [(u, v) for u, v in edges if not is_clear(space.passable, corners[u], corners[v])]
+    edges = [edge for edge in graph.pairs.tolist() if not doors & set(edge)]
+    return [(u, v) for u, v in edges if not is_clear(space.reachable, corners[u], corners[v])]
 
 
 def _noisy(grid, rng, share=0.5):
@@ -61,16 +61,16 @@ def _corner_room(leaf):
 
 
 @pytest.mark.parametrize("leaf", [0.85, 0.95])
-def test_the_nook_behind_an_open_leaf_in_a_corner_is_no_place_to_go(draw, plain, leaf):
+def test_the_alcove_behind_an_open_leaf_in_a_corner_is_no_place_to_go(draw, plain, leaf):
     grid = draw(10.0, 8.0, **_corner_room(leaf))
-    nook = grid.frame.to_cells(np.array([1.5, 1.3]))
+    alcove = grid.frame.to_cells(np.array([1.5, 1.3]))
     space = clean_free_space(grid, plain.graph)
     row, col = space.frame.to_cells(np.array([1.5, 1.3]))
-    assert grid.free[tuple(nook)]
-    assert space.passable[row, col]
+    assert grid.free[tuple(alcove)]
+    assert space.clean[row, col]
     graph = build_graph(grid, config=plain).graph
     assert np.hypot(*(graph.vertices - np.array([1.6, 1.5])).T).min() > 1.0
-    kept = clean_free_space(grid, replace(plain.graph, nook_width=0.0))
+    kept = clean_free_space(grid, replace(plain.graph, alcove_width=0.0))
     assert kept.mask[tuple(kept.frame.to_cells(np.array([1.5, 1.3])))]
 
 
@@ -82,7 +82,7 @@ def test_a_closet_of_a_room_keeps_its_vertex(draw, plain):
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000), st.floats(0.0, np.pi), st.floats(0.3, 1.4))
-def test_leaving_out_nooks_parts_nothing_that_was_connected(seed, angle, width):
+def test_leaving_out_alcoves_parts_nothing_that_was_connected(seed, angle, width):
     """Two rooms and a slanted passage between them, with blocks set at random."""
     rng = np.random.default_rng(seed)
     cells = np.full((160, 240), 100, dtype=np.int8)
@@ -95,7 +95,7 @@ def test_leaving_out_nooks_parts_nothing_that_was_connected(seed, angle, width):
         cells[row : row + height, col : col + length] = 100
     grid = OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 160, 240), cells)
     config = GraphConfig(clutter_filter=False)
-    before = clean_free_space(grid, replace(config, nook_width=0.0))
+    before = clean_free_space(grid, replace(config, alcove_width=0.0))
     after = clean_free_space(grid, config)
     labels = before.parts[after.mask]
     assert (after.mask <= before.mask).all()
@@ -108,7 +108,7 @@ def test_a_corridor_around_a_block_stays_a_ring(ring, plain):
     graph = build_graph(ring, config=plain).graph
     assert len(graph.edges) == len(graph.vertices) >= 4
     assert not _blocked_edges(ring, graph)
-    assert np.bincount(graph.edges.ravel()).tolist() == [2] * len(graph.vertices)
+    assert np.bincount(graph.pairs.ravel()).tolist() == [2] * len(graph.vertices)
 
 
 @given(seed=st.integers(0, 1000), rooms=st.integers(1, 4))
@@ -150,7 +150,7 @@ def test_a_door_in_the_wall_is_joined_across_its_own_leaf(corridor_with_rooms, p
     vertex = graph.door_vertices["d07"]
     assert graph.vertices[vertex] == pytest.approx([5.0, 0.95])
     assert graph.kinds[vertex] == "door"
-    (edge,) = [edge for edge in graph.edges.tolist() if vertex in edge]
+    (edge,) = [edge for edge in graph.pairs.tolist() if vertex in edge]
     line = LineString(graph.vertices[edge])
     assert line.length < 1.5
     assert len(graph.edges) == len(graph.vertices) - 1
@@ -198,7 +198,7 @@ def test_a_shifted_origin_shifts_the_graph(draw, plain):
     shifted = draw(12.0, 8.0, boxes, origin=(-3.0, 2.0))
     other = build_graph(shifted, config=plain).graph
     assert other.vertices - one.vertices == pytest.approx(np.tile([-3.0, 2.0], (len(one.vertices), 1)))
-    assert one.edges.tolist() == other.edges.tolist()
+    assert one.pairs.tolist() == other.pairs.tolist()
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from shapely import box
 from shapely.geometry import LineString
 
-from closedrooms.coverage.line_of_sight import cells_between, is_clear, split_where_blocked
+from closedrooms.coverage.line_of_sight import find_cells_between, is_clear, split_where_blocked
 
 coordinates = st.floats(0.0, 12.0, allow_nan=False).map(lambda v: round(v, 3))
 
@@ -14,7 +14,7 @@ coordinates = st.floats(0.0, 12.0, allow_nan=False).map(lambda v: round(v, 3))
 @given(a=st.tuples(coordinates, coordinates), b=st.tuples(coordinates, coordinates))
 @settings(max_examples=60, deadline=None)
 def test_crossed_cells_are_those_whose_inside_the_segment_meets(a, b):
-    found = set(map(tuple, cells_between(np.array(a), np.array(b)).tolist()))
+    found = set(map(tuple, find_cells_between(np.array(a), np.array(b)).tolist()))
     line = LineString([a, b]) if a != b else None
     for row in range(13):
         for col in range(13):

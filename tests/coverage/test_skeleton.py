@@ -1,9 +1,12 @@
+import subprocess
+import sys
+
 import cv2
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from closedrooms.coverage.skeleton import thin, trace_skeleton
+from closedrooms.coverage.skeleton import load_skeletonize, thin, trace_skeleton
 
 
 def _blobs(seed, discs):
@@ -84,3 +87,46 @@ def test_every_part_of_the_mask_keeps_a_cell():
     skeleton = thin(mask)
     _, labels = cv2.connectedComponents(mask.astype(np.uint8))
     assert set(labels[skeleton].tolist()) == {1, 2, 3}
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=30, deadline=None)
+def test_the_function_that_is_loaded_by_itself_is_that_of_scikit_image(seed):
+    from skimage.morphology import skeletonize
+
+    mask = np.zeros((60, 70), dtype=bool)
+    rng = np.random.default_rng(seed)
+    for row, col, height, width in rng.integers((1, 1, 2, 2), (40, 40, 19, 29), (10, 4)):
+        mask[row : row + height, col : col + width] = True
+    assert (np.asarray(load_skeletonize()(mask)) == skeletonize(mask)).all()
+
+
+def test_where_scikit_image_keeps_it_elsewhere_the_package_gives_it(monkeypatch):
+    from skimage.morphology import skeletonize
+
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    load_skeletonize.cache_clear()
+    try:
+        assert load_skeletonize() is skeletonize
+    finally:
+        load_skeletonize.cache_clear()
+
+
+def test_covering_a_map_imports_neither_scipy_signal_nor_the_whole_of_scikit_image():
+    """Each of them costs more than the work."""
+    code = """
+import sys
+import numpy as np
+from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
+from closedrooms.coverage.tour_planner import plan_coverage
+cells = np.full((120, 200), OCCUPIED, dtype=np.int8)
+cells[10:110, 10:90] = cells[10:110, 95:190] = cells[50:70, 90:95] = FREE
+plan_coverage(OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 120, 200), cells))
+print(*sorted(sys.modules))
+"""
+    loaded = set(
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    )
+    slow = {"scipy.signal", "scipy.sparse", "scipy.stats", "scipy.ndimage", "skimage.morphology", "ortools", "pandas"}
+    assert "networkx" in loaded
+    assert not slow & loaded

@@ -11,9 +11,9 @@ from closedrooms.core.geojson import read_doors, read_features, write_features
 from closedrooms.core.grid import OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.rosmap import read_map
 from closedrooms.coverage.config import CoverageConfig, TourConfig
-from closedrooms.coverage.estimates import coverage_errors
+from closedrooms.coverage.estimates import compare_tours
 from closedrooms.coverage.room_count import count_rooms
-from closedrooms.coverage.tour_features import tour_features
+from closedrooms.coverage.tour_features import make_tour_features
 from closedrooms.coverage.tour_planner import plan_coverage
 
 AUTHORS = Path(__file__).parents[2].parent / "shared" / "data" / "authors"
@@ -54,8 +54,11 @@ def test_the_map_goes_through_the_clutter_filter_unless_told_otherwise(draw, pla
     furnished, empty = draw(19.0, 10.0, boxes, occupied=tables), draw(19.0, 10.0, boxes)
     monkeypatch.setattr("closedrooms.predictor.structure.clutter.filter_clutter", lambda _: empty)
     filtered, unfiltered = plan_coverage(furnished), plan_coverage(furnished, config=plain)
-    assert len(unfiltered.graph.vertices) > len(filtered.graph.vertices)
-    assert filtered.path.tobytes() == plan_coverage(empty, config=plain).path.tobytes()
+    assert _count_loops(unfiltered) > _count_loops(filtered) == _count_loops(plan_coverage(empty, config=plain))
+
+
+def _count_loops(tour):
+    return tour.graph.number_of_edges() - tour.graph.number_of_nodes() + int(tour.graph.parts.max()) + 1
 
 
 def test_what_no_scan_saw_inside_of_filtered_furniture_goes_with_it(draw, plain, monkeypatch):
@@ -67,10 +70,15 @@ def test_what_no_scan_saw_inside_of_filtered_furniture_goes_with_it(draw, plain,
     monkeypatch.setattr(
         "closedrooms.predictor.structure.clutter.filter_clutter", lambda _: OccupancyGrid(empty.frame, filtered)
     )
-    tour = plan_coverage(OccupancyGrid(empty.frame, furnished))
-    assert tour.path.tobytes() == plan_coverage(empty, config=plain).path.tobytes()
+    given = OccupancyGrid(empty.frame, furnished)
+    tour, without = plan_coverage(given), plan_coverage(empty, config=plain)
+    # The same places, reached around the table: no loop leads around it, and no edge through it.
+    assert _count_loops(tour) == _count_loops(without) == 0
+    assert tour.length == pytest.approx(without.length, rel=0.1)
+    cells = given.frame.to_cells(tour.graph.vertices)
+    assert given.free[cells[:, 0], cells[:, 1]].all()
     # What is unknown without furniture around it stays in the way.
-    assert len(plan_coverage(OccupancyGrid(empty.frame, filtered)).graph.vertices) > len(tour.graph.vertices)
+    assert _count_loops(plan_coverage(OccupancyGrid(empty.frame, filtered))) == 1
 
 
 def test_an_empty_map_is_refused():
@@ -81,7 +89,7 @@ def test_an_empty_map_is_refused():
 
 def test_features_carry_the_map_and_survive_a_file(corridor_with_rooms, plain, tmp_path):
     tour = plan_coverage(corridor_with_rooms(2), [ClosedDoor("d", (5.0, 0.95))], plain)
-    features = tour_features(tour, "closed")
+    features = make_tour_features(tour, "closed")
     write_features(tmp_path / "tour.geojson", features)
     read = read_features(tmp_path / "tour.geojson")
     assert {properties["map"] for _, properties in read} == {"closed"}
@@ -95,14 +103,14 @@ def test_features_carry_the_map_and_survive_a_file(corridor_with_rooms, plain, t
 
 
 def test_a_tour_of_one_vertex_is_a_point_feature(draw, plain):
-    features = tour_features(plan_coverage(draw(6.0, 6.0, [(1.0, 1.0, 5.0, 5.0)]), config=plain), "truth")
+    features = make_tour_features(plan_coverage(draw(6.0, 6.0, [(1.0, 1.0, 5.0, 5.0)]), config=plain), "truth")
     assert [geometry.geom_type for geometry, _ in features] == ["Point", "Point"]
 
 
 def test_errors_follow_the_paper(corridor_with_rooms, plain):
     tour = plan_coverage(corridor_with_rooms(2), config=plain)
     closed, predicted, truth = (replace(tour, length=length) for length in (60.0, 95.0, 100.0))
-    errors = coverage_errors(closed, predicted, truth, n_rooms=6, n_doors=3)
+    errors = compare_tours(closed, predicted, truth, n_rooms=6, n_doors=3)
     assert (errors.tsp_closed, errors.tsp_pred, errors.tsp_gt) == (60.0, 95.0, 100.0)
     assert errors.tsp_baseline == pytest.approx(90.0)
     assert (errors.error_closed, errors.error_baseline, errors.error_pred) == pytest.approx((40.0, 10.0, 5.0))
@@ -111,9 +119,14 @@ def test_errors_follow_the_paper(corridor_with_rooms, plain):
 def test_tours_of_different_methods_are_not_compared(corridor_with_rooms, plain):
     tour = plan_coverage(corridor_with_rooms(2), config=plain)
     with pytest.raises(InvalidInputError, match="same method"):
-        coverage_errors(tour, replace(tour, method="paper"), tour, 1, 1)
-    with pytest.raises(InvalidInputError, match="length 0"):
-        coverage_errors(tour, tour, replace(tour, length=0.0), 1, 1)
+        compare_tours(tour, replace(tour, method="paper"), tour, 1, 1)
+
+
+def test_there_is_no_error_where_the_true_tour_has_no_length(corridor_with_rooms, plain):
+    tour = plan_coverage(corridor_with_rooms(2), config=plain)
+    errors = compare_tours(tour, tour, replace(tour, length=0.0), 1, 1)
+    assert (errors.error_closed, errors.error_baseline, errors.error_pred) == (None, None, None)
+    assert errors.tsp_closed == tour.length
 
 
 @pytest.mark.parametrize("rooms", [1, 2, 4])
@@ -140,6 +153,6 @@ def test_on_an_authors_map_all_doors_are_reached_and_the_prediction_helps():
     predicted, truth = (plan_coverage(read_map(folder / f"{name}.yaml")) for name in ("authors", "truth"))
     assert closed.status == "complete"
     assert set(closed.graph.door_vertices) == {door.id for door in doors}
-    errors = coverage_errors(closed, predicted, truth, 6, len(doors))
+    errors = compare_tours(closed, predicted, truth, 6, len(doors))
     assert errors.error_pred < errors.error_closed
     assert max(tour.gap for tour in (closed, predicted, truth)) < 0.01

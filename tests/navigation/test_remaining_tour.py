@@ -78,7 +78,7 @@ def test_a_tour_from_home_to_home_is_a_closed_one(stops: RemainingTour) -> None:
     # The robot drives to the first stop along the graph too: as from there to home.
     graph = nx.Graph()
     graph.add_weighted_edges_from(
-        (*edge, length) for edge, length in zip(closed.graph.edges, closed.graph.lengths, strict=True)
+        (*edge, length) for edge, length in zip(closed.graph.pairs, closed.graph.lengths, strict=True)
     )
     first, home = (
         int(np.argmin(np.hypot(*(closed.graph.vertices - place).T))) for place in (stops.path()[0], stops.home)

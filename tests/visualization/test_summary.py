@@ -35,7 +35,7 @@ def a_prediction(grid: OccupancyGrid) -> Prediction:
 
 def a_tour() -> Any:
     vertices = np.array([[1.0, 1.5], [5.0, 1.5], [9.0, 1.5]])
-    graph = SimpleNamespace(vertices=vertices, edges=np.array([[0, 1], [1, 2]]), door_vertices={})
+    graph = SimpleNamespace(vertices=vertices, pairs=np.array([[0, 1], [1, 2]]), door_vertices={})
     return SimpleNamespace(graph=graph, path=vertices[[0, 1, 2, 1, 0]], length=16.0)
 
 

@@ -90,7 +90,7 @@ def draw_tours(stream: RecordingStream, tours: Mapping[str, "CoverageTour"]) -> 
     _say(stream, "Coverage", f"tours: {lengths or 'none'} (section 5)")
     for name, tour in tours.items():
         graph, colour = tour.graph, colours.TOURS.get(name, colours.INK)
-        edges = np.asarray(graph.vertices)[np.asarray(graph.edges).reshape(-1, 2)]
+        edges = np.asarray(graph.vertices)[graph.pairs]
         stream.log(f"coverage/{name}/edges", drawables.strips(list(edges), (150, 150, 160), radius=drawables.THIN))
         stream.log(f"coverage/{name}/tour", drawables.strips([tour.path], colour, z=drawables.Z_PATH))
         stream.log(f"coverage/{name}/vertices", drawables.points(graph.vertices, colours.INK, radius=drawables.MEDIUM))

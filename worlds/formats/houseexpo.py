@@ -11,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.incoming import read_json
+from closedrooms.core.numbers import FARTHEST
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.door_hinges import hung
 from closedrooms.worlds.formats.room_outlines import repaired
@@ -99,7 +100,7 @@ def _boxes(data: dict[str, Any], path: Path, remarks: list[Remark]) -> list[tupl
                 x0, y0, x1, y1 = (float(v) for v in row)
             except (TypeError, ValueError, OverflowError):
                 x0 = y0 = x1 = y1 = math.nan
-            if not all(map(math.isfinite, (x0, y0, x1, y1))):
+            if not all(abs(value) <= FARTHEST for value in (x0, y0, x1, y1)):
                 why = "no box [x0, y0, x1, y1] in metres"
                 name = f"{label}[{number}]"
                 remarks.append(Remark(action="dropped", what="rooms", why=why, names=(name,), loss=True))

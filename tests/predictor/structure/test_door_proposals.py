@@ -132,3 +132,76 @@ def test_wall_directions_are_found_to_half_a_degree() -> None:
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InvalidInputError, match="expected"):
         ProposalConfig(**wrong)
+
+
+def hall(places: list[float], *, width: float = 0.9, recess: float = 0.1, depth: float = 6.0) -> OccupancyGrid:
+    """A hall of 20 m x ``depth``: leaves or niches in its upper wall, middles at ``places``; all else is unknown."""
+    frame = GridFrame(RESOLUTION, -1.0, -1.0, round((depth + 5.0) / RESOLUTION), 440)
+    cells = np.full(frame.shape, UNKNOWN, dtype=np.int8)
+
+    def fill(x0: float, y0: float, x1: float, y1: float, value: int) -> None:
+        col, row, to_col, to_row = (round((v + 1.0) / RESOLUTION) for v in (x0, y0, x1, y1))
+        cells[row:to_row, col:to_col] = value
+
+    fill(-SHOWN, -SHOWN, 20.0 + SHOWN, depth + SHOWN, OCCUPIED)
+    fill(0.0, 0.0, 20.0, depth, FREE)
+    for middle in places:
+        low, high = middle - width / 2, middle + width / 2
+        fill(low - SHOWN, depth, high + SHOWN, depth + recess + SHOWN, OCCUPIED)
+        fill(low, depth, high, depth + recess, FREE)
+    return OccupancyGrid(frame, cells)
+
+
+@given(
+    spacing=st.sampled_from([1.5, 1.8, 2.0, 3.0, 4.0]),
+    width=st.sampled_from([0.75, 0.9, 1.1]),
+    recess=st.sampled_from([0.05, 0.1, 0.15]),
+    count=st.integers(3, 5),
+)
+@settings(max_examples=25, deadline=None)
+def test_a_row_of_window_niches_scores_low(spacing: float, width: float, recess: float, count: int) -> None:
+    grid = hall([1.5 + spacing * number for number in range(count)], width=width, recess=recess)
+    proposals = propose_doors(grid, ProposalConfig(min_score=0.0))
+    assert len(proposals) >= count
+    assert max(proposal.score for proposal in proposals) <= 0.2
+    assert propose_doors(grid) == ()
+
+
+def test_windows_of_two_rooms_in_a_line_and_one_that_was_not_seen_are_a_row_too() -> None:
+    uneven = hall([1.5, 3.1, 6.0, 7.6, 10.5, 12.1])
+    assert propose_doors(uneven) == ()
+    gap = hall([1.5, 4.5, 10.5, 13.5])
+    assert propose_doors(gap) == ()
+
+
+@pytest.mark.parametrize("spacing", [2.6, 3.5, 4.5])
+def test_closed_doors_in_a_row_along_a_corridor_stay(spacing: float) -> None:
+    places = [1.5 + spacing * number for number in range(4)]
+    proposals = propose_doors(hall(places, depth=2.0))
+    assert len(proposals) == 4
+    assert min(proposal.score for proposal in proposals) > 0.8
+
+
+def test_two_doors_and_doors_at_uneven_distances_of_a_hall_stay() -> None:
+    assert len(propose_doors(hall([3.0, 6.0]))) == 2
+    assert len(propose_doors(hall([3.0, 5.4, 9.5]))) == 3
+
+
+@pytest.mark.parametrize(("behind", "proposed"), [(0.8, False), (1.6, True)])
+def test_a_leaf_is_proposed_where_the_unknown_behind_it_has_room_for_a_room(behind: float, proposed: bool) -> None:
+    grid = hall([10.0], depth=2.0)
+    cells = grid.cells.copy()
+    row = round((2.0 + 0.1 + 4.0 * RESOLUTION + behind + 1.0) / RESOLUTION)
+    cells[row:] = FREE
+    assert bool(propose_doors(OccupancyGrid(grid.frame, cells))) == proposed
+    assert propose_doors(OccupancyGrid(grid.frame, cells), ProposalConfig(min_room=0.0))
+
+
+def test_a_room_beside_the_leaf_counts_only_where_the_leaf_opens_into_it() -> None:
+    """A shaft of 1 m behind the leaf; next to it there is room, but the door does not lead there."""
+    grid = hall([10.0], depth=2.0)
+    cells = grid.cells.copy()
+    low, high = (round((10.0 + side + 1.0) / RESOLUTION) for side in (-0.5, 0.5))
+    behind = round((2.0 + 0.3 + 1.0) / RESOLUTION)
+    cells[behind:, low - 4 : low] = cells[behind:, high : high + 4] = FREE
+    assert propose_doors(OccupancyGrid(grid.frame, cells)) == ()

@@ -57,9 +57,7 @@ def test_boxes_that_touch_over_less_than_a_door_have_wall_only(tmp_path: Path) -
 
 
 def test_a_broken_box_costs_that_room_and_is_named(tmp_path: Path) -> None:
-    plan = read(
-        tmp_path, SQUARE, Hall=[[0, 0, 10, 3], [1, 2], ["a", 0, 1, 1], [0, 0, 1, 10**90]], Bath=[[0, 3, 10, 8]]
-    )
+    plan = read(tmp_path, SQUARE, Hall=[[0, 0, 10, 3], [1, 2], ["a", 0, 1, 1], [0, 0, 1, 10**90]], Bath=[[0, 3, 10, 8]])
     (remark,) = [remark for remark in plan.remarks if remark.loss]
     assert remark.names == ("Hall[1]", "Hall[2]", "Hall[3]")
     assert len(plan.rooms) == 2

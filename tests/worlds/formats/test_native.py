@@ -70,7 +70,7 @@ def test_the_element_that_is_wrong_is_named(
     ("changes", "message"),
     [
         ({"segment": [[0, 0]]}, "a segment of 1 points; expected 2 points"),
-        ({"segment": [[0, 0], [1, 9**90]]}, "...; expected [x, y] in metres"),
+        ({"segment": [[0, 0], [1, 9**90]]}, "door d0 has no usable coordinates"),
         ({"segment": [[1.5, 1.0], [2.4, 1.0]]}, "door d0 stands on no wall"),
         ({"segment": [[1.5, 2.0], [1.6, 2.0]]}, "door d0 is 0.100 m long"),
         ({"rooms": ["r0"]}, "expected two room ids"),
