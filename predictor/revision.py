@@ -18,8 +18,9 @@ from closedrooms.core.arrays import BoolArray, IntArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.predictor.inpainting import fill_shape, inpaint
-from closedrooms.predictor.prediction import Prediction, Shape
+from closedrooms.core.shapes import Shape, cells_inside, fill_shape
+from closedrooms.predictor.inpainting import inpaint
+from closedrooms.predictor.prediction import Prediction
 
 # A room counts as looked into when so much of its free space is observed [m2].
 LOOKED_INTO = 0.5
@@ -127,8 +128,7 @@ def seen_share(prediction: Prediction, grid: OccupancyGrid) -> dict[str, float]:
     known = grid.on(frame).known
     shares = {}
     for room in prediction.rooms:
-        mask = np.zeros(frame.shape, dtype=np.bool_)
-        fill_shape(room.polygon, frame, mask)
+        mask = cells_inside(room.polygon, frame)
         shares[room.doors[0]] = float((mask & known).sum() / max(int(mask.sum()), 1))
     return shares
 
@@ -141,9 +141,7 @@ def _scene(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedDo
     rooms = [*prediction.rooms, *nothing]
     masks, thresholds, doorways = [], [], []
     for room in rooms:
-        mask = np.zeros(frame.shape, dtype=np.bool_)
-        fill_shape(room.polygon, frame, mask)
-        masks.append(mask)
+        masks.append(cells_inside(room.polygon, frame))
         own = [door for door in doors if door.id in room.doors]
         thresholds.append(_doorways(own, frame, beyond=THRESHOLD))
         doorways.append(_doorways(own, frame))

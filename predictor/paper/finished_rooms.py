@@ -1,18 +1,17 @@
 """From grown layouts to rooms: polygons and passages (paper, sections 3.6 and 3.7)."""
 
-import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
 from closedrooms.core.room import Room, RoomKind
+from closedrooms.core.shapes import Shape
 from closedrooms.predictor.config import PaperConfig
-from closedrooms.predictor.inpainting import passage
+from closedrooms.predictor.inpainting import find_passage
 from closedrooms.predictor.paper.arrangement import joined
 from closedrooms.predictor.paper.border import border_rooms
 from closedrooms.predictor.paper.expansion import Growth
 from closedrooms.predictor.paper.initial_layouts import Start
-from closedrooms.predictor.prediction import Shape
-from closedrooms.predictor.structure.doorways import DoorInWall, find_doorways
+from closedrooms.predictor.structure.doorways import find_doorways
 from closedrooms.predictor.structure.wall_thickness import free_interior, measure_thickness
 
 
@@ -38,8 +37,8 @@ def finish_rooms(start: Start, growth: Growth, config: PaperConfig) -> tuple[tup
     if thickness is None:
         thickness = measure_thickness(start.grid, start.structure.angles)
     shapes = {room: free_interior(shape, start.grid, thickness) for room, shape in shapes.items()}
-    inward = [DoorInWall(e.door, start.along(room), start.inward(room)) for room, e in enumerate(start.entrances)]
-    for room, doorway in enumerate(find_doorways(start.grid, inward, width=config.door_width)):
+    facing = [entrance.facing for entrance in start.entrances]
+    for room, doorway in enumerate(find_doorways(start.grid, facing, width=config.door_width)):
         if doorway is not None:
             shapes[room] = doorway.joined(shapes[room], start.grid.frame.resolution)
     rooms, passages = [], []
@@ -47,17 +46,8 @@ def finish_rooms(start: Start, growth: Growth, config: PaperConfig) -> tuple[tup
         kind: RoomKind = "border" if room in outside else "dependent" if growth.touches(room) else "independent"
         score = None if room in outside else round(growth.scores[room], 9)
         rooms.append(Room(shapes[room], (entrance.door.id,), kind, score, growth.bounded[room]))
-        door = np.array(entrance.door.midpoint)
         passages.append(
-            passage(
-                start.grid,
-                shapes[room],
-                door,
-                start.along(room),
-                start.inward(room),
-                width=config.door_width,
-                reach=config.door_reach,
-            )
+            find_passage(start.grid, shapes[room], entrance.facing, width=config.door_width, reach=config.door_reach)
         )
     return tuple(rooms), [cleared for cleared in passages if not cleared.is_empty]
 
