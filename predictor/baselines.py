@@ -12,7 +12,7 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import Shape
 from closedrooms.predictor.config import FacesConfig
-from closedrooms.predictor.inpainting import find_passage, inpaint
+from closedrooms.predictor.inpainting import complete_map
 from closedrooms.predictor.paper.arrangement import joined
 from closedrooms.predictor.paper.initial_layouts import Start, Started, start_rooms
 from closedrooms.predictor.prediction import Prediction
@@ -72,17 +72,15 @@ def _each(
     failures = dict(reasons)
     if start is None:
         return Prediction(grid, (), failures)
-    rooms, passages = [], []
+    rooms = []
     for number, entrance in enumerate(start.entrances):
         shape = shape_of(start, number)
         if shape.is_empty:
             failures[entrance.door.id] = "nothing unknown is in sight of the door within the bounds of the map"
-            continue
-        rooms.append(Room(shape, (entrance.door.id,)))
-        cleared = find_passage(start.grid, shape, entrance.facing, width=config.door_width, reach=config.door_reach)
-        if not cleared.is_empty:
-            passages.append(cleared)
-    return Prediction(inpaint(grid, [room.polygon for room in rooms], passages), tuple(rooms), failures)
+        else:
+            rooms.append(Room(shape, (entrance.door.id,)))
+    completed = complete_map(grid, start.grid, rooms, [entrance.facing for entrance in start.entrances], config)
+    return Prediction(completed, tuple(rooms), failures)
 
 
 def _seen(start: Start, room: int) -> Shape:

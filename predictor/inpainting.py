@@ -8,12 +8,39 @@ import shapely
 from closedrooms.core.arrays import handed_over
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, OccupancyGrid, is_free, is_occupied
+from closedrooms.core.room import Room
 from closedrooms.core.shapes import Shape, fill_shape, trace_outline
+from closedrooms.predictor.config import MethodConfig
 from closedrooms.predictor.structure.doorways import FacingDoor
 from closedrooms.predictor.structure.known_window import MAX_CELLS
 
 # Rows of cells drawn at once.
 STRIP = 512
+
+
+def complete_map(
+    grid: OccupancyGrid,
+    seen: OccupancyGrid,
+    rooms: Sequence[Room],
+    facing: Sequence[FacingDoor],
+    config: MethodConfig,
+) -> OccupancyGrid:
+    """Draw rooms into a map and open their doors (paper, section 3.7).
+
+    Args:
+        grid: The input map.
+        seen: The same as the method looked at it.
+        rooms: To draw.
+        facing: The doors that lead there, others too.
+        config: How wide passages are, and how far free space is looked for.
+    """
+    ways = {door.door.id: door for door in facing}
+    passages = [
+        find_passage(seen, room.polygon, ways[door], width=config.door_width, reach=config.door_reach)
+        for room in rooms
+        for door in room.doors
+    ]
+    return inpaint(grid, [room.polygon for room in rooms], [way for way in passages if not way.is_empty])
 
 
 def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Shape]) -> OccupancyGrid:

@@ -19,6 +19,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import Shape, cells_inside, fill_shape
+from closedrooms.predictor.disjoint_rooms import part_rooms
 from closedrooms.predictor.inpainting import inpaint
 from closedrooms.predictor.prediction import Prediction
 
@@ -92,11 +93,14 @@ def update(
     looked_into = {index for index in rooms if observed[index].any()}
     if predictor is not None and looked_into:
         rooms |= _again(scene, rooms, looked_into, doors, predictor)
-    kept = tuple(rooms[index] for index in sorted(rooms))
+    places = {door.id: door.midpoint for door in doors}
+    sure = {number for number, index in enumerate(sorted(rooms)) if index in looked_into}
+    kept, without = part_rooms([rooms[index] for index in sorted(rooms)], places, sure=sure)
+    failures |= without
     found = {door for room in kept for door in room.doors}
     failures = {door: why for door, why in failures.items() if door not in found}
     completed = inpaint(scene.now, [room.polygon for room in kept], [])
-    return Prediction(_with_doorways(completed, scene, observed), kept, failures, prediction.trace)
+    return Prediction(_with_doorways(completed, scene, observed), tuple(kept), failures, prediction.trace)
 
 
 def overlay(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedDoor] = ()) -> OccupancyGrid:

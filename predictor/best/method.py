@@ -12,13 +12,12 @@ import shapely
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.core.room import Room
 from closedrooms.predictor.best.hypotheses import Hypotheses, propose_rectangles
 from closedrooms.predictor.best.room_shape import trace_rooms
 from closedrooms.predictor.best.scene import Scene, prepare
 from closedrooms.predictor.best.selection import select_jointly
 from closedrooms.predictor.config import BestConfig
-from closedrooms.predictor.inpainting import find_passage, inpaint
+from closedrooms.predictor.inpainting import complete_map
 from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
 
 
@@ -39,24 +38,12 @@ def predict_best(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: BestC
     scene = prepare(grid, doors, config)
     hypotheses = propose_rectangles(scene)
     chosen = select_jointly(scene, hypotheses)
-    rooms, failures = trace_rooms(scene, chosen)
-    prediction = complete(grid, doors, scene, rooms, scene.failures | failures)
+    rooms, without = trace_rooms(scene, chosen)
+    completed = complete_map(grid, scene.grid, rooms, [pose.facing for pose in scene.poses], config)
+    failures = scene.failures | without
+    in_order = {door.id: failures[door.id] for door in doors if door.id in failures}
+    prediction = Prediction(completed, tuple(rooms), in_order)
     return _with_trace(prediction, scene, hypotheses.alone) if config.keep_trace and scene.poses else prediction
-
-
-def complete(
-    grid: OccupancyGrid, doors: Sequence[ClosedDoor], scene: Scene, rooms: Sequence[Room], failures: dict[str, str]
-) -> Prediction:
-    """Draw the rooms into the map and open their doors (paper, section 3.7)."""
-    facing = {pose.facing.door.id: pose.facing for pose in scene.poses}
-    width, reach = scene.config.door_width, scene.config.door_reach
-    passages = [
-        find_passage(scene.grid, room.polygon, facing[door], width=width, reach=reach)
-        for room in rooms
-        for door in room.doors
-    ]
-    completed = inpaint(grid, [room.polygon for room in rooms], [cleared for cleared in passages if cleared.area > 0.0])
-    return Prediction(completed, tuple(rooms), {door.id: failures[door.id] for door in doors if door.id in failures})
 
 
 def _with_trace(prediction: Prediction, scene: Scene, alone: Sequence[Hypotheses]) -> Prediction:

@@ -14,6 +14,7 @@ from closedrooms.predictor.best.door_frame import TurnedMap
 from closedrooms.predictor.best.lattice import RESOLUTION, in_cells
 from closedrooms.predictor.best.scene import Scene
 from closedrooms.predictor.best.selection import Choice
+from closedrooms.predictor.disjoint_rooms import NO_ROOM, part_rooms
 from closedrooms.predictor.structure.doorways import Doorway, FacingDoor, find_doorways
 
 # A rectangle that known space takes less of than this stays a rectangle.
@@ -38,7 +39,7 @@ def trace_rooms(scene: Scene, choices: Sequence[Choice]) -> tuple[list[Room], di
         choices: A rectangle each.
 
     Returns:
-        Rooms in the order of the choices, and why doors have none, by their id.
+        Disjoint rooms in the order of the choices, and why doors have none, by their id.
     """
     facing = [pose.facing for pose in scene.poses]
     openings = find_doorways(scene.grid, facing, width=scene.config.door_width)
@@ -48,12 +49,13 @@ def trace_rooms(scene: Scene, choices: Sequence[Choice]) -> tuple[list[Room], di
         names = tuple(facing[i].door.id for i in choice.doors)
         shape = _trace_room(scene, choice, [opening for i in choice.doors if (opening := openings[i]) is not None])
         if shape is None:
-            failures |= dict.fromkeys(names, "no room fits behind it")
+            failures |= dict.fromkeys(names, NO_ROOM)
             continue
         others = [other.corners for other in choices if other is not choice]
         kind = _name_kind(choice.corners, others, scene.grid, scene.walls.usual)
         rooms.append(Room(shape, names, kind, round(choice.score, 9), choice.cut))
-    return rooms, failures
+    apart, without = part_rooms(rooms, {door.door.id: door.door.midpoint for door in facing})
+    return apart, failures | without
 
 
 def _trace_room(scene: Scene, choice: Choice, doorways: Sequence[Doorway]) -> Polygon | None:
