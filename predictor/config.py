@@ -73,8 +73,8 @@ class DirectionsConfig:
     min_length: float = 2.0
     """A direction needs this much wall in longer segments [m]; less is noise of the raster."""
 
-    min_share: float = 0.03
-    """A direction needs this share of the wall of the strongest direction."""
+    min_share: float = 0.15
+    """A direction needs this share of the strongest one's wall: oblique walls in few places shatter all faces."""
 
     min_concentration: float = 0.40
     """A direction needs this share of its longer segments within 3 degrees; noise spreads evenly, to about 0.25."""

@@ -121,7 +121,7 @@ def test_rooms_of_any_closed_set_are_disjoint(mapped, method, closed) -> None:
     assert _shared(predict(scene.grid, scene.doors, method).rooms) < ROUNDING
 
 
-def test_two_facing_doors_into_one_pocket_are_one_room_and_one_failure() -> None:
+def test_of_two_facing_doors_one_keeps_the_floor_and_a_door_without_any_says_so() -> None:
     grid, doors = _pocket(3.0, [(6.0, False), (6.0, True)])
     found = predict(grid, doors, "best")
     assert _shared(found.rooms) < ROUNDING
