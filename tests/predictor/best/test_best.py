@@ -113,7 +113,7 @@ def test_two_doors_into_a_gap_as_wide_as_two_rooms_have_a_room_each() -> None:
     assert [room.doors for room in rooms] == [(door.id,) for door in doors]
 
 
-def test_a_door_to_a_nook_too_small_for_a_room_gets_what_is_left() -> None:
+def test_a_door_to_an_alcove_too_small_for_a_room_gets_what_is_left() -> None:
     grid, doors = _building({"d2a"})
     cells = grid.cells.copy()
     truth = _truth("d2a")
