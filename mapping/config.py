@@ -107,7 +107,7 @@ class LoopConfig:
     surroundings: float = 8.0
     """Distance around the older keyframe from which surfaces are taken [m]."""
 
-    recent_way: float = 3.0
+    recent_distance: float = 3.0
     """Way before the present keyframe that is matched with it [m]."""
 
     max_points: int = 500

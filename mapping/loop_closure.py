@@ -54,8 +54,8 @@ def find_loop(
     """
     loops = config.loops
     latest = keyframes[-1]
-    inconsistent = graph.ways > loops.horizon
-    doubts = np.minimum(loops.window + loops.drift * graph.ways, loops.max_window)
+    inconsistent = graph.path_lengths > loops.horizon
+    doubts = np.minimum(loops.window + loops.drift * graph.path_lengths, loops.max_window)
     near = np.flatnonzero(inconsistent & (distances < np.minimum(loops.max_distance, loops.overlap + doubts)))
     if near.size == 0:
         return None
@@ -66,10 +66,10 @@ def find_loop(
     field.add_scans(
         [k.pose.transform(k.beams.points) for k in surroundings if k.pose.distance(older.pose) < loops.surroundings]
     )
-    points = recent_points(keyframes, loops.recent_way, config)
+    points = recent_points(keyframes, loops.recent_distance, config)
     window = Window(
         float(doubts[older.index]),
-        min(loops.window_angle + loops.drift_angle * float(graph.ways[older.index]), 0.5),
+        min(loops.window_angle + loops.drift_angle * float(graph.path_lengths[older.index]), 0.5),
     )
     sigmas, least = (window.distance, window.angle), loops.min_score - 0.15
     searched = Search(field, points, latest.pose, window, coarse_cells=6, prior_sigmas=sigmas)
@@ -95,7 +95,7 @@ def recent_points(keyframes: Sequence[Keyframe], way: float, config: MapperConfi
     robot_T_map = latest.pose.inverse()
     clouds = []
     for keyframe in reversed(keyframes):
-        if latest.way - keyframe.way > way:
+        if latest.travelled - keyframe.travelled > way:
             break
         clouds.append((robot_T_map @ keyframe.pose).transform(keyframe.points))
     points = np.vstack(clouds)

@@ -19,8 +19,9 @@ from closedrooms.mapping.keyframe import Keyframe
 from closedrooms.mapping.local_map import LocalMap
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
 from closedrooms.mapping.loop_closure import Loop, find_loop
+from closedrooms.mapping.motion import Motion
 from closedrooms.mapping.pose_graph import Edge, PoseGraph, optimise
-from closedrooms.mapping.scan_matcher import Motion, match_scan
+from closedrooms.mapping.scan_matcher import match_scan
 from closedrooms.mapping.scan_preparation import Sweep
 
 MOVED = (0.015, 0.003)
@@ -43,7 +44,7 @@ class Mapper:
         self._hessian: FloatArray = np.zeros((3, 3))
         self._tied_at = self._tried_at = 0.0
         self._places = GrowingArray(2)
-        self._driven = GrowingArray()
+        self._travelled_at = GrowingArray()
         self._drawn = 0
         self._trusted = True
         self._evidence = EvidenceGrid(self._config)
@@ -54,7 +55,7 @@ class Mapper:
         self._usual_score = 0.0
         self._stamps: list[float] = []
         self._references: list[tuple[int, Pose2]] = []
-        self._way = 0.0
+        self._travelled = 0.0
 
     @property
     def pose(self) -> Pose2:
@@ -100,7 +101,7 @@ class Mapper:
             self._match(points)
         if self._wants_keyframe():
             beams = clean(scan, max_range=max_range) if sweep is None else sweep.beams
-            self._insert(Keyframe(len(self._keyframes), scan.stamp, self._pose, beams, points, self._way))
+            self._insert(Keyframe(len(self._keyframes), scan.stamp, self._pose, beams, points, self._travelled))
         latest = self._keyframes[-1]
         keyframe_T_robot = latest.pose.inverse() @ self._pose
         for sighting in sightings:
@@ -114,7 +115,7 @@ class Mapper:
             step = self._odometry.inverse() @ odometry
             self._pose = self._pose @ step
             way = math.hypot(step.x, step.y)
-            self._way += way
+            self._travelled += way
             self._motion = self._motion.then(way, abs(step.theta))
         self._odometry = odometry
 
@@ -156,12 +157,12 @@ class Mapper:
         if keyframe.index > 0:
             self._tie_to_previous(keyframe)
         self._places.append((keyframe.pose.x, keyframe.pose.y))
-        self._driven.append(keyframe.way)
+        self._travelled_at.append(keyframe.travelled)
         distances = self._distances(keyframe)
         self._tie_to_older(keyframe, distances)
         if self._config.loops.enabled and self._close_loop(keyframe, distances):
             distances = self._distances(keyframe)
-        self._local.update(self._keyframes, self._graph.ways, distances)
+        self._local.update(self._keyframes, self._graph.path_lengths, distances)
 
     def _distances(self, keyframe: Keyframe) -> FloatArray:
         """From a keyframe to each as the crow flies, shape (keyframes,) [m]."""
@@ -170,9 +171,9 @@ class Mapper:
 
     def _tie_to_previous(self, keyframe: Keyframe) -> None:
         previous = self._keyframes[keyframe.index - 1]
-        way = keyframe.way - previous.way
+        way = keyframe.travelled - previous.travelled
         turn = abs(wrap_angle(keyframe.pose.theta - previous.pose.theta))
-        distance, angle = Motion(way=way, turn=turn).sigmas(self._config.matcher)
+        distance, angle = Motion(distance=way, turn=turn).sigmas(self._config.matcher)
         odometry = np.diag([distance**-2, distance**-2, angle**-2])
         information = odometry + self._information(self._hessian, keyframe.pose)
         a_T_b = previous.pose.inverse() @ keyframe.pose
@@ -182,9 +183,11 @@ class Mapper:
     def _tie_to_older(self, keyframe: Keyframe, distances: FloatArray) -> None:
         """The match was against older keyframes too: say so in the graph, or a loop would tear them apart."""
         loops = self._config.loops
-        if keyframe.way - self._tied_at < loops.link_interval:
+        if keyframe.travelled - self._tied_at < loops.link_interval:
             return
-        older = (keyframe.way - self._driven.values > loops.horizon / 2) & (self._graph.ways <= loops.horizon)
+        older = (keyframe.travelled - self._travelled_at.values > loops.horizon / 2) & (
+            self._graph.path_lengths <= loops.horizon
+        )
         candidates = np.flatnonzero(older & (distances <= loops.link_distance))
         if candidates.size == 0:
             return
@@ -194,7 +197,7 @@ class Mapper:
         a_T_b = near.pose.inverse() @ keyframe.pose
         length = max(near.pose.distance(keyframe.pose), 0.01)
         self._graph.add(Edge(near.index, keyframe.index, a_T_b, information, length, loop=True))
-        self._tied_at = keyframe.way
+        self._tied_at = keyframe.travelled
 
     def _information(self, hessian: FloatArray, pose: Pose2) -> FloatArray:
         """Curvature in the map frame as information in the keyframe's own frame."""
@@ -204,9 +207,9 @@ class Mapper:
 
     def _close_loop(self, keyframe: Keyframe, distances: FloatArray) -> bool:
         loops = self._config.loops
-        if keyframe.way - self._tried_at < loops.interval:
+        if keyframe.travelled - self._tried_at < loops.interval:
             return False
-        self._tried_at = keyframe.way
+        self._tried_at = keyframe.travelled
         loop = find_loop(self._keyframes, self._graph, distances, self._config)
         if loop is None:
             return False
