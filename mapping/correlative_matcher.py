@@ -85,11 +85,12 @@ class Search:
         self._parts = pairs(np.arange(0, coarse_cells, self._small))
         self._inner = pairs(np.arange(self._small))
 
-    def best(self, *, away_from: tuple[Pose2, float] | None = None, floor: float = -math.inf) -> Found:
+    def best(self, *, away_from: tuple[Pose2, float, float] | None = None, floor: float = -math.inf) -> Found:
         """The pose of the window with the highest mean likelihood, less what the prior takes.
 
         Args:
-            away_from: A pose, and the distance [m] within which of it none is taken: finds its rivals.
+            away_from: A pose, and the distance [m] and the turn [rad] within both of which none is taken: finds its
+                rivals.
             floor: Score without the prior below which a pose is of no interest.
 
         Returns:
@@ -119,9 +120,11 @@ class Search:
             turns = np.repeat(self._turns[angles], fine.shape[1])
             penalised = scores.ravel() - _penalty(turns, flat_fine, 1, self._resolution, self._sigmas)
             if away_from is not None:
-                pose, radius = away_from
+                pose, radius, angle = away_from
                 at = flat_fine[:, ::-1] * self._resolution + (guess.x - pose.x, guess.y - pose.y)
-                penalised[np.hypot(at[:, 0], at[:, 1]) < radius] = -math.inf
+                off = turns + (guess.theta - pose.theta + math.pi)
+                alike = np.abs(off % (2.0 * math.pi) - math.pi) < angle
+                penalised[alike & (np.hypot(at[:, 0], at[:, 1]) < radius)] = -math.inf
             k = int(np.argmax(penalised))
             if penalised[k] > best + TIE:
                 best, best_score = float(penalised[k]), float(scores.ravel()[k])

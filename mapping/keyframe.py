@@ -21,6 +21,8 @@ class Keyframe:
         beams: The cleaned scan, robot frame.
         points: The points that are matched, robot frame, shape (n, 2) [m].
         travelled: Distance travelled up to here [m].
+        submap: Number of its submap: a new one begins where the robot was lost; a loop that joins two gives them one
+            number.
         drawn: The pose at which it is drawn into the map, ``None`` while it is not.
         sightings: Closed doors seen while this was the latest keyframe, by id: the nearest sighting in the
             keyframe's frame and its distance from the robot [m].
@@ -33,6 +35,7 @@ class Keyframe:
     beams: Beams
     points: FloatArray
     travelled: float
+    submap: int = 0
     drawn: Pose2 | None = None
     sightings: dict[str, tuple[Segment, float]] = field(default_factory=dict)
     middle: FloatArray = field(init=False)

@@ -63,7 +63,7 @@ class PoseGraph:
 
     @property
     def path_lengths(self) -> FloatArray:
-        """Length of the shortest path along the graph [m] from the latest keyframe to each, shape (keyframes,), until the next edge."""
+        """Shortest paths [m] from the latest keyframe to each, shape (keyframes,), until the next edge."""
         return self._path_lengths.values
 
     def add(self, edge: Edge) -> None:

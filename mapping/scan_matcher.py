@@ -1,5 +1,6 @@
 """Match a scan to the map, starting from odometry."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,12 +27,14 @@ class Match:
         score: Mean likelihood [0..1].
         hessian: Curvature of the field at the pose, shape (3, 3).
         searched: The refinement alone was not trusted.
+        relocalised: It was found in a wider window than the odometry leaves open.
     """
 
     pose: Pose2
     score: float
     hessian: FloatArray
     searched: bool
+    relocalised: bool = False
 
 
 def match_scan(
@@ -42,6 +45,7 @@ def match_scan(
     *,
     usual_score: float,
     config: MatcherConfig,
+    reach: float = math.inf,
 ) -> Match | None:
     """Refine the pose that odometry predicts, so that the scan lies on the surfaces of the field.
 
@@ -55,6 +59,7 @@ def match_scan(
         motion: Since the last match.
         usual_score: Mean likelihood of recent matches.
         config: Search window and thresholds.
+        reach: Largest half width of the window where the motion was not measured [m].
 
     Returns:
         The match, or ``None`` when the scan has too few points or fits nowhere (the caller keeps odometry).
@@ -72,12 +77,16 @@ def match_scan(
     if sigma_angle > config.sure_angle:
         start = search_heading(field, points, guess, sigma_angle, config.window_sigmas)
     direct = refined(start)
-    if direct.score >= doubted:
+    if direct.score >= doubted and motion.unmeasured is None:
         return Match(direct.pose, direct.score, direct.hessian, searched=False)
-    window = Window(
-        min(max(config.window_sigmas * sigma_distance, 3 * field.lattice.resolution), config.max_window),
-        min(max(config.window_sigmas * sigma_angle, 0.05), config.max_window_angle),
-    )
+    if motion.unmeasured is None:
+        window = Window(
+            min(max(config.window_sigmas * sigma_distance, 3 * field.lattice.resolution), config.max_window),
+            min(max(config.window_sigmas * sigma_angle, 0.05), config.max_window_angle),
+        )
+    else:
+        # The standard deviation is the size of the step itself.
+        window = Window(min(1.5 * sigma_distance, reach), min(1.5 * sigma_angle, math.pi))
     found = Search(field, points, guess, window, prior_sigmas=(sigma_distance, sigma_angle)).best()
     best = direct
     if found.score > 0.0:

@@ -156,7 +156,7 @@ def test_a_place_that_repeats_has_a_rival(repeated: bool, least: float, most: fl
     window = Window(3.0, 0.1)
     searched = Search(field, corner, Pose2(0.2, 0.1, 0.0), window, prior_sigmas=(3.0, 0.1))
     best = searched.best()
-    rival = searched.best(away_from=(best.pose, 1.0))
+    rival = searched.best(away_from=(best.pose, 1.0, math.inf))
     assert best.pose.distance(Pose2()) < 0.06
     assert rival.pose.distance(best.pose) >= 1.0
     assert least <= rival.score / best.score <= most
