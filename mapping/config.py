@@ -22,6 +22,10 @@ class MatcherConfig:
     max_points: int = 320
     """Most points of a scan that are matched."""
 
+    range_margin: float = 1.0
+    """Distance before the longest range from which points are not matched [m]: along a hall that is longer than the
+    sensor sees, they lie beyond the walls known so far and draw each scan back to where those end."""
+
     min_points: int = 20
     """Fewest points worth matching."""
 

@@ -12,7 +12,7 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.beams import Beams, clean, hit_points, thin
+from closedrooms.mapping.beams import Beams, clean, hit_points, matched_range, thin
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.door_fusion import fuse_doors
 from closedrooms.mapping.gauss_newton_matcher import refine
@@ -107,7 +107,8 @@ class Mapper:
         if sweep is not None:
             points = sweep.points
         else:
-            points = thin(hit_points(scan, max_range=max_range), matcher.point_spacing, matcher.max_points)
+            reach = matched_range(scan, max_range=max_range, margin=matcher.range_margin)
+            points = thin(hit_points(scan, max_range=reach), matcher.point_spacing, matcher.max_points)
 
         @functools.cache
         def beams() -> Beams:
