@@ -57,7 +57,7 @@ def with_faults(odometry: FloatArray, kind: str, share: float, seed: int) -> Flo
 
 
 def yag_slam(run: RecordedRun) -> FloatArray:
-    """Karto's matcher and loop closure (``yag-slam``); loops need chains of 3 scans where these are far apart."""
+    """Karto's matcher and loop closure (``yag-slam``), its defaults with 20 scans to match against."""
     # numba, which it imports, takes a module called coverage for the tool of that name; one lies beside this file.
     sys.path[:] = [folder for folder in sys.path if Path(folder).resolve() != Path(__file__).resolve().parent]
     np.float = float  # type: ignore[attr-defined]  # noqa: NPY001  (it still uses the alias that NumPy dropped)
@@ -66,13 +66,7 @@ def yag_slam(run: RecordedRun) -> FloatArray:
     from yag_slam.scan_matching import Scan2DMatcherCpp
 
     blind = not np.ptp(run.odometry, axis=0).any()
-    dense = len(run.scans) > 1000
-    slam = GraphSlam(
-        Scan2DMatcherCpp({}),
-        Scan2DMatcherCpp({}, loop=True),
-        scan_buffer_len=20,
-        loop_search_min_chain_size=10 if dense else 3,
-    )
+    slam = GraphSlam(Scan2DMatcherCpp({}), Scan2DMatcherCpp({}, loop=True), scan_buffer_len=20)
     nodes, references = [], []
     taken = Pose2()
     for scan, row in zip(run.scans, run.odometry, strict=True):

@@ -53,7 +53,7 @@ def hit_points(scan: LaserScan, *, max_range: float) -> FloatArray:
 
 
 def matched_range(scan: LaserScan, *, max_range: float, margin: float) -> float:
-    """Range up to which points are matched [m]: ``margin`` [m] short of what is seen, less for a short-sighted sensor."""
+    """Range up to which points are matched [m]: ``margin`` [m] less than is seen, at most a tenth of it."""
     reach = min(max_range, scan.range_max)
     return reach - min(margin, MARGIN_SHARE * reach)
 
