@@ -53,9 +53,13 @@ def hit_points(scan: LaserScan, *, max_range: float) -> FloatArray:
 
 
 def matched_range(scan: LaserScan, *, max_range: float, margin: float) -> float:
-    """Range up to which points are matched [m]: ``margin`` [m] less than is seen, at most a tenth of it."""
-    reach = min(max_range, scan.range_max)
-    return reach - min(margin, MARGIN_SHARE * reach)
+    """Range up to which points are matched [m]: ``margin`` [m] less than the sensor sees, or ``max_range``.
+
+    Of a short-sighted sensor at most a tenth of its range is left out.
+    """
+    if scan.range_max > max_range:
+        return max_range
+    return scan.range_max - min(margin, MARGIN_SHARE * scan.range_max)
 
 
 def clean(scan: LaserScan, *, max_range: float) -> Beams:
