@@ -1,24 +1,31 @@
 """How good and how fast the mapper is on recorded logs, beside its peers, in one run.
 
     python benchmarks/mapping.py LOG ... [--parts]
+    python benchmarks/mapping.py LOG ... --faults [--quick] [--seeds 5] [--methods closedrooms yag-slam ...] [--out CSV]
 
 Every log is mapped with one set of parameters, the defaults, and compared with raw odometry; with ``small_gicp`` (scan
 to keyframe) and ``kiss-icp`` (without deskewing), both started from odometry, where they are installed; with the mapper
 without loops; and, where ``gtsam`` is installed, with the mapper whose pose graph gtsam solves. Errors are against
 the log's reference poses after SE(2) alignment. Speeds are scans a second of the process's own processor time, with
 wall-clock time in brackets, reading and importing left out. Simulated worlds: ``benchmarks/loop_closure.py``.
+
+With ``--faults`` steps of the odometry fail (``odometry_faults.py``), ``yag-slam`` is measured too, and the result is a
+CSV; ``--quick`` takes less than a minute a log.
 """
 
 import argparse
+import contextlib
 import math
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import scipy.sparse.linalg  # noqa: F401  (loaded here, not inside the first timing)
+from odometry_faults import bench_faults, yag_slam
 
-import closedrooms.mapping.mapper as mapper_module
+import closedrooms.mapping.keyframe_graph as graph_module
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.mapping.beams import clean, hit_points, thin
@@ -108,12 +115,13 @@ def kiss(run: RecordedRun) -> FloatArray:
     config.registration.max_num_threads = 1
     odometer = KissICP(config)
     poses: list[tuple[float, float, float]] = []
-    before = Pose2(*run.odometry[0])
+    before, measured = Pose2(*run.odometry[0]), bool(np.ptp(run.odometry, axis=0).any())
     for scan, odometry in zip(run.scans, run.odometry, strict=True):
         now = Pose2(*odometry)
         step, before = before.inverse() @ now, now
-        odometer.last_delta = np.eye(4)
-        odometer.last_delta[:2, :2], odometer.last_delta[:2, 3] = step.matrix()[:2, :2], (step.x, step.y)
+        if measured:  # else its own model of constant velocity
+            odometer.last_delta = np.eye(4)
+            odometer.last_delta[:2, :2], odometer.last_delta[:2, 3] = step.matrix()[:2, :2], (step.x, step.y)
         points = hit_points(scan, max_range=KISS_RANGE)
         if len(points) > 20:
             odometer.register_frame(np.column_stack((points, np.zeros(len(points)))), np.zeros(len(points)))
@@ -150,12 +158,12 @@ def with_gtsam(run: RecordedRun) -> FloatArray:
     """The final trajectory of the mapper whose pose graph gtsam solves."""
     import gtsam  # noqa: F401  (a missing one shows here, not in the middle of a run)
 
-    own = mapper_module.optimise
-    mapper_module.optimise = gtsam_optimise
+    own = graph_module.optimise
+    graph_module.optimise = gtsam_optimise
     try:
         return mapped(run, MapperConfig())[0].trajectory()[1]
     finally:
-        mapper_module.optimise = own
+        graph_module.optimise = own
 
 
 def error(estimate: FloatArray, reference: FloatArray | None) -> str:
@@ -221,11 +229,29 @@ def bench_parts(run: RecordedRun) -> None:
         print(f"- {name}: {len(scans) / (time.process_time() - start):.0f} a second")
 
 
+METHODS: dict[str, Callable[[RecordedRun], FloatArray]] = {
+    "closedrooms": lambda run: mapped(run, MapperConfig())[0].trajectory()[1],
+    "yag-slam": yag_slam,
+    "small_gicp": gicp,
+    "kiss-icp": kiss,
+}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("logs", nargs="+", type=Path)
     parser.add_argument("--parts", action="store_true", help="also measure single steps, on the first log")
+    parser.add_argument("--faults", action="store_true", help="with odometry that fails, as CSV")
+    parser.add_argument("--quick", action="store_true", help="with --faults: one seed, the worst faults")
+    parser.add_argument("--seeds", type=int, default=5, help="with --faults: runs of each kind")
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS), help="with --faults: whose")
+    parser.add_argument("--out", type=Path, help="with --faults: the file, else printed")
     options = parser.parse_args()
+    if options.faults:
+        methods = {name: METHODS[name] for name in options.methods}
+        with options.out.open("w") if options.out else contextlib.nullcontext(sys.stdout) as out:
+            bench_faults(options.logs, methods, seeds=options.seeds, quick=options.quick, out=out)
+        return
     print(f"| {' | '.join(HEAD)} |\n| --- |{' ---: |' * (len(HEAD) - 1)}", flush=True)
     for path in options.logs:
         print(f"| {' | '.join(bench_log(path))} |", flush=True)

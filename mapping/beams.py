@@ -24,6 +24,8 @@ many beams to each side."""
 STEADY = 0.025
 """Standard deviation of the range below which a scan is left as it is [m]: less than half a cell of the map thickens no
 wall, and corners and walls that are not quite straight would lose more."""
+MARGIN_SHARE = 0.1
+"""Largest share of the range that is left out of the matching."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,6 +50,16 @@ def hit_points(scan: LaserScan, *, max_range: float) -> FloatArray:
     units, _ = directions(scan.angle_min, scan.angle_increment, ranges.size)
     points: FloatArray = units[hits] * ranges[hits, None]
     return points if scan.robot_T_sensor == (0.0, 0.0, 0.0) else Pose2(*scan.robot_T_sensor).transform(points)
+
+
+def matched_range(scan: LaserScan, *, max_range: float, margin: float) -> float:
+    """Range up to which points are matched [m]: ``margin`` [m] less than the sensor sees, or ``max_range``.
+
+    Of a short-sighted sensor at most a tenth of its range is left out.
+    """
+    if scan.range_max > max_range:
+        return max_range
+    return scan.range_max - min(margin, MARGIN_SHARE * scan.range_max)
 
 
 def clean(scan: LaserScan, *, max_range: float) -> Beams:

@@ -22,6 +22,10 @@ class MatcherConfig:
     max_points: int = 320
     """Most points of a scan that are matched."""
 
+    range_margin: float = 1.0
+    """Distance before the longest range from which points are not matched [m]: along a hall that is longer than the
+    sensor sees, they lie beyond the walls known so far and draw each scan back to where those end."""
+
     min_points: int = 20
     """Fewest points worth matching."""
 
@@ -107,7 +111,7 @@ class LoopConfig:
     surroundings: float = 8.0
     """Distance around the older keyframe from which surfaces are taken [m]."""
 
-    recent_way: float = 3.0
+    recent_distance: float = 3.0
     """Way before the present keyframe that is matched with it [m]."""
 
     max_points: int = 500
@@ -134,6 +138,60 @@ class LoopConfig:
 
     point_information: float = 2.0
     """Information of a match per unit of the field's curvature; gives about 1.5 cm in a room."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecoveryConfig:
+    """What is done when a match contradicts what was seen before, because the odometry failed."""
+
+    enabled: bool = True
+    """Look for contradictions, search wide windows and start submaps."""
+
+    suspect: float = 0.8
+    """Share of the usual score below which a match is looked at for contradictions, as every keyframe is."""
+
+    max_conflict: float = 0.20
+    """Share of the surfaces [0..1] that a scan and the keyframe before may see through before the pose is taken for
+    wrong: 99 % of the right poses of the aces log are below 0.18, half of those after a lost step above 0.42."""
+
+    reach: float = 0.9
+    """Half width of the window in which a lost robot is searched, all headings [m]."""
+
+    max_reach: float = 1.5
+    """Largest half width of that window, where the steps from scan to scan are long [m]."""
+
+    min_score: float = 0.7
+    """Share of the usual score that a pose found there must reach."""
+
+    advantage: float = 0.05
+    """Mean likelihood by which it must beat the match in doubt."""
+
+    max_rival: float = 0.9
+    """Score of the best other pose there, as a share of the found one's, above which none is taken."""
+
+    patience: int = 10
+    """Scans in a row that fit nowhere after which a new submap is started."""
+
+    patience_distance: float = 2.5
+    """Distance from the last keyframe after which it is started in any case [m]."""
+
+    break_length: float = 60.0
+    """How far apart two submaps are taken to be along the pose graph [m]: beyond the horizon."""
+
+    break_distance: float = 1.0
+    """Standard deviation of the distance between two submaps before a loop joins them [m]."""
+
+    break_angle: float = 1.0
+    """Standard deviation of their heading [rad]."""
+
+    join_window: float = 2.0
+    """Half width of the window in which a submap is sought in an older one, all headings [m]."""
+
+    max_speed: float = 5.0
+    """Speed beyond which a step of the odometry is none [m/s]: no robot indoors is as fast."""
+
+    max_turn_rate: float = 8.0
+    """Turn rate beyond which a step of the odometry is none [rad/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,6 +227,9 @@ class MapperConfig:
 
     loops: LoopConfig = field(default_factory=LoopConfig)
     """Loop closure."""
+
+    recovery: RecoveryConfig = field(default_factory=RecoveryConfig)
+    """Failing odometry."""
 
     def __post_init__(self) -> None:
         for name in ("resolution", "keyframe_distance", "keyframe_angle", "max_range"):

@@ -20,7 +20,9 @@ class Keyframe:
         pose: ``map_T_robot``, the current estimate.
         beams: The cleaned scan, robot frame.
         points: The points that are matched, robot frame, shape (n, 2) [m].
-        way: Distance driven up to here [m].
+        travelled: Distance travelled up to here [m].
+        submap: Number of its submap: a new one begins where the robot was lost; a loop that joins two gives them one
+            number.
         drawn: The pose at which it is drawn into the map, ``None`` while it is not.
         sightings: Closed doors seen while this was the latest keyframe, by id: the nearest sighting in the
             keyframe's frame and its distance from the robot [m].
@@ -32,7 +34,8 @@ class Keyframe:
     pose: Pose2
     beams: Beams
     points: FloatArray
-    way: float
+    travelled: float
+    submap: int = 0
     drawn: Pose2 | None = None
     sightings: dict[str, tuple[Segment, float]] = field(default_factory=dict)
     middle: FloatArray = field(init=False)

@@ -27,21 +27,21 @@ class LocalMap:
         self._members: BoolArray = np.zeros(0, dtype=np.bool_)
         self.field = LikelihoodField(config.resolution, config.matcher)
 
-    def update(self, keyframes: Sequence[Keyframe], ways: FloatArray, distances: FloatArray) -> None:
+    def update(self, keyframes: Sequence[Keyframe], path_lengths: FloatArray, distances: FloatArray) -> None:
         """Bring the field up to date after a new keyframe, the last one.
 
         Args:
             keyframes: All of them.
-            ways: Way along the pose graph from the last keyframe to each, shape (keyframes,) [m].
+            path_lengths: Path length along the pose graph from the last keyframe to each, shape (keyframes,) [m].
             distances: The same as the crow flies.
         """
         horizon, near = self._config.loops.horizon, distances < self._config.max_range
         members = np.zeros(len(keyframes), dtype=np.bool_)
         members[: len(self._members)] = self._members
-        if np.count_nonzero(members & near & (ways > HYSTERESIS * horizon)) > STALE_MEMBERS:
+        if np.count_nonzero(members & near & (path_lengths > HYSTERESIS * horizon)) > STALE_MEMBERS:
             self.field.clear()
             members[:] = False
-        entering = near & (ways <= horizon) & ~members
+        entering = near & (path_lengths <= horizon) & ~members
         chosen = (keyframes[i] for i in np.flatnonzero(entering).tolist())
         self.field.add_scans([k.pose.transform(k.beams.points) for k in chosen])
         self._members = members | entering

@@ -1,11 +1,12 @@
-"""Recognise places: match the recent way to older keyframes over a wide window."""
+"""Recognise places: match what was seen lately to older keyframes over a wide window."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from closedrooms.core.arrays import FloatArray
+from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.correlative_matcher import Search, Window
@@ -13,10 +14,13 @@ from closedrooms.mapping.gauss_newton_matcher import refine
 from closedrooms.mapping.keyframe import Keyframe
 from closedrooms.mapping.likelihood_field import LikelihoodField
 from closedrooms.mapping.pose_graph import PoseGraph
+from closedrooms.mapping.visibility import conflict
 
 RIVAL_DISTANCE = 1.0
 """Distance [m] from the best place of a window beyond which another is a rival: beyond its own peak, nearer than the
 next door."""
+RIVAL_ANGLE = 0.5
+"""Turn [rad] beyond which it is a rival too, where all headings are searched."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,7 +31,7 @@ class Loop:
         source: Index of the older keyframe.
         target: Index of the present keyframe.
         a_T_b: The present keyframe in the frame of the older one.
-        score: Mean likelihood of the recent way on the older surfaces [0..1].
+        score: Mean likelihood of the recent scans on the older surfaces [0..1].
         hessian: Curvature at the match in the map frame, shape (3, 3).
     """
 
@@ -41,7 +45,7 @@ class Loop:
 def find_loop(
     keyframes: Sequence[Keyframe], graph: PoseGraph, distances: FloatArray, config: MapperConfig
 ) -> Loop | None:
-    """Match the latest keyframe, with the way that led to it, to the nearest older place beyond the horizon.
+    """Match the latest keyframe, with the scans that led to it, to the nearest older place beyond the horizon.
 
     Args:
         keyframes: All of them; the latest asks.
@@ -54,23 +58,28 @@ def find_loop(
     """
     loops = config.loops
     latest = keyframes[-1]
-    inconsistent = graph.ways > loops.horizon
-    doubts = np.minimum(loops.window + loops.drift * graph.ways, loops.max_window)
+    foreign = np.array([k.submap != latest.submap for k in keyframes])
+    inconsistent = graph.path_lengths > loops.horizon
+    doubts = np.minimum(loops.window + loops.drift * graph.path_lengths, loops.max_window)
     near = np.flatnonzero(inconsistent & (distances < np.minimum(loops.max_distance, loops.overlap + doubts)))
     if near.size == 0:
         return None
     views = np.array([keyframes[i].view for i in near.tolist()]) - latest.view
-    older = keyframes[int(near[np.argmin(np.hypot(views[:, 0], views[:, 1]) + distances[near])])]
+    # The heading of a new submap is unknown, and with it the middle of what is seen.
+    apart = np.where(foreign[near], 0.0, np.hypot(views[:, 0], views[:, 1]))
+    older = keyframes[int(near[np.argmin(apart + distances[near])])]
     field = LikelihoodField(config.resolution, config.matcher)
     surroundings = (keyframes[i] for i in sorted(graph.within(older.index, loops.horizon)) if inconsistent[i])
     field.add_scans(
         [k.pose.transform(k.beams.points) for k in surroundings if k.pose.distance(older.pose) < loops.surroundings]
     )
-    points = recent_points(keyframes, loops.recent_way, config)
+    points = recent_points(keyframes, loops.recent_distance, config)
     window = Window(
         float(doubts[older.index]),
-        min(loops.window_angle + loops.drift_angle * float(graph.ways[older.index]), 0.5),
+        min(loops.window_angle + loops.drift_angle * float(graph.path_lengths[older.index]), 0.5),
     )
+    if foreign[older.index]:
+        window = Window(max(window.distance, config.recovery.join_window), math.pi)
     sigmas, least = (window.distance, window.angle), loops.min_score - 0.15
     searched = Search(field, points, latest.pose, window, coarse_cells=6, prior_sigmas=sigmas)
     found = searched.best(floor=least)
@@ -80,24 +89,48 @@ def find_loop(
     if match.score < loops.min_score or match.pose.distance(found.pose) > 0.3:
         return None
     # Rooms of one size in a row fit one room further nearly as well: what has a rival is no evidence.
-    rival = searched.best(away_from=(found.pose, RIVAL_DISTANCE), floor=loops.max_rival * found.score)
+    apart_angle = RIVAL_ANGLE if foreign[older.index] else math.inf
+    rival = searched.best(away_from=(found.pose, RIVAL_DISTANCE, apart_angle), floor=loops.max_rival * found.score)
     if rival.score > loops.max_rival * found.score:
+        return None
+    if foreign[older.index] and _contradicts(keyframes, foreign, match.pose, config):
         return None
     return Loop(older.index, latest.index, older.pose.inverse() @ match.pose, match.score, match.hessian)
 
 
-def recent_points(keyframes: Sequence[Keyframe], way: float, config: MapperConfig) -> FloatArray:
-    """What was seen on the last ``way`` [m], in the frame of the latest keyframe, one point a cell of 0.1 m or more.
+def _contradicts(keyframes: Sequence[Keyframe], foreign: BoolArray, pose: Pose2, config: MapperConfig) -> bool:
+    """Whether the recent keyframes, moved as a whole so that the latest is at ``pose``, contradict the older submap."""
+    latest = keyframes[-1]
+    correction = pose @ latest.pose.inverse()
+    older = [keyframes[i] for i in np.flatnonzero(foreign).tolist()]
+    places = np.array([(k.pose.x, k.pose.y, k.pose.theta) for k in older])
+    conflicts = []
+    for keyframe in _recent(keyframes, config.loops.recent_distance):
+        moved = correction @ keyframe.pose
+        turns = np.abs((places[:, 2] - moved.theta + math.pi) % (2.0 * math.pi) - math.pi)
+        apart = np.hypot(places[:, 0] - moved.x, places[:, 1] - moved.y) + turns
+        near = older[int(np.argmin(apart))]
+        conflicts.append(conflict(near.beams, keyframe.beams, near.pose.inverse() @ moved) or 0.0)
+    return max(conflicts) > config.recovery.max_conflict
+
+
+def _recent(keyframes: Sequence[Keyframe], distance: float) -> Iterator[Keyframe]:
+    """Keyframes of the last ``distance`` [m] of one submap, the latest first."""
+    latest = keyframes[-1]
+    for keyframe in reversed(keyframes):
+        if latest.travelled - keyframe.travelled > distance or keyframe.submap != latest.submap:
+            return
+        yield keyframe
+
+
+def recent_points(keyframes: Sequence[Keyframe], distance: float, config: MapperConfig) -> FloatArray:
+    """What was seen on the last ``distance`` [m] of one submap, in the latest keyframe's frame, a point a cell.
 
     One scan alone fits in many places; the surroundings of several metres do not.
     """
     latest = keyframes[-1]
     robot_T_map = latest.pose.inverse()
-    clouds = []
-    for keyframe in reversed(keyframes):
-        if latest.way - keyframe.way > way:
-            break
-        clouds.append((robot_T_map @ keyframe.pose).transform(keyframe.points))
+    clouds = [(robot_T_map @ keyframe.pose).transform(keyframe.points) for keyframe in _recent(keyframes, distance)]
     points = np.vstack(clouds)
     cells = np.floor(points / config.matcher.point_spacing).astype(np.int64)
     _, first = np.unique(cells, axis=0, return_index=True)

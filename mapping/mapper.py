@@ -1,7 +1,8 @@
 """The mapper: scans and odometry in, poses, map and closed doors out."""
 
+import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -9,24 +10,33 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor, DoorSighting
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2, wrap_angle
+from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.beams import clean, hit_points, thin
+from closedrooms.mapping.beams import Beams, clean, hit_points, matched_range, thin
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.door_fusion import fuse_doors
 from closedrooms.mapping.gauss_newton_matcher import refine
-from closedrooms.mapping.growing_array import GrowingArray
 from closedrooms.mapping.keyframe import Keyframe
+from closedrooms.mapping.keyframe_graph import KeyframeGraph
 from closedrooms.mapping.local_map import LocalMap
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
-from closedrooms.mapping.loop_closure import Loop, find_loop
-from closedrooms.mapping.pose_graph import Edge, PoseGraph, optimise
-from closedrooms.mapping.scan_matcher import Motion, match_scan
+from closedrooms.mapping.mapping_events import Event, EventLog
+from closedrooms.mapping.motion import Motion
+from closedrooms.mapping.motion_prediction import MotionPrediction
+from closedrooms.mapping.pose_graph import Edge
+from closedrooms.mapping.relocalisation import relocalise
+from closedrooms.mapping.scan_matcher import ADVANTAGE, Match, match_scan
 from closedrooms.mapping.scan_preparation import Sweep
+from closedrooms.mapping.visibility import conflict
 
 MOVED = (0.015, 0.003)
 """Correction of a keyframe ([m], [rad]) beyond which it is drawn anew."""
 SCORE_MEMORY = 0.05
 """Weight of the newest match in the usual score."""
+WITNESSES = 2
+"""Keyframes that a scan must contradict."""
+GOOD_SCORE = 0.75
+"""Mean likelihood [0..1] of a good match, before the usual one is known."""
 
 
 class Mapper:
@@ -38,23 +48,21 @@ class Mapper:
     def __init__(self, config: MapperConfig | None = None) -> None:
         self._config = config or MapperConfig()
         self._local = LocalMap(self._config)
-        self._graph = PoseGraph()
-        self._loops: list[Loop] = []
+        self._graph = KeyframeGraph(self._config)
+        self._events = EventLog()
         self._hessian: FloatArray = np.zeros((3, 3))
-        self._tied_at = self._tried_at = 0.0
-        self._places = GrowingArray(2)
-        self._driven = GrowingArray()
         self._drawn = 0
         self._trusted = True
+        self._lost = 0
         self._evidence = EvidenceGrid(self._config)
-        self._keyframes: list[Keyframe] = []
         self._pose = Pose2()
-        self._odometry: Pose2 | None = None
+        self._prediction = MotionPrediction(self._config.recovery, self._events)
         self._motion = Motion()
+        self._measured = True
         self._usual_score = 0.0
         self._stamps: list[float] = []
         self._references: list[tuple[int, Pose2]] = []
-        self._way = 0.0
+        self._travelled = 0.0
 
     @property
     def pose(self) -> Pose2:
@@ -64,17 +72,22 @@ class Mapper:
     @property
     def keyframes(self) -> Sequence[Keyframe]:
         """The scans that make the map, oldest first."""
-        return self._keyframes
+        return self._graph.keyframes
 
     @property
     def edges(self) -> Sequence[Edge]:
-        """The measurements that tie the keyframes together."""
-        return self._graph.edges
+        """The constraints between the keyframes."""
+        return self._graph.graph.edges
+
+    @property
+    def events(self) -> tuple[Remark, ...]:
+        """What befell the mapper so far (failed odometry, gaps, lost scans, submaps), counted, with times."""
+        return self._events.remarks()
 
     def process(
         self,
         scan: LaserScan,
-        odometry: Pose2,
+        odometry: Pose2 | None,
         sightings: Sequence[DoorSighting] = (),
         *,
         sweep: Sweep | None = None,
@@ -83,25 +96,32 @@ class Mapper:
 
         Args:
             scan: The sweep.
-            odometry: ``odom_T_robot`` at its time, accumulated since any start.
+            odometry: ``odom_T_robot`` at its time, accumulated since any start; ``None`` where there is none.
             sightings: Closed doors seen in it, robot frame.
             sweep: What is taken from the scan, where that was found for many at once (:func:`sweeps`).
 
         Returns:
             ``map_T_robot`` as estimated.
         """
-        self._predict(odometry)
         matcher, max_range = self._config.matcher, self._config.max_range
         if sweep is not None:
             points = sweep.points
         else:
-            points = thin(hit_points(scan, max_range=max_range), matcher.point_spacing, matcher.max_points)
-        if self._keyframes:
-            self._match(points)
+            reach = matched_range(scan, max_range=max_range, margin=matcher.range_margin)
+            points = thin(hit_points(scan, max_range=reach), matcher.point_spacing, matcher.max_points)
+
+        @functools.cache
+        def beams() -> Beams:
+            return clean(scan, max_range=max_range) if sweep is None else sweep.beams
+
+        before = self._pose
+        alternative = self._predict(odometry, scan.stamp)
+        if self.keyframes:
+            self._match(points, beams, scan.stamp, alternative)
+        self._prediction.moved(before.inverse() @ self._pose)
         if self._wants_keyframe():
-            beams = clean(scan, max_range=max_range) if sweep is None else sweep.beams
-            self._insert(Keyframe(len(self._keyframes), scan.stamp, self._pose, beams, points, self._way))
-        latest = self._keyframes[-1]
+            self._insert(Keyframe(len(self.keyframes), scan.stamp, self._pose, beams(), points, self._travelled))
+        latest = self.keyframes[-1]
         keyframe_T_robot = latest.pose.inverse() @ self._pose
         for sighting in sightings:
             latest.remember(sighting, keyframe_T_robot)
@@ -109,31 +129,49 @@ class Mapper:
         self._references.append((latest.index, keyframe_T_robot))
         return self._pose
 
-    def _predict(self, odometry: Pose2) -> None:
-        if self._odometry is not None:
-            step = self._odometry.inverse() @ odometry
-            self._pose = self._pose @ step
-            way = math.hypot(step.x, step.y)
-            self._way += way
-            self._motion = self._motion.then(way, abs(step.theta))
-        self._odometry = odometry
+    def _predict(self, odometry: Pose2 | None, stamp: float) -> Pose2 | None:
+        """Move the pose as the odometry says; the pose that it may mean instead, ``None`` as a rule."""
+        step = self._prediction.step(odometry, stamp)
+        alternative = None if step.alternative is None else self._pose @ step.alternative
+        self._pose = self._pose @ step.motion
+        if step.unmeasured is None:
+            distance = math.hypot(step.motion.x, step.motion.y)
+            self._travelled += distance
+            self._motion = self._motion.then(distance, abs(step.motion.theta))
+        else:
+            self._motion = self._motion.without_odometry(*step.unmeasured)
+        return alternative
 
-    def _match(self, points: FloatArray) -> None:
-        if self._motion.still:
+    def _match(self, points: FloatArray, beams: Callable[[], Beams], stamp: float, alternative: Pose2 | None) -> None:
+        if self._motion.still and not self._moved_in_silence(points):
             return
-        match = match_scan(
-            self._local.field,
-            points,
-            self._pose,
-            self._motion,
-            usual_score=self._usual_score,
-            config=self._config.matcher,
-        )
+        if self._motion.unmeasured is not None:
+            self._measured = False
+        match = self._match_from(self._pose, points)
+        other = None if alternative is None else self._match_from(alternative, points)
+        if other is not None and (match is None or other.score > match.score + ADVANTAGE):
+            match = other
+        if len(points) < self._config.matcher.min_points:
+            self._events.note(Event.BLIND, stamp)
+        elif self._config.recovery.enabled and self._contradicts(match, beams):
+            match = self._recover(match, points, beams, stamp)
+            if match is None:
+                self._trusted = False
+                return
+        self._lost = 0
         self._trusted = False
-        if match is None:
-            return
+        if match is not None:
+            self._take(match)
+
+    def _match_from(self, guess: Pose2, points: FloatArray) -> Match | None:
+        config, reach = self._config.matcher, self._config.recovery.max_reach
+        usual = self._usual_score
+        return match_scan(self._local.field, points, guess, self._motion, usual_score=usual, config=config, reach=reach)
+
+    def _take(self, match: Match) -> None:
         distance, angle = self._pose.distance(match.pose), abs(wrap_angle(match.pose.theta - self._pose.theta))
-        self._motion = self._motion.corrected(distance, angle, self._config.matcher)
+        if self._motion.unmeasured is None and not match.relocalised:
+            self._motion = self._motion.corrected(distance, angle, self._config.matcher)
         self._pose = match.pose
         self._hessian = match.hessian
         self._trusted = match.score >= self._config.matcher.poor * self._usual_score
@@ -141,126 +179,141 @@ class Mapper:
             self._motion = self._motion.matched()
         self._usual_score += SCORE_MEMORY * (match.score - self._usual_score)
 
-    def _wants_keyframe(self) -> bool:
-        if not self._keyframes:
-            return True
-        latest = self._keyframes[-1].pose
-        patience = 1.0 if self._trusted else self._config.patience
-        return (
-            latest.distance(self._pose) >= patience * self._config.keyframe_distance
-            or abs(wrap_angle(latest.theta - self._pose.theta)) >= patience * self._config.keyframe_angle
-        )
-
-    def _insert(self, keyframe: Keyframe) -> None:
-        self._keyframes.append(keyframe)
-        if keyframe.index > 0:
-            self._tie_to_previous(keyframe)
-        self._places.append((keyframe.pose.x, keyframe.pose.y))
-        self._driven.append(keyframe.way)
-        distances = self._distances(keyframe)
-        self._tie_to_older(keyframe, distances)
-        if self._config.loops.enabled and self._close_loop(keyframe, distances):
-            distances = self._distances(keyframe)
-        self._local.update(self._keyframes, self._graph.ways, distances)
-
-    def _distances(self, keyframe: Keyframe) -> FloatArray:
-        """From a keyframe to each as the crow flies, shape (keyframes,) [m]."""
-        offsets = self._places.values - (keyframe.pose.x, keyframe.pose.y)
-        return np.asarray(np.hypot(offsets[:, 0], offsets[:, 1]))
-
-    def _tie_to_previous(self, keyframe: Keyframe) -> None:
-        previous = self._keyframes[keyframe.index - 1]
-        way = keyframe.way - previous.way
-        turn = abs(wrap_angle(keyframe.pose.theta - previous.pose.theta))
-        distance, angle = Motion(way=way, turn=turn).sigmas(self._config.matcher)
-        odometry = np.diag([distance**-2, distance**-2, angle**-2])
-        information = odometry + self._information(self._hessian, keyframe.pose)
-        a_T_b = previous.pose.inverse() @ keyframe.pose
-        self._graph.add(Edge(previous.index, keyframe.index, a_T_b, information, max(way, 0.01)))
-        self._hessian = np.zeros((3, 3))
-
-    def _tie_to_older(self, keyframe: Keyframe, distances: FloatArray) -> None:
-        """The match was against older keyframes too: say so in the graph, or a loop would tear them apart."""
-        loops = self._config.loops
-        if keyframe.way - self._tied_at < loops.link_interval:
-            return
-        older = (keyframe.way - self._driven.values > loops.horizon / 2) & (self._graph.ways <= loops.horizon)
-        candidates = np.flatnonzero(older & (distances <= loops.link_distance))
-        if candidates.size == 0:
-            return
-        near = self._keyframes[int(candidates[np.argmin(distances[candidates])])]
-        match = refine(self._local.field, keyframe.points, keyframe.pose, iterations=1)
-        information = self._information(match.hessian, keyframe.pose)
-        a_T_b = near.pose.inverse() @ keyframe.pose
-        length = max(near.pose.distance(keyframe.pose), 0.01)
-        self._graph.add(Edge(near.index, keyframe.index, a_T_b, information, length, loop=True))
-        self._tied_at = keyframe.way
-
-    def _information(self, hessian: FloatArray, pose: Pose2) -> FloatArray:
-        """Curvature in the map frame as information in the keyframe's own frame."""
-        c, s = math.cos(pose.theta), math.sin(pose.theta)
-        rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return np.asarray(self._config.loops.point_information * (rotation.T @ hessian @ rotation))
-
-    def _close_loop(self, keyframe: Keyframe, distances: FloatArray) -> bool:
-        loops = self._config.loops
-        if keyframe.way - self._tried_at < loops.interval:
+    def _moved_in_silence(self, points: FloatArray) -> bool:
+        """Whether the scan no longer fits where the odometry stands still."""
+        if len(points) < self._config.matcher.min_points or not self._config.recovery.enabled:
             return False
-        self._tried_at = keyframe.way
-        loop = find_loop(self._keyframes, self._graph, distances, self._config)
-        if loop is None:
+        score = refine(self._local.field, points, self._pose, iterations=1).score
+        if score >= self._config.recovery.suspect * max(self._usual_score, GOOD_SCORE):
             return False
-        information = self._information(loop.hessian, keyframe.pose)
-        self._graph.add(Edge(loop.source, loop.target, loop.a_T_b, information, loops.interval, loop=True))
-        solution = optimise(self._poses(), self._graph.edges, kernel=loops.kernel)
-        if 1.0 / (1.0 + solution.errors[-1] / loops.kernel**2) < loops.min_weight:
-            self._graph.drop_last()
-            return False
-        self._loops.append(loop)
-        self._apply(solution.poses)
+        self._motion = self._motion.without_odometry(*self._prediction.possible)
         return True
 
-    def _poses(self) -> FloatArray:
-        return np.array([k.pose.as_tuple() for k in self._keyframes])
+    def _contradicts(self, match: Match | None, beams: Callable[[], Beams]) -> bool:
+        """Whether a match, or the prediction without one, puts surfaces where the last keyframe saw none."""
+        recovery, pose = self._config.recovery, self._pose if match is None else match.pose
+        if match is not None and match.score >= recovery.suspect * self._usual_score and not self._far(pose):
+            return False
+        return self._conflict_at(pose, beams) > recovery.max_conflict
 
-    def _apply(self, poses: FloatArray) -> None:
-        """Move the keyframes; what hangs on them (way, doors, map) follows."""
-        for keyframe, (x, y, theta) in zip(self._keyframes, poses, strict=True):
-            keyframe.pose = Pose2(x, y, theta)
-        self._places.values[:] = poses[:, :2]
-        self._pose = self._keyframes[-1].pose
+    def _conflict_at(self, pose: Pose2, beams: Callable[[], Beams]) -> float:
+        """Of the last keyframes the one with the smallest conflict: people that walk by contradict only one."""
+        least: float | None = None
+        for keyframe in reversed(self.keyframes[-WITNESSES:]):
+            if keyframe.submap != self.keyframes[-1].submap:
+                break
+            share = conflict(keyframe.beams, beams(), keyframe.pose.inverse() @ pose)
+            if share is not None:
+                least = share if least is None else min(least, share)
+            if least is not None and least <= self._config.recovery.max_conflict:
+                break
+        return least or 0.0
+
+    def _recover(
+        self, direct: Match | None, points: FloatArray, beams: Callable[[], Beams], stamp: float
+    ) -> Match | None:
+        recovery = self._config.recovery
+        reach = min(max(recovery.reach, 1.5 * self._prediction.possible[0]), recovery.max_reach)
+        match = relocalise(
+            self._local.field,
+            points,
+            self._pose,
+            direct,
+            reach=reach,
+            least=max(recovery.min_score * self._usual_score, self._config.matcher.min_score),
+            conflict_at=lambda pose: self._conflict_at(pose, beams),
+            config=recovery,
+        )
+        if match is None:
+            self._lost += 1
+            self._events.note(Event.LOST, stamp)
+        elif match.relocalised:
+            self._measured = False
+            self._events.note(Event.RECOVERED, stamp)
+        return match
+
+    def _far(self, pose: Pose2, patience: float = 1.0) -> bool:
+        """Whether a pose is as far from the latest keyframe as keyframes are apart."""
+        latest, config = self.keyframes[-1].pose, self._config
+        return (
+            latest.distance(pose) >= patience * config.keyframe_distance
+            or abs(wrap_angle(latest.theta - pose.theta)) >= patience * config.keyframe_angle
+        )
+
+    def _wants_keyframe(self) -> bool:
+        recovery = self._config.recovery
+        if not self.keyframes:
+            return True
+        if self._lost:
+            # A map should not be given up while the next scan may still find back.
+            far = self._travelled - self.keyframes[-1].travelled > recovery.patience_distance
+            return far or self._lost >= recovery.patience
+        return self._far(self._pose, 1.0 if self._trusted else self._config.patience)
+
+    def _insert(self, keyframe: Keyframe) -> None:
+        if self.keyframes:
+            latest = self.keyframes[-1]
+            chord = latest.pose.distance(keyframe.pose)
+            if not self._measured:
+                keyframe.travelled = self._travelled = max(self._travelled, latest.travelled + chord)
+            keyframe.submap = latest.submap
+        if self._lost:
+            self._start_submap(keyframe)
+        self._graph.add(keyframe, self._hessian, measured=self._measured)
+        self._hessian, self._measured = np.zeros((3, 3)), True
+        distances = self._graph.distances()
+        self._graph.link_to_older(self._local.field, distances)
+        joined = self._graph.joined
+        if self._graph.close_loop(distances):
+            self._poses_moved()
+            distances = self._graph.distances()
+        if self._graph.joined > joined:
+            self._events.note(Event.JOINED, keyframe.stamp)
+        self._local.update(self.keyframes, self._graph.graph.path_lengths, distances)
+
+    def _start_submap(self, keyframe: Keyframe) -> None:
+        keyframe.submap = self._events.count(Event.SUBMAP) + 1
+        self._events.note(Event.SUBMAP, keyframe.stamp)
+        self._local.clear()
+        self._motion = self._motion.matched()
+        self._lost, self._trusted = 0, True
+        self._hessian = np.zeros((3, 3))
+
+    def _poses_moved(self) -> None:
+        """What hangs on the keyframes (the robot's pose, doors, map) follows them."""
+        self._pose = self.keyframes[-1].pose
         self._local.clear()
         self._drawn = 0
 
     def grid(self) -> OccupancyGrid:
         """The map so far, from the keyframes' present poses."""
-        moved = [keyframe for keyframe in self._keyframes[self._drawn :] if _outdated(keyframe)]
+        moved = [keyframe for keyframe in self.keyframes[self._drawn :] if _outdated(keyframe)]
         self._evidence.add_all([(k.beams, k.drawn) for k in moved if k.drawn is not None], sign=-1)
         self._evidence.add_all([(k.beams, k.pose) for k in moved])
         for keyframe in moved:
             keyframe.drawn = keyframe.pose
-        self._drawn = len(self._keyframes)
+        self._drawn = len(self.keyframes)
         return self._evidence.grid()
 
     def doors(self) -> list[ClosedDoor]:
         """Closed doors seen so far, map frame, sorted by id."""
-        return fuse_doors(self._keyframes)
+        return fuse_doors(self.keyframes)
 
     def trajectory(self) -> tuple[FloatArray, FloatArray]:
         """Stamps [s], shape (n,), and poses ``(x, y, theta)``, shape (n, 3), at the keyframes' present poses."""
-        poses = [(self._keyframes[i].pose @ relative).as_tuple() for i, relative in self._references]
+        poses = [(self.keyframes[i].pose @ relative).as_tuple() for i, relative in self._references]
         return np.array(self._stamps, dtype=np.float64), np.array(poses, dtype=np.float64).reshape(-1, 3)
 
     @property
     def loops(self) -> FloatArray:
         """Positions of the two ends of each loop that was closed, shape (n, 2, 2), map frame [m]."""
-        ends = [(self._keyframes[loop.source].pose, self._keyframes[loop.target].pose) for loop in self._loops]
+        ends = [(self.keyframes[loop.source].pose, self.keyframes[loop.target].pose) for loop in self._graph.loops]
         return np.array([((a.x, a.y), (b.x, b.y)) for a, b in ends], dtype=np.float64).reshape(-1, 2, 2)
 
     def finish(self) -> None:
         """Optimise once more over everything."""
-        if len(self._graph.edges) > 0 and self._loops:
-            self._apply(optimise(self._poses(), self._graph.edges, kernel=self._config.loops.kernel).poses)
+        if self._graph.optimise():
+            self._poses_moved()
 
 
 def _outdated(keyframe: Keyframe) -> bool:

@@ -13,7 +13,7 @@ from closedrooms.mapping.normal_equations import Pattern
 DAMPING = 1e-4
 """First Levenberg-Marquardt damping, relative to the diagonal: nearly Gauss-Newton, since the guess is good."""
 ROUNDING = 1e-9
-"""Differences of ways [m] that come from the order in which lengths were summed."""
+"""Differences of path lengths [m] that come from the order in which lengths were summed."""
 GAIN_DONE = 1e-5
 """Relative decrease of the cost at which the solution counts as converged."""
 
@@ -55,31 +55,31 @@ class PoseGraph:
 
     edges: list[Edge] = field(default_factory=list)
     _neighbours: dict[int, list[tuple[int, float]]] = field(default_factory=dict)
-    _ways: GrowingArray = field(default_factory=lambda: _first(0.0))
+    _path_lengths: GrowingArray = field(default_factory=lambda: _first(0.0))
     _chain: GrowingArray = field(default_factory=lambda: _first(0.0))
-    """Way along the edges from one keyframe to the next only, from the first to each [m], shape (keyframes,)."""
+    """Path along the edges from one keyframe to the next only, from the first to each [m], shape (keyframes,)."""
     _shortcuts: list[tuple[int, int, float]] = field(default_factory=list)
     """All other edges: source, target, length."""
 
     @property
-    def ways(self) -> FloatArray:
-        """Way along the graph [m] from the latest keyframe to each, shape (keyframes,), until the next edge."""
-        return self._ways.values
+    def path_lengths(self) -> FloatArray:
+        """Shortest paths [m] from the latest keyframe to each, shape (keyframes,), until the next edge."""
+        return self._path_lengths.values
 
     def add(self, edge: Edge) -> None:
         """Add an edge: from the latest keyframe to the next one, or from an older one to the latest."""
         self.edges.append(edge)
         self._neighbours.setdefault(edge.source, []).append((edge.target, edge.length))
         self._neighbours.setdefault(edge.target, []).append((edge.source, edge.length))
-        if edge.target == len(self.ways):
-            # Every way from the next keyframe leads over this one.
-            self._ways.values[:] += edge.length
-            self._ways.append(0.0)
+        if edge.target == len(self.path_lengths):
+            # Every path from the next keyframe leads over this one.
+            self._path_lengths.values[:] += edge.length
+            self._path_lengths.append(0.0)
             self._chain.append(float(self._chain.values[-1]) + edge.length)
         else:
             self._shortcuts.append((edge.source, edge.target, edge.length))
-            if edge.length < self.ways[edge.source]:
-                self.ways[edge.source] = edge.length
+            if edge.length < self.path_lengths[edge.source]:
+                self.path_lengths[edge.source] = edge.length
                 self._spread()
 
     def drop_last(self) -> None:
@@ -88,37 +88,37 @@ class PoseGraph:
         self._neighbours[edge.source].pop()
         self._neighbours[edge.target].pop()
         self._shortcuts.pop()
-        self.ways[:-1] = np.inf
-        self.ways[-1] = 0.0
+        self.path_lengths[:-1] = np.inf
+        self.path_lengths[-1] = 0.0
         self._spread()
 
     def _spread(self) -> None:
-        """Make the ways as short as the edges allow: along the chain at once, then over the shortcuts, and again."""
-        chain, ways = self._chain.values, self.ways
+        """Make the paths as short as the edges allow: along the chain at once, then over the shortcuts, and again."""
+        chain, lengths = self._chain.values, self.path_lengths
         shortcuts = np.array(self._shortcuts, dtype=np.float64).reshape(-1, 3)
         source, target = shortcuts[:, :2].T.astype(np.int64)
         while True:
-            ways = np.minimum(ways, np.minimum.accumulate(ways - chain) + chain)
-            ways = np.minimum(ways, np.minimum.accumulate((ways + chain)[::-1])[::-1] - chain)
-            to_target, to_source = ways[source] + shortcuts[:, 2], ways[target] + shortcuts[:, 2]
-            if not ((to_target < ways[target] - ROUNDING) | (to_source < ways[source] - ROUNDING)).any():
+            lengths = np.minimum(lengths, np.minimum.accumulate(lengths - chain) + chain)
+            lengths = np.minimum(lengths, np.minimum.accumulate((lengths + chain)[::-1])[::-1] - chain)
+            to_target, to_source = lengths[source] + shortcuts[:, 2], lengths[target] + shortcuts[:, 2]
+            if not ((to_target < lengths[target] - ROUNDING) | (to_source < lengths[source] - ROUNDING)).any():
                 break
-            np.minimum.at(ways, target, to_target)
-            np.minimum.at(ways, source, to_source)
-        self.ways[:] = ways
+            np.minimum.at(lengths, target, to_target)
+            np.minimum.at(lengths, source, to_source)
+        self.path_lengths[:] = lengths
 
     def within(self, start: int, limit: float) -> dict[int, float]:
-        """Way along the graph [m] from ``start`` to each keyframe that is at most ``limit`` away (Dijkstra)."""
+        """Path length [m] from ``start`` to each keyframe that is at most ``limit`` away along the edges (Dijkstra)."""
         done: dict[int, float] = {}
         queue = [(0.0, start)]
         while queue:
-            way, node = heapq.heappop(queue)
+            path, node = heapq.heappop(queue)
             if node in done:
                 continue
-            done[node] = way
+            done[node] = path
             for neighbour, length in self._neighbours.get(node, ()):
-                if neighbour not in done and way + length <= limit:
-                    heapq.heappush(queue, (way + length, neighbour))
+                if neighbour not in done and path + length <= limit:
+                    heapq.heappush(queue, (path + length, neighbour))
         return done
 
 

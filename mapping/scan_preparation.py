@@ -9,7 +9,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.beams import Beams, clean_alike, directions, spaced
+from closedrooms.mapping.beams import Beams, clean_alike, directions, matched_range, spaced
 from closedrooms.mapping.config import MapperConfig
 
 TOGETHER = 64
@@ -45,10 +45,11 @@ def _sensor(scan: LaserScan) -> tuple[object, ...]:
 
 
 def _thin_alike(scans: Sequence[LaserScan], config: MapperConfig) -> list[FloatArray]:
-    """The hits of scans of one sensor, thinned, as ``thin(hit_points(...))`` does it; of shape (n, 2) each [m]."""
+    """The hits of scans of one sensor, thinned, up to the range that is matched; of shape (n, 2) each [m]."""
     first = scans[0]
     ranges = np.stack([scan.ranges for scan in scans])
-    hits = (ranges >= first.range_min) & (ranges < min(config.max_range, first.range_max))
+    reach = matched_range(first, max_range=config.max_range, margin=config.matcher.range_margin)
+    hits = (ranges >= first.range_min) & (ranges < reach)
     # The hits of each scan, one beside the other from the left.
     order = np.argsort(~hits, axis=1, kind="stable")
     counts = np.count_nonzero(hits, axis=1)[:, None]

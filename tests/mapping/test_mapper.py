@@ -153,3 +153,14 @@ def test_a_mapper_without_scans_has_an_unknown_map_and_no_way() -> None:
     assert mapper.trajectory()[1].shape == (0, 3)
     assert mapper.loops.shape == (0, 2, 2)
     assert mapper.doors() == []
+
+
+@pytest.mark.parametrize("width", [12.0, 25.0])
+def test_the_end_of_sight_does_not_hold_the_robot_back_in_a_long_hall(segment_world: Any, width: float) -> None:
+    corners = [(0.0, 0.0), (63.0, 0.0), (63.0, width), (0.0, width)]
+    hall = segment_world([(*a, *b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)])
+    drive = hall.drive([(2.0, width / 2), (61.0, width / 2)], seed=1, step=0.12, **MEDIUM)
+    mapper = mapped(drive)
+    travelled = np.hypot(*np.diff(mapper.trajectory()[1][[0, -1], :2], axis=0)[0])
+    assert travelled == pytest.approx(59.0, abs=0.9)
+    assert error(mapper, drive)[0] < 0.4

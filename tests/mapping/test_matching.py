@@ -8,10 +8,12 @@ from hypothesis import strategies as st
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import hit_points, thin
 from closedrooms.mapping.config import MatcherConfig
-from closedrooms.mapping.correlative_matcher import Search, Window, search_heading
+from closedrooms.mapping.correlative_matcher import Search, Window
 from closedrooms.mapping.gauss_newton_matcher import refine
+from closedrooms.mapping.heading_search import search_heading
 from closedrooms.mapping.likelihood_field import LikelihoodField
-from closedrooms.mapping.scan_matcher import Motion, match_scan
+from closedrooms.mapping.motion import Motion
+from closedrooms.mapping.scan_matcher import match_scan
 
 
 def shape(n: int = 240) -> np.ndarray:
@@ -154,7 +156,7 @@ def test_a_place_that_repeats_has_a_rival(repeated: bool, least: float, most: fl
     window = Window(3.0, 0.1)
     searched = Search(field, corner, Pose2(0.2, 0.1, 0.0), window, prior_sigmas=(3.0, 0.1))
     best = searched.best()
-    rival = searched.best(away_from=(best.pose, 1.0))
+    rival = searched.best(away_from=(best.pose, 1.0, math.inf))
     assert best.pose.distance(Pose2()) < 0.06
     assert rival.pose.distance(best.pose) >= 1.0
     assert least <= rival.score / best.score <= most

@@ -74,7 +74,7 @@ def test_headings_across_pi_are_no_error() -> None:
     assert optimise(array(truth), edges, kernel=4.0).errors == pytest.approx(np.zeros(2), abs=1e-12)
 
 
-def test_ways_follow_the_shortest_edges_up_to_the_limit() -> None:
+def test_paths_follow_the_shortest_edges_up_to_the_limit() -> None:
     graph = PoseGraph()
     truth = circle(20)
     for edge in chain(truth)[0]:
@@ -89,7 +89,7 @@ def test_ways_follow_the_shortest_edges_up_to_the_limit() -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.tuples(st.floats(0.1, 2.0), st.booleans(), st.integers(0, 1000), st.booleans()), max_size=25))
-def test_ways_from_the_latest_are_kept_as_a_fresh_search_finds_them(
+def test_path_lengths_from_the_latest_are_kept_as_a_fresh_search_finds_them(
     steps: list[tuple[float, bool, int, bool]],
 ) -> None:
     graph = PoseGraph()
@@ -100,4 +100,4 @@ def test_ways_from_the_latest_are_kept_as_a_fresh_search_finds_them(
             if taken_back:
                 graph.drop_last()
         fresh = graph.within(i + 1, math.inf)
-        assert graph.ways == pytest.approx([fresh[k] for k in range(i + 2)])
+        assert graph.path_lengths == pytest.approx([fresh[k] for k in range(i + 2)])
