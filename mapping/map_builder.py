@@ -34,7 +34,7 @@ class BuiltMap:
         seconds: Wall-clock time of mapping alone [s].
         errors: ATE ``(m, rad)`` against the reference of ``odometry`` (``scans_alone``, where the run has none),
             ``online`` and ``final``; empty without one.
-        remarks: What was guessed on the way.
+        remarks: What was guessed on the way, and what the mapper met: gaps, lost scans, recovered poses, submaps.
     """
 
     grid: OccupancyGrid
@@ -103,7 +103,7 @@ def build_map(
         len(mapper.keyframes),
         seconds,
         errors,
-        () if follower is None else _lost_remarks(follower.lost),
+        (*(() if follower is None else _lost_remarks(follower.lost)), *mapper.events),
     )
 
 
