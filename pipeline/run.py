@@ -117,6 +117,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
         found = _find_out(config, closed, log, mapper, recorder, progress, watch)
         remarks = [
             *plan.remarks,
+            *mapper.events,
             *too_narrow(plan, closed, sim.world_T_map, config.navigation.for_robot(config.sim.robot)),
         ]
         manifest |= _figures(plan, closed, sim.world_T_map.inverse(), found)
