@@ -81,7 +81,7 @@ def test_rmf_levels_are_chosen_by_name_and_share_their_scale(fixtures: Path) -> 
     path = fixtures / "rmf_small.building.yaml"
     plan = load_world(str(path), level="L2")
     assert plan.rooms[0].polygon.area == pytest.approx(25.0)
-    with pytest.raises(InvalidInputError, match="levels L1, L2; expected --level"):
+    with pytest.raises(InvalidInputError, match="levels L1, L2; expected FILE:LEVEL"):
         read_rmf(path)
     with pytest.raises(InvalidInputError, match="no level 'L9'; expected one of L1, L2"):
         read_rmf(path, "L9")
