@@ -42,6 +42,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ClosedroomsError as error:
         _complain(str(error))
         return BAD_INPUT
+    except ModuleNotFoundError as error:
+        from closedrooms.core.packages import missing_package
+
+        missing = missing_package(error, by=f"closedrooms {words[0] if words else ''}".strip())
+        if missing is None:
+            raise
+        _complain(str(missing))
+        return BAD_INPUT
     except KeyboardInterrupt:
         _complain("interrupted; nothing half-written was left behind")
         return INTERRUPTED

@@ -257,10 +257,13 @@ def test_an_unreachable_scheduler_is_one_line(
     assert "no scheduler answers" in capsys.readouterr().err.splitlines()[-1]
 
 
-def test_two_worlds_of_one_name_are_refused(worlds: list[str], tmp_path: Path) -> None:
-    other = write_world(tmp_path, "a", 5.0)
-    with pytest.raises(InvalidInputError, match="two worlds named 'a'"):
-        find_worlds(DatasetConfig(worlds=(worlds[0], str(other)), out=tmp_path))
+def test_two_worlds_of_one_name_are_told_apart_by_their_folders(worlds: list[str], tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    other = write_world(tmp_path / "elsewhere", "a", 5.0)
+    found = find_worlds(DatasetConfig(worlds=(worlds[0], str(other)), out=tmp_path))
+    names = [world.name for world in found]
+    assert len({*names}) == 2
+    assert all(name.endswith("-a") for name in names)
 
 
 def test_a_sample_that_fails_is_recorded_and_the_others_are_made(
