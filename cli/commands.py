@@ -34,21 +34,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        with _sigterm():
+        with _sigterm(), _missing_packages(words):
             return _main(words)
     except UsageError as error:
         _complain(str(error))
         return WRONG_USAGE
     except ClosedroomsError as error:
         _complain(str(error))
-        return BAD_INPUT
-    except ModuleNotFoundError as error:
-        from closedrooms.core.packages import missing_package
-
-        missing = missing_package(error, by=f"closedrooms {words[0] if words else ''}".strip())
-        if missing is None:
-            raise
-        _complain(str(missing))
         return BAD_INPUT
     except KeyboardInterrupt:
         _complain("interrupted; nothing half-written was left behind")
@@ -106,6 +98,18 @@ def _show(name: str, result: Any, terminal: Any, options: Any) -> int:
     if len(failures) > most:
         _complain(f"and {len(failures) - most} more; all are named in what was written")
     return PARTLY_FAILED if result.partial else DONE
+
+
+@contextlib.contextmanager
+def _missing_packages(words: Sequence[str]) -> Iterator[None]:
+    """Name a package that is not installed in one line."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        from closedrooms.core.packages import missing_package
+
+        missing = missing_package(error, by=" ".join(["closedrooms", *words[:1]]))
+        raise missing or error from error
 
 
 @contextlib.contextmanager

@@ -63,3 +63,14 @@ def test_the_method_decides_which_options_there_are(call, capsys):
     assert "--predictor.weights.area" in paper
     assert "--predictor.weights.area" not in best
     assert "--predictor.door-width" in best
+
+
+def test_a_missing_package_is_one_line_with_the_command_that_brings_it(call, one_line, monkeypatch):
+    def missing(*_: object, **__: object) -> None:
+        raise ModuleNotFoundError("No module named 'ortools'", name="ortools")
+
+    monkeypatch.setattr("closedrooms.cli.options.load", missing)
+    assert call("cover", "map.yaml", "--out", "o") == 1
+    assert (
+        one_line() == "closedrooms: closedrooms cover needs ortools, which is not installed here: pip install ortools"
+    )

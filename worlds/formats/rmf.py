@@ -109,7 +109,9 @@ def _level_fields(data: dict[str, Any], level: str | None, path: Path) -> tuple[
         raise InvalidInputError("a building without levels", expected=WHAT, where=path)
     names = ", ".join(map(str, levels))
     if level is None and len(levels) > 1:
-        raise InvalidInputError(f"a building with the levels {names}", expected="FILE:LEVEL with one of them", where=path)
+        raise InvalidInputError(
+            f"a building with the levels {names}", expected="FILE:LEVEL with one of them", where=path
+        )
     # A level called 1 is a number to YAML.
     by_name = {str(key): fields for key, fields in levels.items()}
     name = next(iter(by_name)) if level is None else level
