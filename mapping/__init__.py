@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from closedrooms.mapping.config import LoopConfig, MapperConfig, MatcherConfig, RecoveryConfig
-    from closedrooms.mapping.keyframe import Keyframe
+    from closedrooms.mapping.graph.keyframe import Keyframe
     from closedrooms.mapping.mapper import Mapper
     from closedrooms.mapping.scan_preparation import Sweep, sweeps
     from closedrooms.mapping.trajectory import align, ate
@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 _MODULES = {
-    "Keyframe": "keyframe",
+    "Keyframe": "graph.keyframe",
     "LoopConfig": "config",
     "Mapper": "mapper",
     "MapperConfig": "config",

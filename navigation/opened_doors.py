@@ -9,7 +9,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.core.shapes import mark_doorways
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.keyframe import Keyframe
+from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
 from closedrooms.navigation.control_loop import MapMaker
 

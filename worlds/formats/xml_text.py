@@ -5,7 +5,7 @@ from typing import Any
 from xml.etree.ElementTree import ParseError
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import read_text
+from closedrooms.core.incoming import read_text
 
 MAX_BYTES = 100_000_000
 
