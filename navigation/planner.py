@@ -64,7 +64,7 @@ def start_cell(costmap: Costmap, fits: BoolArray, start: Point) -> tuple[int, in
 
 
 def plan_path(costmap: Costmap, start: Point, goals: BoolArray, config: RobotNavigation) -> Path | None:
-    """The cheapest path from ``start`` to the nearest of several goals.
+    """Plan the cheapest path from ``start`` to the nearest of several goals.
 
     Args:
         costmap: Planning grid.

@@ -80,7 +80,7 @@ def _on_boundary(growth: Growth, point: FloatArray) -> bool:
 
 
 def _groups(growth: Growth, rooms: dict[int, BorderRoom]) -> list[list[int]]:
-    """Border rooms whose initial faces touch, one after the other, and that reach the same way out."""
+    """Group border rooms whose initial faces touch, one after the other, and that reach outward alike."""
     left, groups = set(rooms), []
     while left:
         group, queue = [], [min(left)]

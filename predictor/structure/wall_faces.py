@@ -74,8 +74,8 @@ def find_faces(grid: OccupancyGrid) -> WallFaces:
         if d_row + d_col > 0:
             # The occupied cell is the one before the edge.
             rows, cols = rows - d_row, cols - d_col
-        way = np.array([d_col, d_row], dtype=np.float64)
-        points.append(frame.to_points(np.stack((rows, cols), axis=-1)) + way * frame.resolution / 2)
-        outward.append(np.tile(way, (rows.size, 1)))
+        outside = np.array([d_col, d_row], dtype=np.float64)
+        points.append(frame.to_points(np.stack((rows, cols), axis=-1)) + outside * frame.resolution / 2)
+        outward.append(np.tile(outside, (rows.size, 1)))
         angles.append(np.arctan2(slope_y[rows, cols], slope_x[rows, cols]).astype(np.float64))
     return WallFaces(np.vstack(points), np.vstack(outward), np.concatenate(angles))

@@ -1,7 +1,7 @@
 """Floor plans in the formats of others: one file a format, each reads into a :class:`~closedrooms.worlds.FloorPlan`.
 
 ``settlement`` is every importer's last step. ``portals`` and ``room_outlines`` serve formats of rooms without walls,
-``raster_rooms`` and ``raster_walls`` maps, ``xml_text`` XML.
+``hallways`` pyrobosim, ``raster_rooms`` and ``raster_walls`` maps, ``xml_text`` XML.
 """
 
 from typing import TYPE_CHECKING

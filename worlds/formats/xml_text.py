@@ -11,7 +11,7 @@ MAX_BYTES = 100_000_000
 
 
 def parse_xml(path: Path, *, what: str) -> Any:
-    """The root element of an XML file.
+    """Parse the root element of an XML file.
 
     Raises:
         InvalidInputError: Missing, too large, no XML, or XML with entities.
