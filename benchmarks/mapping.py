@@ -25,17 +25,17 @@ import numpy as np
 import scipy.sparse.linalg  # noqa: F401  (loaded here, not inside the first timing)
 from odometry_faults import bench_faults, yag_slam
 
-import closedrooms.mapping.keyframe_graph as graph_module
+import closedrooms.mapping.graph.keyframe_graph as graph_module
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.mapping.beams import clean, hit_points, thin
 from closedrooms.mapping.config import LoopConfig, MapperConfig
-from closedrooms.mapping.gauss_newton_matcher import refine
-from closedrooms.mapping.likelihood_field import LikelihoodField
+from closedrooms.mapping.graph.pose_graph import Edge, Solution, optimise
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
 from closedrooms.mapping.logs import RecordedRun, read_run
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.mapping.pose_graph import Edge, Solution, optimise
+from closedrooms.mapping.matching.gauss_newton_matcher import refine
+from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 from closedrooms.mapping.scan_preparation import sweeps
 from closedrooms.mapping.trajectory import ate
 
@@ -134,7 +134,7 @@ def kiss(run: RecordedRun) -> FloatArray:
 
 
 def gtsam_optimise(poses: FloatArray, edges: list[Edge], *, kernel: float, iterations: int = 20) -> Solution:
-    """What :func:`closedrooms.mapping.pose_graph.optimise` does, by gtsam's Levenberg-Marquardt."""
+    """What :func:`closedrooms.mapping.graph.pose_graph.optimise` does, by gtsam's Levenberg-Marquardt."""
     import gtsam
 
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()

@@ -1,4 +1,8 @@
-"""The command line: subcommands and their options."""
+"""The command line: ``commands`` runs what ``table`` finds on a line.
+
+``options`` of a command, ``config_file`` and ``settings`` for ``--config``, ``usage`` for what was not understood,
+``work`` for commands whose use case returns no report.
+"""
 
 from typing import TYPE_CHECKING
 

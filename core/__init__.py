@@ -1,76 +1,65 @@
-"""The words every stage shares (poses, grids, scans, doors, rooms, errors) and the files they are kept in.
+"""The words every stage shares, and the files they are kept in. Nothing here imports another folder of ours.
+
+- Words: ``pose``, ``grid``, ``scan``, ``observation``, ``door``, ``room``, ``robot`` (radius and speeds, said once).
+- Cells: ``shapes`` (which cells a polygon, its outline or a doorway holds), ``arrays``.
+- Files in: ``incoming`` (the one opener), ``archives``, ``numbers``, ``names``, ``yaml_text``; out: ``files``.
+- Formats: ``rosmap``, ``map_picture``, ``geojson``, ``tum``.
+- For people: ``errors``, ``remarks`` (what was dropped, repaired, guessed), ``report``, ``nearest``, ``packages``.
+- ``options`` that commands share, ``random`` streams of one seed, ``lazy`` public faces.
 
 This is the public face: ``from closedrooms.core import OccupancyGrid, read_map``. A name is imported when it is first
 asked for, so that ``import closedrooms.core`` stays quick and loads no library.
 """
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from closedrooms.core.lazy import lazy_face
+
 if TYPE_CHECKING:
-    from closedrooms.core.door import ClosedDoor, DoorSighting
-    from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError
-    from closedrooms.core.geojson import (
-        read_doors,
-        read_features,
-        read_rooms,
-        write_doors,
-        write_features,
-        write_rooms,
-    )
-    from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-    from closedrooms.core.pose import Pose2
-    from closedrooms.core.remarks import Remark
-    from closedrooms.core.room import Room
-    from closedrooms.core.rosmap import RosMap, read_map, read_ros_map, write_map
-    from closedrooms.core.scan import LaserScan
-    from closedrooms.core.tum import read_trajectory, write_trajectory
+    from closedrooms.core.door import ClosedDoor as ClosedDoor
+    from closedrooms.core.door import DoorSighting as DoorSighting
+    from closedrooms.core.errors import ClosedroomsError as ClosedroomsError
+    from closedrooms.core.errors import InvalidInputError as InvalidInputError
+    from closedrooms.core.errors import OutputError as OutputError
+    from closedrooms.core.geojson import read_doors as read_doors
+    from closedrooms.core.geojson import read_features as read_features
+    from closedrooms.core.geojson import read_rooms as read_rooms
+    from closedrooms.core.geojson import write_doors as write_doors
+    from closedrooms.core.geojson import write_features as write_features
+    from closedrooms.core.geojson import write_rooms as write_rooms
+    from closedrooms.core.grid import FREE as FREE
+    from closedrooms.core.grid import OCCUPIED as OCCUPIED
+    from closedrooms.core.grid import UNKNOWN as UNKNOWN
+    from closedrooms.core.grid import GridFrame as GridFrame
+    from closedrooms.core.grid import OccupancyGrid as OccupancyGrid
+    from closedrooms.core.pose import Pose2 as Pose2
+    from closedrooms.core.remarks import Remark as Remark
+    from closedrooms.core.room import Room as Room
+    from closedrooms.core.rosmap import RosMap as RosMap
+    from closedrooms.core.rosmap import read_map as read_map
+    from closedrooms.core.rosmap import read_ros_map as read_ros_map
+    from closedrooms.core.rosmap import write_map as write_map
+    from closedrooms.core.scan import LaserScan as LaserScan
+    from closedrooms.core.tum import read_trajectory as read_trajectory
+    from closedrooms.core.tum import write_trajectory as write_trajectory
 
     __version__: str
 
-_HOMES = {
-    "door": ("ClosedDoor", "DoorSighting"),
-    "errors": ("ClosedroomsError", "InvalidInputError", "OutputError"),
-    "geojson": ("read_doors", "read_features", "read_rooms", "write_doors", "write_features", "write_rooms"),
-    "grid": ("FREE", "OCCUPIED", "UNKNOWN", "GridFrame", "OccupancyGrid"),
-    "pose": ("Pose2",),
-    "remarks": ("Remark",),
-    "room": ("Room",),
-    "rosmap": ("RosMap", "read_map", "read_ros_map", "write_map"),
-    "scan": ("LaserScan",),
-    "tum": ("read_trajectory", "write_trajectory"),
-}
-_HOME = {name: module for module, names in _HOMES.items() for name in names}
-
-__all__ = [
-    "FREE",
-    "OCCUPIED",
-    "UNKNOWN",
-    "ClosedDoor",
-    "ClosedroomsError",
-    "DoorSighting",
-    "GridFrame",
-    "InvalidInputError",
-    "LaserScan",
-    "OccupancyGrid",
-    "OutputError",
-    "Pose2",
-    "Remark",
-    "Room",
-    "RosMap",
-    "__version__",
-    "read_doors",
-    "read_features",
-    "read_map",
-    "read_rooms",
-    "read_ros_map",
-    "read_trajectory",
-    "write_doors",
-    "write_features",
-    "write_map",
-    "write_rooms",
-    "write_trajectory",
-]
+_load, __dir__, __all__ = lazy_face(
+    __name__,
+    {
+        "door": ("ClosedDoor", "DoorSighting"),
+        "errors": ("ClosedroomsError", "InvalidInputError", "OutputError"),
+        "geojson": ("read_doors", "read_features", "read_rooms", "write_doors", "write_features", "write_rooms"),
+        "grid": ("FREE", "OCCUPIED", "UNKNOWN", "GridFrame", "OccupancyGrid"),
+        "pose": ("Pose2",),
+        "remarks": ("Remark",),
+        "room": ("Room",),
+        "rosmap": ("RosMap", "read_map", "read_ros_map", "write_map"),
+        "scan": ("LaserScan",),
+        "tum": ("read_trajectory", "write_trajectory"),
+    },
+)
 
 
 def __getattr__(name: str) -> Any:
@@ -78,10 +67,4 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("closedrooms")
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return _load(name)

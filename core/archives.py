@@ -24,7 +24,7 @@ alike, lines of a log have stamps."""
 
 
 def read_arrays(path: Path, *, what: str, max_bytes: int = MAX_UNPACKED) -> dict[str, np.ndarray[Any, Any]]:
-    """The arrays of an untrusted ``.npz``, without pickles.
+    """Read the arrays of an untrusted ``.npz``, without pickles.
 
     The size that an array's head claims is compared with what is there before memory is taken.
 

@@ -19,8 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError
-from closedrooms.core.incoming import read_json as read_json  # noqa: PLC0414 (callers know it from here)
-from closedrooms.core.incoming import read_text as read_text  # noqa: PLC0414
+from closedrooms.core.incoming import read_json
 from closedrooms.core.names import short_name
 
 MANIFEST = "run.json"

@@ -134,7 +134,7 @@ def read_head(path: Path, *, what: str, size: int) -> bytes:
 
 
 def read_bytes(path: Path, *, what: str, max_bytes: int = MAX_TEXT) -> bytes:
-    """A whole file of bounded size.
+    """Read a whole file of bounded size.
 
     Raises:
         InvalidInputError: See :func:`opened`; larger than ``max_bytes``.
@@ -151,7 +151,7 @@ def read_bytes(path: Path, *, what: str, max_bytes: int = MAX_TEXT) -> bytes:
 
 
 def read_text(path: Path, *, what: str, max_bytes: int = MAX_TEXT) -> str:
-    """An untrusted UTF-8 text file of bounded size; a byte order mark is dropped, line ends become one character.
+    """Read an untrusted UTF-8 text file of bounded size; a byte order mark is dropped, line ends become one character.
 
     Raises:
         InvalidInputError: Missing, a folder, unreadable, too large or not text.

@@ -1,10 +1,13 @@
-"""Shapes to cells: which cells of a grid a polygon holds, and which its outline passes."""
+"""Shapes to cells: which cells of a grid a polygon holds, which its outline passes, and which lie in doorways."""
+
+from collections.abc import Sequence
 
 import numpy as np
 import shapely
 from shapely.geometry import MultiPolygon, Polygon
 
 from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame
 
 Shape = Polygon | MultiPolygon
@@ -48,17 +51,35 @@ def fill_shape(shape: Shape, frame: GridFrame, mask: BoolArray) -> None:
         mask[r, c0:c1] |= shapely.contains_xy(shape, x[c0:c1], y[r]) if asked else True
 
 
+def mark_doorways(doors: Sequence[ClosedDoor], frame: GridFrame, *, reach: float) -> BoolArray:
+    """Mark the cells of the leaves of doors and up to ``reach`` [m] before and behind; a door without leaf has none.
+
+    Args:
+        doors: In the coordinates of the frame.
+        frame: Of the mask.
+        reach: Across the leaf, from its middle [m].
+
+    Returns:
+        A mask of the frame.
+    """
+    mask = np.zeros(frame.shape, dtype=np.bool_)
+    for door in doors:
+        if door.segment is not None:
+            fill_shape(shapely.LineString(door.segment).buffer(reach, cap_style="flat"), frame, mask)
+    return mask
+
+
 def trace_outline(shape: Shape, frame: GridFrame, mask: BoolArray) -> None:
     """Mark the cells that the outline of a shape passes, one cell wide."""
     for part in shapely.get_parts(shape):
         for ring in (part.exterior, *part.interiors):
             points = shapely.get_coordinates(ring)
-            ways = np.diff(points, axis=0)
+            sides = np.diff(points, axis=0)
             # Each edge in steps of at most half a cell, all edges at once.
-            steps = np.maximum(np.ceil(np.abs(ways).max(axis=1) / frame.resolution * 2).astype(np.int64), 1)
+            steps = np.maximum(np.ceil(np.abs(sides).max(axis=1) / frame.resolution * 2).astype(np.int64), 1)
             edge = np.repeat(np.arange(len(steps)), steps + 1)
             place = np.arange(edge.size) - np.repeat(np.cumsum(steps + 1) - (steps + 1), steps + 1)
-            cells = frame.to_cells(points[edge] + (place / steps[edge])[:, None] * ways[edge])
+            cells = frame.to_cells(points[edge] + (place / steps[edge])[:, None] * sides[edge])
             cells = cells[frame.contains(cells)]
             mask[cells[:, 0], cells[:, 1]] = True
 

@@ -16,7 +16,7 @@ MAX_ALIASED = 10_000
 
 
 def parse_yaml(path: Path, *, what: str, max_bytes: int = MAX_BYTES, plain: bool = False) -> dict[str, Any]:
-    """The mapping that a YAML file holds.
+    """Parse the mapping that a YAML file holds.
 
     Args:
         path: The file.

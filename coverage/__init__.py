@@ -1,66 +1,49 @@
-"""Topological graph, coverage tour and cost estimates (paper, section 5).
+"""Topological graph, coverage tour and cost estimates (paper, section 5): ``tour_planner`` is where to begin.
 
-This is the public face: ``from closedrooms.coverage import plan_coverage``. A name is imported when it is first asked
-for, so that ``import closedrooms.coverage`` stays quick and loads no library.
+- From map to graph: ``free_space``, ``reachable_space``, ``skeleton``, ``vertex_merging``, ``graph_draft`` with
+  ``line_of_sight`` and ``grid_path``, ``graph_builder``, ``graph``.
+- From graph to tour: ``biconnected``, ``exact_tour``, ``routing``, ``local_search``, ``lower_bound``, ``tour``.
+- For robots and files: ``drivable_path``, ``ros_tour``, ``tour_features``.
+- What a map tells of the cost: ``estimates``, ``room_count``.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from closedrooms.core.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from closedrooms.coverage.config import CoverageConfig, GraphConfig, TourConfig
-    from closedrooms.coverage.drivable_path import DrivablePath, find_drivable_paths
-    from closedrooms.coverage.estimates import CoverageErrors, compare_lengths, compare_tours
-    from closedrooms.coverage.graph import TopologicalGraph, make_graph
-    from closedrooms.coverage.graph_builder import BuiltGraph, build_graph
-    from closedrooms.coverage.room_count import count_rooms
-    from closedrooms.coverage.ros_tour import write_path_message, write_waypoints
-    from closedrooms.coverage.tour import CoverageTour
-    from closedrooms.coverage.tour_features import make_tour_features
-    from closedrooms.coverage.tour_planner import plan_coverage, solve_tour
+    from closedrooms.coverage.config import CoverageConfig as CoverageConfig
+    from closedrooms.coverage.config import GraphConfig as GraphConfig
+    from closedrooms.coverage.config import TourConfig as TourConfig
+    from closedrooms.coverage.drivable_path import DrivablePath as DrivablePath
+    from closedrooms.coverage.drivable_path import find_drivable_paths as find_drivable_paths
+    from closedrooms.coverage.estimates import CoverageErrors as CoverageErrors
+    from closedrooms.coverage.estimates import compare_lengths as compare_lengths
+    from closedrooms.coverage.estimates import compare_tours as compare_tours
+    from closedrooms.coverage.graph import TopologicalGraph as TopologicalGraph
+    from closedrooms.coverage.graph import make_graph as make_graph
+    from closedrooms.coverage.graph_builder import BuiltGraph as BuiltGraph
+    from closedrooms.coverage.graph_builder import build_graph as build_graph
+    from closedrooms.coverage.room_count import count_rooms as count_rooms
+    from closedrooms.coverage.ros_tour import write_path_message as write_path_message
+    from closedrooms.coverage.ros_tour import write_waypoints as write_waypoints
+    from closedrooms.coverage.tour import CoverageTour as CoverageTour
+    from closedrooms.coverage.tour_features import make_tour_features as make_tour_features
+    from closedrooms.coverage.tour_planner import plan_coverage as plan_coverage
+    from closedrooms.coverage.tour_planner import solve_tour as solve_tour
 
-_HOMES = {
-    "config": ("CoverageConfig", "GraphConfig", "TourConfig"),
-    "drivable_path": ("DrivablePath", "find_drivable_paths"),
-    "estimates": ("CoverageErrors", "compare_lengths", "compare_tours"),
-    "graph": ("TopologicalGraph", "make_graph"),
-    "graph_builder": ("BuiltGraph", "build_graph"),
-    "room_count": ("count_rooms",),
-    "ros_tour": ("write_path_message", "write_waypoints"),
-    "tour": ("CoverageTour",),
-    "tour_features": ("make_tour_features",),
-    "tour_planner": ("plan_coverage", "solve_tour"),
-}
-_HOME = {name: module for module, names in _HOMES.items() for name in names}
-
-__all__ = [
-    "BuiltGraph",
-    "CoverageConfig",
-    "CoverageErrors",
-    "CoverageTour",
-    "DrivablePath",
-    "GraphConfig",
-    "TopologicalGraph",
-    "TourConfig",
-    "build_graph",
-    "compare_lengths",
-    "compare_tours",
-    "count_rooms",
-    "find_drivable_paths",
-    "make_graph",
-    "make_tour_features",
-    "plan_coverage",
-    "solve_tour",
-    "write_path_message",
-    "write_waypoints",
-]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__, __all__ = lazy_face(
+    __name__,
+    {
+        "config": ("CoverageConfig", "GraphConfig", "TourConfig"),
+        "drivable_path": ("DrivablePath", "find_drivable_paths"),
+        "estimates": ("CoverageErrors", "compare_lengths", "compare_tours"),
+        "graph": ("TopologicalGraph", "make_graph"),
+        "graph_builder": ("BuiltGraph", "build_graph"),
+        "room_count": ("count_rooms",),
+        "ros_tour": ("write_path_message", "write_waypoints"),
+        "tour": ("CoverageTour",),
+        "tour_features": ("make_tour_features",),
+        "tour_planner": ("plan_coverage", "solve_tour"),
+    },
+)

@@ -36,7 +36,7 @@ class Metric:
         return self.trace([*tour, tour[0]])
 
     def trace(self, stops: list[int]) -> list[int]:
-        """The walk over vertices of the graph that visits the positions ``stops`` in turn."""
+        """Trace the walk over vertices of the graph that visits the positions ``stops`` in turn."""
         path = [stops[0]]
         for a, b in pairwise(stops):
             piece, stop = [], b
@@ -66,7 +66,7 @@ def measure_paths(graph: TopologicalGraph, members: list[int]) -> Metric:
 
 
 def find_blocks(graph: TopologicalGraph, members: list[int]) -> list[list[int]]:
-    """The blocks (biconnected components) of one connected part, each sorted, in a fixed order."""
+    """Find the blocks (biconnected components) of one connected part, each sorted, in a fixed order."""
     found: Any = nx.biconnected_components(graph.subgraph(members))
     blocks: list[list[int]] = [sorted(block) for block in found]
     return sorted(blocks)

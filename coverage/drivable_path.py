@@ -31,7 +31,7 @@ class DrivablePath:
 
 
 def find_drivable_paths(grid: OccupancyGrid, tour: CoverageTour, radius: float) -> list[DrivablePath]:
-    """The poses of a tour, one path for each unconnected part of it.
+    """Find the poses of a tour, one path for each unconnected part of it.
 
     Edges lead around furniture already. A closed door is approached as far as the robot fits.
 
@@ -67,7 +67,7 @@ def find_drivable_paths(grid: OccupancyGrid, tour: CoverageTour, radius: float) 
 
 
 def _split_at_gaps(path: FloatArray) -> Iterator[FloatArray]:
-    """The walks of a tour's path, between which stand rows of NaN."""
+    """Split a tour's path into its walks, between which stand rows of NaN."""
     gaps = np.flatnonzero(np.isnan(path[:, 0]))
     for walk in np.split(path, gaps):
         yield walk[~np.isnan(walk[:, 0])]

@@ -9,7 +9,7 @@ MOST_PLACES = 12
 
 
 def find_shortest_tour(distances: FloatArray) -> list[int]:
-    """The shortest closed tour from place 0 over all places.
+    """Find the shortest closed tour from place 0 over all places.
 
     ``cost[s, j]`` is the shortest path from place 0 over the places of subset ``s`` that ends at ``j``, one of them.
 

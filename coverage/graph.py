@@ -79,7 +79,7 @@ def make_graph(
     polylines: Sequence[FloatArray] = (),
     map_name: str | None = None,
 ) -> TopologicalGraph:
-    """A topological graph from arrays.
+    """Make a topological graph from arrays.
 
     Args:
         vertices: Positions in the map frame [m], shape (n, 2).

@@ -46,7 +46,7 @@ def build_graph(
     start: Point | None = None,
     map_name: str | None = None,
 ) -> BuiltGraph:
-    """The topological graph of what is free, with a vertex at every closed door.
+    """Build the topological graph of what is free, with a vertex at every closed door.
 
     Args:
         grid: M, M_pred or M_GT.

@@ -107,12 +107,12 @@ class GraphDraft:
         return start[None] if path is None else path
 
     def add_edge(self, u: int, v: int, polyline: FloatArray) -> None:
-        """An edge from ``u`` to ``v``; of two between the same vertices the first stays."""
+        """Add an edge from ``u`` to ``v``; of two between the same vertices the first stays."""
         if u != v and (u, v) not in self.edges and (v, u) not in self.edges:
             self.edges[u, v] = polyline
 
     def split_edge(self, edge: tuple[int, int], point: FloatArray) -> int:
-        """A new vertex on an edge."""
+        """Put a new vertex on an edge."""
         u, v = edge
         polyline = self.edges.pop(edge)
         middle = int(np.argmin(((polyline - point) ** 2).sum(axis=1)))
@@ -136,7 +136,7 @@ class GraphDraft:
 
 
 def add_doors(draft: GraphDraft, doors: Sequence[ClosedDoor], voronoi: VoronoiGraph, config: GraphConfig) -> list[str]:
-    """A vertex at every closed door, joined to the nearest place of the graph that is visible from it.
+    """Add a vertex at every closed door, joined to the nearest place of the graph that is visible from it.
 
     A door stands in an obstacle: its edge may cross the cells of its own leaf and of the wall that it hangs in.
 

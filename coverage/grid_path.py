@@ -15,7 +15,7 @@ WIDTHS = (15, 50)
 
 
 def find_path_along(chain: IntArray, start: IntArray, goal: IntArray, cells: BoolArray) -> IntArray | None:
-    """A path over some cells, near a chain where there is one.
+    """Find a path over some cells, near a chain where there is one.
 
     Args:
         chain: Cells (row, col) to follow, shape (n, 2).
@@ -46,7 +46,7 @@ def find_path_along(chain: IntArray, start: IntArray, goal: IntArray, cells: Boo
 
 
 def find_shortest_path(start: IntArray, goal: IntArray, cells: BoolArray) -> IntArray | None:
-    """The shortest path between two cells over cells and their eight neighbours (A*), or ``None``.
+    """Find the shortest path between two cells over cells and their eight neighbours (A*), or ``None``.
 
     Args:
         start: First cell (row, col).

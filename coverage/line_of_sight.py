@@ -7,7 +7,7 @@ from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 
 
 def find_cells_between(a: FloatArray, b: FloatArray) -> IntArray:
-    """Cells (row, col) whose inside the segment from ``a`` to ``b`` crosses, exact.
+    """Find cells (row, col) whose inside the segment from ``a`` to ``b`` crosses, exact.
 
     Args:
         a: Start as (row, col) in continuous cells, cell (0, 0) from 0 to 1.

@@ -35,7 +35,7 @@ class ReachableSpace:
 
 
 def find_reachable(free: BoolArray, radius: float) -> ReachableSpace:
-    """Where a disc of ``radius`` cells stands on free cells only; what is unknown may hold an obstacle.
+    """Find where a disc of ``radius`` cells stands on free cells only; what is unknown may hold an obstacle.
 
     A wall seen in pieces holds as far as the gaps between them are narrower than the robot.
 
@@ -71,7 +71,7 @@ def part_where_labels_meet(mask: BoolArray, labels: IntArray) -> BoolArray:
 
 
 def find_outside(free: BoolArray, occupied: BoolArray, resolution: float) -> BoolArray:
-    """Free cells that rays reached through windows: open country, with hardly a wall around it.
+    """Find free cells that rays reached through windows: open country, with hardly a wall around it.
 
     From a cell inside of a building nearly every direction ends at something seen; from one outside most directions
     end where no ray came. Regions of such cells are outside when their rim, but for where they go over into the rest

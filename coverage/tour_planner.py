@@ -72,7 +72,7 @@ def plan_coverage(
 
 
 def solve_tour(graph: TopologicalGraph, config: TourConfig | None = None, *, start: int = 0) -> CoverageTour:
-    """A short closed walk over all vertices of a graph; of each unconnected part, one after the other.
+    """Find a short closed walk over all vertices of a graph; of each unconnected part, one after the other.
 
     Args:
         graph: At least one vertex.

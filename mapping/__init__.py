@@ -1,51 +1,35 @@
-"""SLAM and nothing else: scans and odometry in, poses, the map and closed doors out.
+"""SLAM and nothing else: scans and odometry in, poses, the map and closed doors out; ``mapper`` is where to begin.
 
-The names below are loaded when they are first asked for: importing the package is quick.
+- A scan: ``beams``, ``scan_preparation``, ``visibility``; where it fits: ``matching/``.
+- Motion: ``motion``, ``motion_prediction``, ``scan_odometry`` (robots that recorded none), ``mapping_events``.
+- Surroundings: ``local_map``, ``lattice``, ``growing_array``; poses of keyframes: ``graph/``.
+- The map: ``log_odds_grid``, ``door_fusion``, ``trajectory``.
+- Recorded runs: ``logs/`` reads them (rosbags too), ``map_builder`` maps them.
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from closedrooms.core.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from closedrooms.mapping.config import LoopConfig, MapperConfig, MatcherConfig, RecoveryConfig
-    from closedrooms.mapping.keyframe import Keyframe
-    from closedrooms.mapping.mapper import Mapper
-    from closedrooms.mapping.scan_preparation import Sweep, sweeps
-    from closedrooms.mapping.trajectory import align, ate
+    from closedrooms.mapping.config import LoopConfig as LoopConfig
+    from closedrooms.mapping.config import MapperConfig as MapperConfig
+    from closedrooms.mapping.config import MatcherConfig as MatcherConfig
+    from closedrooms.mapping.config import RecoveryConfig as RecoveryConfig
+    from closedrooms.mapping.graph.keyframe import Keyframe as Keyframe
+    from closedrooms.mapping.mapper import Mapper as Mapper
+    from closedrooms.mapping.scan_preparation import Sweep as Sweep
+    from closedrooms.mapping.scan_preparation import sweeps as sweeps
+    from closedrooms.mapping.trajectory import align as align
+    from closedrooms.mapping.trajectory import ate as ate
 
-__all__ = [
-    "Keyframe",
-    "LoopConfig",
-    "Mapper",
-    "MapperConfig",
-    "MatcherConfig",
-    "RecoveryConfig",
-    "Sweep",
-    "align",
-    "ate",
-    "sweeps",
-]
-
-_MODULES = {
-    "Keyframe": "keyframe",
-    "LoopConfig": "config",
-    "Mapper": "mapper",
-    "MapperConfig": "config",
-    "MatcherConfig": "config",
-    "RecoveryConfig": "config",
-    "Sweep": "scan_preparation",
-    "align": "trajectory",
-    "ate": "trajectory",
-    "sweeps": "scan_preparation",
-}
-
-
-def __getattr__(name: str) -> Any:
-    """Load a public name from its module (PEP 562)."""
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{_MODULES[name]}"), name)
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__, __all__ = lazy_face(
+    __name__,
+    {
+        "config": ("LoopConfig", "MapperConfig", "MatcherConfig", "RecoveryConfig"),
+        "graph.keyframe": ("Keyframe",),
+        "mapper": ("Mapper",),
+        "scan_preparation": ("Sweep", "sweeps"),
+        "trajectory": ("align", "ate"),
+    },
+)

@@ -60,7 +60,7 @@ class MatcherConfig:
     """Largest half width of the search window [rad]."""
 
     odometry_distance: float = 0.08
-    """Standard deviation of the odometry after 1 m [m]; its variance grows with the way."""
+    """Standard deviation of the odometry after 1 m [m]; its variance grows with the distance."""
 
     odometry_turn_per_metre: float = 0.07
     """Standard deviation of the odometry's heading after 1 m [rad]."""
@@ -112,13 +112,13 @@ class LoopConfig:
     """Distance around the older keyframe from which surfaces are taken [m]."""
 
     recent_distance: float = 3.0
-    """Way before the present keyframe that is matched with it [m]."""
+    """Distance travelled before the present keyframe whose surfaces are matched with it [m]."""
 
     max_points: int = 500
     """Most points that are matched."""
 
     min_score: float = 0.60
-    """Mean likelihood [0..1] of the recent way on the older surfaces that a loop must reach."""
+    """Mean likelihood [0..1] of the recent path on the older surfaces that a loop must reach."""
 
     max_rival: float = 0.9
     """Score of the best other place in the window, as a share of the loop's, above which the loop is ambiguous and not
@@ -131,10 +131,10 @@ class LoopConfig:
     """Weight [0..1] after optimisation below which a loop contradicts the rest and is taken back."""
 
     link_distance: float = 2.5
-    """Distance up to which the present keyframe is also tied to an older one that it was matched against [m]."""
+    """Distance up to which an edge also joins the present keyframe to an older one that it was matched against [m]."""
 
     link_interval: float = 1.0
-    """Way between two such ties [m]."""
+    """Distance travelled between two such edges [m]."""
 
     point_information: float = 2.0
     """Information of a match per unit of the field's curvature; gives about 1.5 cm in a room."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
-from closedrooms.mapping.keyframe import Keyframe
+from closedrooms.mapping.graph.keyframe import Keyframe
 
 NEAR = 1.0
 """Distance [m] below which a sighting does not get more trustworthy: heading errors no longer matter."""

@@ -6,8 +6,8 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.keyframe import Keyframe
-from closedrooms.mapping.likelihood_field import LikelihoodField
+from closedrooms.mapping.graph.keyframe import Keyframe
+from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 
 HYSTERESIS = 1.5
 """Horizons after which a keyframe has to leave the field; one horizon lets it in. Saves stamping at the border."""

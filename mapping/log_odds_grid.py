@@ -85,7 +85,7 @@ class EvidenceGrid:
         self._count(window, mask, imprint.hits, sign)
 
     def _draw(self, scans: Sequence[tuple[Beams, Pose2]]) -> Iterator[tuple[Window, Mask, IntArray]]:
-        """The window of each scan that crossed anything, its crossed cells and flat indices of those hit.
+        """Draw the window of each scan that crossed anything, its crossed cells and flat indices of those hit.
 
         The arrays grow to hold them all.
         """

@@ -15,17 +15,17 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.beams import Beams, clean, hit_points, matched_range, thin
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.door_fusion import fuse_doors
-from closedrooms.mapping.gauss_newton_matcher import refine
-from closedrooms.mapping.keyframe import Keyframe
-from closedrooms.mapping.keyframe_graph import KeyframeGraph
+from closedrooms.mapping.graph.keyframe import Keyframe
+from closedrooms.mapping.graph.keyframe_graph import KeyframeGraph
+from closedrooms.mapping.graph.pose_graph import Edge
 from closedrooms.mapping.local_map import LocalMap
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
 from closedrooms.mapping.mapping_events import Event, EventLog
+from closedrooms.mapping.matching.gauss_newton_matcher import refine
+from closedrooms.mapping.matching.relocalisation import relocalise
+from closedrooms.mapping.matching.scan_matcher import ADVANTAGE, Match, match_scan
 from closedrooms.mapping.motion import Motion
 from closedrooms.mapping.motion_prediction import MotionPrediction
-from closedrooms.mapping.pose_graph import Edge
-from closedrooms.mapping.relocalisation import relocalise
-from closedrooms.mapping.scan_matcher import ADVANTAGE, Match, match_scan
 from closedrooms.mapping.scan_preparation import Sweep
 from closedrooms.mapping.visibility import conflict
 

@@ -36,7 +36,7 @@ class EventLog:
         self._times.setdefault(event, []).append(stamp)
 
     def count(self, event: Event) -> int:
-        """How often it happened."""
+        """Count how often an event happened."""
         return len(self._times.get(event, ()))
 
     def remarks(self) -> tuple[Remark, ...]:

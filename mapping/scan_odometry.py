@@ -8,9 +8,9 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.correlative_matcher import Search, Window
-from closedrooms.mapping.gauss_newton_matcher import refine
-from closedrooms.mapping.likelihood_field import LikelihoodField
+from closedrooms.mapping.matching.correlative_matcher import Search, Window
+from closedrooms.mapping.matching.gauss_newton_matcher import refine
+from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 
 DISTANCE_RATE, ANGLE_RATE = 0.5, 0.3
 """How fast ([m/s], [rad/s]) a robot strays from going on as before: half an indoor robot's speed."""

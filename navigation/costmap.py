@@ -163,13 +163,6 @@ class NavigationMap:
         self.free[at] = pooled(free[own], small) & (1 - self.blocked[at])
 
 
-def build_costmap(grid: OccupancyGrid, config: RobotNavigation) -> Costmap:
-    """The planning grid of a map, once."""
-    navigation = NavigationMap(config)
-    navigation.update(grid)
-    return navigation.costmap
-
-
 def clearance_field(free: Image, blocked: Image, resolution: float) -> Field:
     """Distance of every free cell's centre from the nearest occupied cell's edge [m], 0 where not free."""
     field: Any = cv2.distanceTransform(1 - blocked, cv2.DIST_L2, 5)

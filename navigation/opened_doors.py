@@ -3,16 +3,13 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-import numpy as np
-import shapely
-
-from closedrooms.core.arrays import BoolArray
 from closedrooms.core.door import ClosedDoor, DoorSighting
-from closedrooms.core.grid import UNKNOWN, GridFrame, OccupancyGrid
+from closedrooms.core.grid import UNKNOWN, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
+from closedrooms.core.shapes import mark_doorways
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.keyframe import Keyframe
+from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
 from closedrooms.navigation.control_loop import MapMaker
 
@@ -63,7 +60,7 @@ class ReopenedMap:
             return grid
         self._draw()
         since = self._since.grid().on(grid.frame)
-        doorways = doorway_cells(self._doors, grid.frame, LEAF_REACH)
+        doorways = mark_doorways(self._doors, grid.frame, reach=LEAF_REACH)
         cells = grid.cells.copy()
         cells[doorways & ~grid.free] = UNKNOWN
         fresh = doorways & since.known
@@ -79,18 +76,3 @@ class ReopenedMap:
                     self._since.add(keyframe.beams, drawn, sign=-1)
                 self._since.add(keyframe.beams, keyframe.pose)
                 self._drawn[keyframe.index] = keyframe.pose
-
-
-def doorway_cells(doors: Sequence[ClosedDoor], frame: GridFrame, reach: float) -> BoolArray:
-    """Cells whose middle lies where a closed leaf was, or up to ``reach`` [m] before or behind it."""
-    mask = np.zeros(frame.shape, dtype=np.bool_)
-    for door in doors:
-        if door.segment is None:
-            continue
-        strip = shapely.LineString(door.segment).buffer(reach, cap_style="flat")
-        corners = frame.to_cells(np.reshape(strip.bounds, (2, 2)))
-        corners[1] += 1
-        (r0, c0), (r1, c1) = np.clip(corners, 0, frame.shape).tolist()
-        points = frame.to_points(np.moveaxis(np.mgrid[r0:r1, c0:c1], 0, -1))
-        mask[r0:r1, c0:c1] |= shapely.contains_xy(strip, points[..., 0], points[..., 1])
-    return mask

@@ -24,12 +24,10 @@ class Path:
     Attributes:
         points: Corners in the map frame, shape (n, 2), n >= 1 [m].
         cost: Length weighted by closeness to obstacles [m].
-        goal_cell: Coarse cell ``(row, col)`` where it ends.
     """
 
     points: FloatArray
     cost: float
-    goal_cell: tuple[int, int]
 
     @property
     def length(self) -> float:
@@ -66,7 +64,7 @@ def start_cell(costmap: Costmap, fits: BoolArray, start: Point) -> tuple[int, in
 
 
 def plan_path(costmap: Costmap, start: Point, goals: BoolArray, config: RobotNavigation) -> Path | None:
-    """The cheapest path from ``start`` to the nearest of several goals.
+    """Plan the cheapest path from ``start`` to the nearest of several goals.
 
     Args:
         costmap: Planning grid.
@@ -148,7 +146,7 @@ class Search:
         cells = np.array(self._search.traceback((row, col)), dtype=np.int64) + self._corner
         points = np.vstack((np.array(self._start), self._costmap.anchors(cells)))
         points = straighten(points, self._costmap, self._config)
-        return Path(points, float(self._costs[row, col]), (int(cell[0]), int(cell[1])))
+        return Path(points, float(self._costs[row, col]))
 
     @property
     def _corner(self) -> IntArray:

@@ -88,7 +88,7 @@ class RemainingTour:
     def solve_again(
         self, grid: OccupancyGrid, here: Point, done: FloatArray, config: CoverageConfig, *, reach: float
     ) -> bool:
-        """A new tour over what is left of a revised map, from ``here`` to home.
+        """Plan a new tour over what is left of a revised map, from ``here`` to home.
 
         Args:
             grid: The revised map, completed.

@@ -8,7 +8,7 @@ import numpy as np
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.navigation.opened_doors import doorway_cells
+from closedrooms.core.shapes import mark_doorways
 from closedrooms.navigation.prediction_monitor import SURPRISE, PredictionMonitor, difference
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.predictor.revision import Predict, overlay, update
@@ -65,7 +65,7 @@ class RevisedPrediction:
     def completed(self, grid: OccupancyGrid) -> OccupancyGrid:
         """Complete the map: predicted where it is unknown, and doorways open where nothing was seen in them."""
         completed = overlay(self.now, grid)
-        doorways = doorway_cells(self._doors, completed.frame, DOORWAY) & ~grid.on(completed.frame).occupied
+        doorways = mark_doorways(self._doors, completed.frame, reach=DOORWAY) & ~grid.on(completed.frame).occupied
         return OccupancyGrid(completed.frame, np.where(doorways, FREE, completed.cells))
 
     def is_wrong(self, grid: OccupancyGrid) -> bool:

@@ -1,5 +1,11 @@
 """Whole jobs: a run in a simulated building, and each of its stages on anybody's files.
 
+- One command a file: ``run``, ``predict``, ``map``, ``cover``, ``propose_doors``, ``world_files``; their options:
+  ``config``, ``propose_doors_config``.
+- Parts of a run: ``survey`` (explore and map), ``bounds``, ``drive``, ``run_log``, ``stopwatch``, ``manifest``.
+- What came of it: ``scores``, ``run_metrics``, ``report``, ``drive_report``; told while it works: ``progress``,
+  ``live_recording``, ``log_observer``.
+
 The main job is ``closedrooms.pipeline.run.run``: it is named like its module and so stands there.
 """
 

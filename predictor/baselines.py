@@ -157,8 +157,8 @@ def _faces_in_sight(start: Start, room: int) -> Shape:
 
 
 def _in_sight(inner: shapely.STRtree, eye: FloatArray, face: Polygon) -> bool:
-    """Whether the way from the door to the centre of a face crosses inner faces only."""
-    way = shapely.LineString((eye, face.centroid.coords[0]))
-    crossed = inner.geometries[inner.query(way, predicate="intersects")]
-    inside = float(shapely.length(shapely.intersection(way, crossed)).sum())
-    return inside >= way.length - 0.1
+    """Tell whether the straight path from the door to the centre of a face crosses inner faces only."""
+    path = shapely.LineString((eye, face.centroid.coords[0]))
+    crossed = inner.geometries[inner.query(path, predicate="intersects")]
+    inside = float(shapely.length(shapely.intersection(path, crossed)).sum())
+    return inside >= path.length - 0.1

@@ -34,13 +34,13 @@ def complete_map(
         facing: The doors that lead there, others too.
         config: How wide passages are, and how far free space is looked for.
     """
-    ways = {door.door.id: door for door in facing}
+    facing_by_id = {door.door.id: door for door in facing}
     passages = [
-        find_passage(seen, room.polygon, ways[door], width=config.door_width, reach=config.door_reach)
+        find_passage(seen, room.polygon, facing_by_id[door], width=config.door_width, reach=config.door_reach)
         for room in rooms
         for door in room.doors
     ]
-    return inpaint(grid, [room.polygon for room in rooms], [way for way in passages if not way.is_empty])
+    return inpaint(grid, [room.polygon for room in rooms], [passage for passage in passages if not passage.is_empty])
 
 
 def inpaint(grid: OccupancyGrid, shapes: Sequence[Shape], passages: Sequence[Shape]) -> OccupancyGrid:
@@ -94,7 +94,7 @@ def find_passage(grid: OccupancyGrid, room: Shape, door: FacingDoor, *, width: f
     Args:
         grid: The input map.
         room: Free interior of the room [m].
-        door: And the way into the room.
+        door: And the direction into the room.
         width: Of the passage [m] (section 3.7: 0.80 m).
         reach: How far free space is looked for on either side [m].
 

@@ -18,7 +18,7 @@ from closedrooms.core.arrays import BoolArray, IntArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.core.shapes import Shape, cells_inside, fill_shape
+from closedrooms.core.shapes import Shape, cells_inside, mark_doorways
 from closedrooms.predictor.disjoint_rooms import part_rooms
 from closedrooms.predictor.inpainting import inpaint
 from closedrooms.predictor.prediction import Prediction
@@ -117,7 +117,7 @@ def overlay(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedD
     frame = prediction.grid.frame.covering(*grid.frame.bounds)
     now, before = grid.on(frame), prediction.grid.on(frame)
     cells = np.where(now.unknown, before.cells, now.cells)
-    cells[_mark_doorways(doors, frame) & before.free & now.occupied] = FREE
+    cells[mark_doorways(doors, frame, reach=DOORWAY_DEPTH) & before.free & now.occupied] = FREE
     return OccupancyGrid(frame, cells)
 
 
@@ -148,21 +148,11 @@ def _prepare(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[Closed
     for room in rooms:
         masks.append(cells_inside(room.polygon, frame))
         own = [door for door in doors if door.id in room.doors]
-        thresholds.append(_mark_doorways(own, frame, beyond=THRESHOLD))
-        doorways.append(_mark_doorways(own, frame))
-    all_doorways = _mark_doorways(doors, frame)
+        thresholds.append(mark_doorways(own, frame, reach=DOORWAY_DEPTH + THRESHOLD))
+        doorways.append(mark_doorways(own, frame, reach=DOORWAY_DEPTH))
+    all_doorways = mark_doorways(doors, frame, reach=DOORWAY_DEPTH)
     before, now = prediction.grid.on(frame), grid.on(frame)
     return _Scene(frame, before, now, rooms, masks, thresholds, doorways, all_doorways)
-
-
-def _mark_doorways(doors: Sequence[ClosedDoor], frame: GridFrame, *, beyond: float = 0.0) -> BoolArray:
-    """Mark the cells of the doors' leaves and a little before and behind them, and ``beyond`` that [m]."""
-    mask = np.zeros(frame.shape, dtype=np.bool_)
-    for door in doors:
-        if door.segment is not None:
-            line = shapely.LineString(door.segment)
-            fill_shape(line.buffer(DOORWAY_DEPTH + beyond, cap_style="flat"), frame, mask)
-    return mask
 
 
 def _open_doorways(completed: OccupancyGrid, scene: _Scene, observed: list[BoolArray]) -> OccupancyGrid:

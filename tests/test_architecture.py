@@ -163,3 +163,48 @@ def test_nothing_outside_core_opens_a_file_by_itself() -> None:
             if found:
                 strange[name] = sorted(found)
     assert not strange, f"core.incoming opens files: {strange}"
+
+
+def read_outside_validation(tree: ast.AST) -> set[str]:
+    """Names of the attributes that are read anywhere but in ``__post_init__``, where a configuration checks itself."""
+    names = set()
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.FunctionDef) and node.name == "__post_init__":
+            continue
+        if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load):
+            names.add(node.attr)
+        names |= read_outside_validation(node)
+    return names
+
+
+def configuration_fields(tree: ast.AST) -> set[tuple[str, str]]:
+    """Class and name of every field of a class whose name ends in ``Config`` or ``Options``."""
+    classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+    return {
+        (node.name, field.target.id)
+        for node in classes
+        if node.name.endswith(("Config", "Options"))
+        for field in node.body
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+    }
+
+
+def test_a_field_that_only_its_own_check_reads_is_told_apart() -> None:
+    tree = ast.parse(
+        "class AConfig:\n a: int\n b: int\n def __post_init__(self):\n  check(self.a, self.b)\n"
+        "def use(config): return config.b"
+    )
+    assert configuration_fields(tree) == {("AConfig", "a"), ("AConfig", "b")}
+    assert read_outside_validation(tree) == {"b"}
+
+
+# Read by tyro itself, through the word on the line.
+READ_BY_NAME = {("SharedOptions", "help_all")}
+
+
+def test_every_field_of_every_configuration_is_read() -> None:
+    trees = [ast.parse(path.read_text()) for path in modules().values()]
+    fields = set().union(*(configuration_fields(tree) for tree in trees))
+    read = set().union(*(read_outside_validation(tree) for tree in trees))
+    assert len(fields) > 100
+    assert {field for field in fields if field[1] not in read} <= READ_BY_NAME

@@ -70,7 +70,7 @@ def draw_plan(plan: FloorPlan, path_png: str | Path, *, closed: Collection[str] 
 
 
 def _write_title(figure: Any, name: str, rest: str) -> None:
-    """The name and figures of a plan, the name shortened until the line fits into the picture."""
+    """Write the name and figures of a plan, the name shortened until the line fits into the picture."""
     room = int(figure.get_figwidth() * CHARACTERS_PER_INCH) - len(rest) - 3
     size = 10.0
     if room < SHORTEST_NAME:
@@ -110,7 +110,7 @@ def _draw_door(axes: Any, plan: FloorPlan, door: PlanDoor, *, closed: bool) -> N
 
 
 def _draw_swing(axes: Any, plan: FloorPlan, door: PlanDoor) -> None:
-    """The leaf at 90 degrees in the room that it opens into, and the arc of its edge."""
+    """Draw the leaf at 90 degrees in the room that it opens into, and the arc of its edge."""
     import numpy as np
 
     hinge = np.array(door.segment[door.hinge])

@@ -43,7 +43,7 @@ def closable_rooms(plan: FloorPlan, *, several_doors: bool = False) -> dict[str,
 def draw_closed(
     plan: FloorPlan, count: int, rng: np.random.Generator, *, several_doors: bool = False
 ) -> tuple[str, ...]:
-    """Doors that close ``count`` rooms drawn by ``rng``, in plan order.
+    """Draw doors that close ``count`` rooms drawn by ``rng``, in plan order.
 
     Rooms drawn early are the same whatever ``count`` is, so that a series of growing counts is nested.
 

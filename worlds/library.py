@@ -47,7 +47,7 @@ def bundled_names() -> list[str]:
 
 
 def load_world(name_or_path: str, *, level: str | None = None) -> "FloorPlan":
-    """A bundled world by its name, or a file of any known format, told by its content.
+    """Load a bundled world by its name, or a file of any known format, told by its content.
 
     Doors to the outside are walled up (``meta["sealed"]``) and open outlines closed: a robot that maps a floor must
     not leave it. What was dropped, repaired or guessed on reading is in the plan's ``remarks``.
@@ -83,7 +83,7 @@ def read_world(name_or_path: str, *, level: str | None = None) -> "FloorPlan":
 
 
 def split_level(given: str, level: str | None = None) -> tuple[Path, str | None]:
-    """The file and the floor that ``FILE`` or ``FILE:LEVEL`` names.
+    """Split ``FILE`` or ``FILE:LEVEL`` into the file and the floor that it names.
 
     Raises:
         InvalidInputError: There is no such file, or ``level`` is another one.

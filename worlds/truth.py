@@ -18,7 +18,7 @@ from closedrooms.worlds.plan import FloorPlan
 
 
 def rasterise(plan: FloorPlan, frame: GridFrame, map_T_world: Pose2) -> OccupancyGrid:
-    """The true map: doors open, no leaves, no furniture.
+    """Rasterise the true map: doors open, no leaves, no furniture.
 
     A cell is occupied when its centre lies in a wall, else free when it lies in a room or in a passage between
     rooms, else unknown.

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError
-from closedrooms.core.files import MANIFEST, read_json, write_bytes, write_json
+from closedrooms.core.files import MANIFEST, write_bytes, write_json
+from closedrooms.core.incoming import read_json
 from closedrooms.core.report import Report
 from closedrooms.experiments.dataset.card import card
 from closedrooms.experiments.dataset.checksums import check

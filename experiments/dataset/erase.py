@@ -24,7 +24,7 @@ from closedrooms.experiments.dataset.open_survey import OpenSurvey
 from closedrooms.experiments.dataset.rays import first_hits
 from closedrooms.mapping.beams import clean
 from closedrooms.mapping.door_fusion import fuse_doors
-from closedrooms.mapping.keyframe import Keyframe
+from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.log_odds_grid import EvidenceGrid, Imprint
 from closedrooms.sim.building import building_solids
 from closedrooms.sim.contacts import edges_of, leaf_edges

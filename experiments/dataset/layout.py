@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError
-from closedrooms.core.files import MANIFEST, PROGRAM, read_json, write_bytes, write_json
+from closedrooms.core.files import MANIFEST, PROGRAM, write_bytes, write_json
+from closedrooms.core.incoming import read_json
 from closedrooms.experiments.dataset.checksums import digest
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.sample import FORMAT, NOT_CONTENT, SURVEYS

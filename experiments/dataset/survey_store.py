@@ -6,7 +6,8 @@ from typing import Any
 
 from closedrooms.core.archives import read_arrays
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import MANIFEST, output_folder, read_json
+from closedrooms.core.files import MANIFEST, output_folder
+from closedrooms.core.incoming import read_json
 from closedrooms.core.tum import read_trajectory, write_trajectory
 from closedrooms.experiments.dataset.checksums import checksums
 from closedrooms.experiments.dataset.config import DatasetConfig

@@ -8,9 +8,10 @@ import numpy as np
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import MANIFEST, read_json
+from closedrooms.core.files import MANIFEST
 from closedrooms.core.geojson import read_doors, read_rooms
 from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.incoming import read_json
 from closedrooms.core.numbers import repr_of
 from closedrooms.core.room import Room
 from closedrooms.core.rosmap import read_map

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
+from closedrooms.core.shapes import cells_inside
 
 # How hidden rooms are told apart on a true map, as measured on the authors' maps (cells of 0.05 m there): closing of
 # the hidden area, least distance of a seed from its edge, least area of a room.
@@ -65,23 +65,7 @@ def _pieces(labels: npt.NDArray[Any], least: float) -> list[BoolArray]:
 
 def room_masks(rooms: Sequence[Room], frame: GridFrame) -> list[BoolArray]:
     """Cells whose centre lies in each room, one mask a room, shape ``frame.shape``."""
-    return [_inside(room.polygon, frame) for room in rooms]
-
-
-def _inside(area: BaseGeometry, frame: GridFrame) -> BoolArray:
-    import shapely
-
-    mask = np.zeros(frame.shape, dtype=np.bool_)
-    x_min, y_min, x_max, y_max = area.bounds
-    low = np.maximum(frame.to_cells(np.array([x_min, y_min])), 0)
-    high = np.minimum(frame.to_cells(np.array([x_max, y_max])) + 1, frame.shape)
-    if (high <= low).any():
-        return mask
-    rows, cols = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]), indexing="ij")
-    centres = frame.to_points(np.stack((rows, cols), axis=-1))
-    shapely.prepare(area)
-    mask[low[0] : high[0], low[1] : high[1]] = shapely.contains_xy(area, centres[..., 0], centres[..., 1])
-    return mask
+    return [cells_inside(room.polygon, frame) for room in rooms]
 
 
 def matched_iou(truth: Sequence[BoolArray], predicted: Sequence[BoolArray]) -> FloatArray:

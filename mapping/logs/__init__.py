@@ -1,19 +1,23 @@
-"""Recorded runs of robots: CARMEN logs, ROS bags, NumPy archives."""
+"""Recorded runs of robots; ``reader`` tells the formats apart.
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+- ROS bags: ``rosbag`` (from a bag to a run), ``bag_messages``, ``bag_scans``, ``transform_tree``, ``bag_options``.
+- CARMEN logs: ``carmen``, ``carmen_lines``, ``carmen_odometry``.
+- NumPy archives: ``npz``.
+- All of them: ``clocks``, ``odometry``, ``recorded_run``.
+"""
+
+from typing import TYPE_CHECKING
+
+from closedrooms.core.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from closedrooms.mapping.logs.reader import read_run
-    from closedrooms.mapping.logs.recorded_run import RecordedRun
+    from closedrooms.mapping.logs.reader import read_run as read_run
+    from closedrooms.mapping.logs.recorded_run import RecordedRun as RecordedRun
 
-__all__ = ["RecordedRun", "read_run"]
-
-_OWNERS = {"RecordedRun": "recorded_run", "read_run": "reader"}
-
-
-def __getattr__(name: str) -> Any:
-    """Import a public name when it is asked for."""
-    if name not in _OWNERS:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_OWNERS[name]}"), name)
+__getattr__, __dir__, __all__ = lazy_face(
+    __name__,
+    {
+        "reader": ("read_run",),
+        "recorded_run": ("RecordedRun",),
+    },
+)

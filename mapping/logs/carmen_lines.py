@@ -137,7 +137,7 @@ class Sector:
 
 
 def resolve_sector(start: float, view: float, step: float, beams: int) -> Sector:
-    """The sector of a scan from a header whose parts need not agree.
+    """Resolve the sector of a scan from a header whose parts need not agree.
 
     Public writers put degrees, the number of steps, or nothing where the step belongs.
 

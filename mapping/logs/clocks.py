@@ -105,7 +105,7 @@ def forward(stamps: FloatArray) -> tuple[FloatArray, list[Remark]]:
 
 
 def find_gaps(stamps: FloatArray) -> FloatArray:
-    """Where a run has no scans for long: begin and length of each gap [s], shape (k, 2)."""
+    """Find where a run has no scans for long: begin and length of each gap [s], shape (k, 2)."""
     steps = np.diff(stamps)
     if not steps.size:
         return np.zeros((0, 2))

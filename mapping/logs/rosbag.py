@@ -1,11 +1,9 @@
 """Recorded runs in rosbag 1, rosbag 2 and MCAP files, through the optional ``rosbags``."""
 
 import contextlib
-import math
 import tempfile
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,39 +15,16 @@ from closedrooms.core.incoming import check_regular, is_file, is_folder, read_he
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
+from closedrooms.mapping.logs.bag_messages import MAX_SCANS, BagMessages, choose_connections, read_messages, stamp_of
 from closedrooms.mapping.logs.bag_options import BagOptions
-from closedrooms.mapping.logs.bag_scans import ECHOES, SCAN, ranges_of, scan_of
+from closedrooms.mapping.logs.bag_scans import ranges_of, scan_of
 from closedrooms.mapping.logs.clocks import Times, forward, scan_and_odometry_times
 from closedrooms.mapping.logs.odometry import bridge_jumps, jump_remarks, odometry_at
 from closedrooms.mapping.logs.recorded_run import RecordedRun
-from closedrooms.mapping.logs.transform_tree import Mount, TransformTree, clean_name, transform_matrix
+from closedrooms.mapping.logs.transform_tree import Mount, TransformTree, clean_name
 
-ODOMETRY = "nav_msgs/msg/Odometry"
-TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 SUFFIXES = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite": ".db3"}
 """What the files of a bag begin with, and how their names should end."""
-MAX_SCANS = 2_000_000
-
-
-@dataclass(slots=True)
-class _Messages:
-    """What was read, in the order of the bag; each with the time of its recording [s].
-
-    Attributes:
-        scans: Messages of the scans.
-        odometry: ``header stamp, recording time, x, y, yaw`` of each.
-        base: Frame of the robot that the odometry moves.
-        tree: The transforms.
-        broken: Messages that could not be read, by what they should hold.
-        surplus: Scans beyond ``MAX_SCANS``.
-    """
-
-    scans: list[tuple[Any, float]] = field(default_factory=list)
-    odometry: list[tuple[float, float, float, float, float]] = field(default_factory=list)
-    base: str = ""
-    tree: TransformTree = field(default_factory=TransformTree)
-    broken: Counter[str] = field(default_factory=Counter)
-    surplus: int = 0
 
 
 def read_bag(path: Path, options: BagOptions) -> RecordedRun:
@@ -78,8 +53,8 @@ def read_bag(path: Path, options: BagOptions) -> RecordedRun:
     with reading(path, "a rosbag"), _named(path) as named:
         # Bags of ROS 2 before Iron do not carry the definitions of their messages.
         with AnyReader([named], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            wanted, remarks = _chosen(reader.connections, options)
-            messages = _read(reader, wanted)
+            wanted, remarks = choose_connections(reader.connections, options)
+            messages = read_messages(reader, wanted)
         return _resolved(messages, options, remarks)
 
 
@@ -99,100 +74,7 @@ def _named(path: Path) -> Iterator[Path]:
         yield named
 
 
-def _chosen(connections: Iterable[Any], options: BagOptions) -> tuple[list[Any], list[Remark]]:
-    """Connections of one topic of scans, at most one of odometry, and all transforms."""
-    remarks = []
-    topics: dict[str, set[str]] = {}
-    for connection in connections:
-        if connection.msgcount:
-            topics.setdefault(connection.msgtype, set()).add(connection.topic)
-    scans, echoes = topics.get(SCAN, set()), topics.get(ECHOES, set())
-    if options.scan_topic is None and len(scans) == 1 and echoes:
-        why = f"{', '.join(sorted(scans))} is taken"
-        remarks.append(Remark(action="dropped", what="topics of scans", why=why, names=tuple(sorted(echoes))))
-        echoes = set()
-    scan = _topic(scans | echoes, options.scan_topic, "sensor_msgs/LaserScan or MultiEchoLaserScan", topics)
-    transforms = set().union(*(topics.get(kind, set()) for kind in TRANSFORMS))
-    odometry = topics.get(ODOMETRY, set())
-    asked = options.odometry_topic
-    taken = {scan, *transforms}
-    if asked not in transforms and (odometry or asked is not None):
-        taken.add(_topic(odometry, asked, "nav_msgs/Odometry", topics))
-    kinds = {SCAN, ECHOES, ODOMETRY, *TRANSFORMS}
-    return [c for c in connections if c.topic in taken and c.msgtype in kinds], remarks
-
-
-def _topic(found: set[str], asked: str | None, kind: str, topics: dict[str, set[str]]) -> str:
-    if asked is not None and asked in found:
-        return asked
-    if asked is None and len(found) == 1:
-        return next(iter(found))
-    if found:
-        what = f"no topic {asked}" if asked is not None else f"{len(found)} topics of {kind}"
-        raise InvalidInputError(what, expected=f"one of {', '.join(sorted(found))}")
-    holds = ", ".join(sorted(topics)) or "no messages"
-    what = f"no topic {asked} of {kind}" if asked is not None else f"no topic of {kind}"
-    raise InvalidInputError(f"{what}, but {holds}", expected="a bag of a planar lidar")
-
-
-def _read(reader: Any, connections: list[Any]) -> _Messages:
-    messages = _Messages()
-    for connection, recorded, data in reader.messages(connections=connections):
-        kind = connection.msgtype
-        try:
-            message = reader.deserialize(data, kind)
-            if kind in {SCAN, ECHOES}:
-                _take_scan(messages, message, 1e-9 * recorded)
-            elif kind == ODOMETRY:
-                _take_odometry(messages, message, 1e-9 * recorded)
-            else:
-                static = connection.topic.endswith("tf_static")
-                _take_transforms(messages, message, 1e-9 * recorded, static=static)
-        except Exception:  # as above: one broken message does not spoil the bag
-            messages.broken["scans" if kind in {SCAN, ECHOES} else "messages of motion"] += 1
-    return messages
-
-
-def _take_scan(messages: _Messages, message: Any, recorded: float) -> None:
-    if len(messages.scans) >= MAX_SCANS:
-        messages.surplus += 1
-        return
-    messages.scans.append((message, recorded))
-
-
-def _take_odometry(messages: _Messages, message: Any, recorded: float) -> None:
-    pose = message.pose.pose
-    turned, at = pose.orientation, pose.position
-    matrix = transform_matrix((at.x, at.y, at.z), (turned.x, turned.y, turned.z, turned.w))
-    yaw = math.atan2(matrix[1, 0], matrix[0, 0])
-    messages.odometry.append((_seconds(message), recorded, at.x, at.y, yaw))
-    messages.base = clean_name(message.child_frame_id) or messages.base
-
-
-def _take_transforms(messages: _Messages, message: Any, recorded: float, *, static: bool) -> None:
-    for stamped in message.transforms:
-        shift, turn = stamped.transform.translation, stamped.transform.rotation
-        try:
-            matrix = transform_matrix((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w))
-        except InvalidInputError:
-            messages.broken["transforms"] += 1
-            continue
-        messages.tree.add(
-            stamped.header.frame_id,
-            stamped.child_frame_id,
-            matrix,
-            static=static,
-            stamp=_seconds(stamped),
-            recorded=recorded,
-        )
-
-
-def _seconds(message: Any) -> float:
-    stamp = message.header.stamp
-    return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
-
-
-def _resolved(messages: _Messages, options: BagOptions, remarks: list[Remark]) -> RecordedRun:
+def _resolved(messages: BagMessages, options: BagOptions, remarks: list[Remark]) -> RecordedRun:
     remarks = [*remarks, *_reading_remarks(messages)]
     if not messages.scans:
         return RecordedRun((), np.empty((0, 3)), None, tuple(remarks))
@@ -200,7 +82,7 @@ def _resolved(messages: _Messages, options: BagOptions, remarks: list[Remark]) -
     lidar = frames.most_common(1)[0][0]
     track, base, found = _motion(messages, lidar, options)
     mounts, mount_remarks = _mounts(messages.tree, base, list(frames), options, measured=track is not None)
-    scan_times = Times(*np.array([(_seconds(message), at) for message, at in messages.scans]).T)
+    scan_times = Times(*np.array([(stamp_of(message), at) for message, at in messages.scans]).T)
     times = None if track is None else Times(track[:, 0], track[:, 1])
     stamps, odometry_stamps, clock_remarks = scan_and_odometry_times(scan_times, times)
     remarks += [*found, *mount_remarks, *clock_remarks]
@@ -216,7 +98,7 @@ def _resolved(messages: _Messages, options: BagOptions, remarks: list[Remark]) -
 
 
 def _run(
-    messages: _Messages,
+    messages: BagMessages,
     known: Any,
     poses: FloatArray,
     stamps: FloatArray,
@@ -251,7 +133,7 @@ def _run(
     return RecordedRun(swept, poses[rows].reshape(-1, 3), None, (*remarks, *backwards), has_odometry)
 
 
-def _reading_remarks(messages: _Messages) -> list[Remark]:
+def _reading_remarks(messages: BagMessages) -> list[Remark]:
     remarks = [
         Remark(action="dropped", what=what, why="broken in the bag", count=count, loss=what == "scans")
         for what, count in messages.broken.items()
@@ -262,7 +144,9 @@ def _reading_remarks(messages: _Messages) -> list[Remark]:
     return remarks
 
 
-def _motion(messages: _Messages, lidar: str, options: BagOptions) -> tuple[FloatArray | None, str | None, list[Remark]]:
+def _motion(
+    messages: BagMessages, lidar: str, options: BagOptions
+) -> tuple[FloatArray | None, str | None, list[Remark]]:
     """Odometry as ``header stamp, recording time, x, y, yaw``, the frame it moves, and what was guessed."""
     odometry = np.array(messages.odometry, dtype=np.float64).reshape(-1, 5)
     odometry = odometry[np.isfinite(odometry).all(axis=1)]

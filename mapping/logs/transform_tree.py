@@ -82,7 +82,7 @@ class TransformTree:
         return {name for pair in self._links for name in pair}
 
     def find(self, name: str, *, beside: str = "") -> str | None:
-        """The frame of that name, else the only one of that name under another prefix or namespace.
+        """Find the frame of that name, else the only one of that name under another prefix or namespace.
 
         Args:
             name: As a message says it.

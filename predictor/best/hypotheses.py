@@ -64,7 +64,7 @@ class Proposals:
 
 def propose_rectangles(scene: Scene) -> Proposals:
     """Propose and score the rectangles of every door, and of every two neighbours in a wall, frame by frame."""
-    poses, thickness = scene.poses, scene.walls.usual
+    poses, thickness = scene.poses, in_cells(scene.walls.usual)
     found: dict[Doors, Hypotheses] = {}
     angles = {pose.angle for pose in poses} if scene.config.symmetry else set()
     twins = {angle: mirror(scene.turned[angle]) for angle in angles}

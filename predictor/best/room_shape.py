@@ -52,7 +52,7 @@ def trace_rooms(scene: Scene, choices: Sequence[Choice]) -> tuple[list[Room], di
             failures |= dict.fromkeys(names, NO_ROOM)
             continue
         others = [other.corners for other in choices if other is not choice]
-        kind = _name_kind(choice.corners, others, scene.grid, scene.walls.usual)
+        kind = _name_kind(choice.corners, others, scene.grid, in_cells(scene.walls.usual))
         rooms.append(Room(shape, names, kind, round(choice.score, 9), choice.cut))
     apart, without = part_rooms(rooms, {door.door.id: door.door.midpoint for door in facing})
     return apart, failures | without
@@ -62,7 +62,7 @@ def _trace_room(scene: Scene, choice: Choice, doorways: Sequence[Doorway]) -> Po
     """Trace one room up to the leaves of its doors; ``None`` where nothing is left of its rectangle."""
     pose = scene.poses[choice.doors[0]]
     turned = scene.turned[pose.angle]
-    for thickness, narrow in ((scene.walls.least, NARROW), (ALCOVE_WALL, ALCOVE_NARROW)):
+    for thickness, narrow in ((in_cells(scene.walls.least), NARROW), (ALCOVE_WALL, ALCOVE_NARROW)):
         shape = subtract_known(turned, choice.corners, thickness, pose.facing, doorways, narrow=narrow)
         if shape is not None:
             for doorway in doorways:

@@ -1,5 +1,6 @@
 """What the method ``best`` looks at: the map along its walls, and the doors that face something unknown."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -8,16 +9,18 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.best.door_frame import TurnedMap, turn_map
 from closedrooms.predictor.best.door_pose import DoorPose, face_door
 from closedrooms.predictor.best.lattice import RESOLUTION
-from closedrooms.predictor.best.wall_thickness import NOT_MEASURED, WallThickness, measure_walls
 from closedrooms.predictor.config import BestConfig
 from closedrooms.predictor.paper.initial_layouts import unusable
 from closedrooms.predictor.structure.clutter import free_islands
 from closedrooms.predictor.structure.edges import shows_walls
 from closedrooms.predictor.structure.known_window import at_resolution, known_window
 from closedrooms.predictor.structure.wall_directions import find_wall_directions
+from closedrooms.predictor.structure.wall_thickness import WallThickness, measure_walls
 
 # Unknown cells around a turned map [m]: what lies further out reads as its edge.
 MARGIN = 1.0
+# Thickness where hardly any wall is seen from both sides [m]: usual for inner walls.
+UNSEEN_WALLS = WallThickness(usual=0.2, least=0.2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +40,7 @@ class Scene:
     grid: OccupancyGrid
     turned: dict[float, TurnedMap] = field(default_factory=dict)
     poses: tuple[DoorPose, ...] = ()
-    walls: WallThickness = NOT_MEASURED
+    walls: WallThickness = UNSEEN_WALLS
     failures: dict[str, str] = field(default_factory=dict)
 
 
@@ -78,4 +81,5 @@ def prepare(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: BestConfig
             poses.append(found)
         else:
             failures[door.id] = found
-    return Scene(config, working, turned, tuple(poses), measure_walls(turned[main]), failures)
+    walls = measure_walls(working, (main, main + math.pi / 2)) or UNSEEN_WALLS
+    return Scene(config, working, turned, tuple(poses), walls, failures)

@@ -8,6 +8,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.best.hypotheses import Hypotheses, Proposals
+from closedrooms.predictor.best.lattice import in_cells
 from closedrooms.predictor.best.pair_features import score_pairs
 from closedrooms.predictor.best.scene import Scene
 from closedrooms.predictor.best.shared_rooms import merge
@@ -39,7 +40,7 @@ class Choice:
 
 def select_jointly(scene: Scene, proposals: Proposals) -> list[Choice]:
     """Choose one rectangle a door, or for two doors where that scores better, in the order of the doors."""
-    alone, thickness = proposals.alone, scene.walls.usual
+    alone, thickness = proposals.alone, in_cells(scene.walls.usual)
     # By place, so that the order of the doors changes nothing.
     order = sorted(range(len(alone)), key=lambda i: scene.poses[i].facing.door.midpoint)
     places, values, cut = choose([alone[i] for i in order], thickness, safe=True)

@@ -16,14 +16,12 @@ class BorderRoom:
     """A rectangle behind a door's edge.
 
     Attributes:
-        room: Number of the room.
         start: One end of its side at the door [m], shape (2,).
         end: The other end [m], shape (2,).
         outward: Unit vector away from the door's edge, shape (2,).
         depth: How far it reaches outward [m].
     """
 
-    room: int
     start: FloatArray
     end: FloatArray
     outward: FloatArray
@@ -72,7 +70,7 @@ def _square(growth: Growth, room: int) -> BorderRoom:
             end = start + size * along
         elif not cut[1]:
             start = end - size * along
-    return BorderRoom(room, start, end, outward, size)
+    return BorderRoom(start, end, outward, size)
 
 
 def _on_boundary(growth: Growth, point: FloatArray) -> bool:
@@ -82,7 +80,7 @@ def _on_boundary(growth: Growth, point: FloatArray) -> bool:
 
 
 def _groups(growth: Growth, rooms: dict[int, BorderRoom]) -> list[list[int]]:
-    """Border rooms whose initial faces touch, one after the other, and that reach the same way out."""
+    """Group border rooms whose initial faces touch, one after the other, and that reach outward alike."""
     left, groups = set(rooms), []
     while left:
         group, queue = [], [min(left)]

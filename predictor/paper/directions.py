@@ -20,12 +20,10 @@ class Directions:
 
     Attributes:
         angles: Direction of each cluster in [0, pi) [rad], strongest first, shape (k,).
-        strengths: Length of wall of each cluster [m], shape (k,).
         labels: Cluster of each segment, -1 for none, shape (n,).
     """
 
     angles: FloatArray
-    strengths: FloatArray
     labels: IntArray
 
 
@@ -50,7 +48,7 @@ def find_directions(segments: FloatArray, config: DirectionsConfig, *, bandwidth
     weights = lengths**2
     modes = _find_modes(angles, weights, bandwidth)
     if modes.size == 0:
-        return Directions(np.zeros(0), np.zeros(0), np.full(len(segments), -1, dtype=np.int64))
+        return Directions(np.zeros(0), np.full(len(segments), -1, dtype=np.int64))
     apart = np.abs(angle_between(angles[:, None], modes[None, :]))  # (n, modes)
     nearest = apart.argmin(axis=1)
     member = apart[np.arange(len(angles)), nearest] <= bandwidth
@@ -68,7 +66,7 @@ def find_directions(segments: FloatArray, config: DirectionsConfig, *, bandwidth
     labels = np.full(len(segments), -1, dtype=np.int64)
     for cluster, mode in enumerate(kept):
         labels[member & (nearest == mode)] = cluster
-    return Directions(centres[kept] % np.pi, strengths[kept], labels)
+    return Directions(centres[kept] % np.pi, labels)
 
 
 def _measure_concentration(

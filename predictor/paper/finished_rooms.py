@@ -11,7 +11,7 @@ from closedrooms.predictor.paper.border import BorderRoom, border_rooms
 from closedrooms.predictor.paper.expansion import Growth
 from closedrooms.predictor.paper.initial_layouts import Start
 from closedrooms.predictor.structure.doorways import find_doorways
-from closedrooms.predictor.structure.wall_thickness import free_interior, measure_thickness
+from closedrooms.predictor.structure.wall_thickness import free_interior, measure_taken
 
 
 def finish_rooms(start: Start, growth: Growth, config: PaperConfig) -> tuple[list[Room], dict[str, str]]:
@@ -29,7 +29,7 @@ def finish_rooms(start: Start, growth: Growth, config: PaperConfig) -> tuple[lis
     shapes = _gather_shapes(start, growth, border)
     thickness = config.wall_thickness
     if thickness is None:
-        thickness = measure_thickness(start.grid, start.structure.angles)
+        thickness = measure_taken(start.grid, start.structure.angles)
     doorways = find_doorways(start.grid, [e.facing for e in start.entrances], width=config.door_width)
     rooms: list[Room] = []
     failures: dict[str, str] = {}

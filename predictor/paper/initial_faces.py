@@ -18,7 +18,7 @@ class Entrance:
     """Where a door leads.
 
     Attributes:
-        facing: The door, and the way from its edge into the initial face.
+        facing: The door, and the direction from its edge into the initial face.
         edge: Its edge ``e_d``, an index into the arrangement.
         face: The initial face behind it, an index into the arrangement.
     """

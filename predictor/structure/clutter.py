@@ -15,7 +15,7 @@ THIN, FILLED = 0.5, 0.5
 
 
 def filter_clutter(grid: OccupancyGrid) -> OccupancyGrid:
-    """The same map with what stands free of the walls turned free.
+    """Turn what stands free of the walls free, on a copy of the map.
 
     The spectrum answers weakly at the ends of walls and in short ones; what hangs together with a structural cell
     is kept whole, so that no wall gets a hole through which a path would lead.

@@ -18,7 +18,8 @@ from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.structure.door_proposal_config import ProposalConfig
-from closedrooms.predictor.structure.wall_faces import WallFaces, face_directions, find_faces
+from closedrooms.predictor.structure.wall_directions import find_wall_directions
+from closedrooms.predictor.structure.wall_faces import WallFaces, find_faces
 from closedrooms.predictor.structure.window_rows import Niche, find_window_rows
 
 # Faces belong to a wall whose free side is within this of theirs [rad].
@@ -119,10 +120,11 @@ def propose_doors(grid: OccupancyGrid, config: ProposalConfig | None = None) -> 
     if bounds is None:
         return ()
     grid = grid.on(grid.frame.cropped(*bounds))
-    faces = find_faces(grid)
-    if not len(faces.points):
+    directions = find_wall_directions(grid)
+    if directions is None:
         return ()
-    found = [pair for line in _lines(faces, grid.frame.resolution, config) for pair in _on_line(grid, line, config)]
+    lines = _lines(find_faces(grid), directions.angles, grid.frame.resolution, config)
+    found = [pair for line in lines for pair in _on_line(grid, line, config)]
     found.sort(key=lambda pair: (-pair[0].score, pair[0].segment))
     kept: list[tuple[DoorProposal, Niche]] = []
     for proposal, niche in found:
@@ -139,10 +141,10 @@ def propose_doors(grid: OccupancyGrid, config: ProposalConfig | None = None) -> 
     return tuple(proposal for proposal in scored if proposal.score >= config.min_score)
 
 
-def _lines(faces: WallFaces, resolution: float, config: ProposalConfig) -> Iterator[_Line]:
+def _lines(faces: WallFaces, directions: FloatArray, resolution: float, config: ProposalConfig) -> Iterator[_Line]:
     """Every line of faces on which a leaf might be set back, for every wall direction and both sides of the walls."""
-    for across in face_directions(faces, resolution):
-        for angle in (across, across + math.pi):
+    for direction in directions.tolist():
+        for angle in (direction + quarter * math.pi / 2 for quarter in range(4)):
             outward = np.array([math.cos(angle), math.sin(angle)])
             along = np.array([outward[1], -outward[0]])
             alike = np.abs(np.mod(faces.angles - angle + np.pi, 2 * np.pi) - np.pi) < ALIKE

@@ -34,7 +34,7 @@ SAME = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FacingDoor:
-    """A door and the way into its room.
+    """A door and the direction into its room.
 
     Attributes:
         door: In the map frame.
@@ -60,7 +60,7 @@ class Doorway:
     """An opening in a wall, seen from before it. Distances are from the mid-point of its door.
 
     Attributes:
-        door: And the way into the room.
+        door: And the direction into the room.
         left: One jamb, along the wall [m].
         right: The other jamb [m], more than ``left``.
         leaf: Where known space ends at the leaf, inward [m].
@@ -112,7 +112,7 @@ def find_doorways(grid: OccupancyGrid, doors: Sequence[FacingDoor], *, width: fl
 
     Args:
         grid: The map.
-        doors: And the ways into their rooms.
+        doors: And the directions into their rooms.
         width: Of an opening where no door tells any [m].
 
     Returns:

@@ -65,7 +65,7 @@ class Edges:
 
     Attributes:
         cells: Their places in the flattened map, ascending, shape (n,).
-        angles: Which way up [rad], shape (n,).
+        angles: Direction in which the picture rises [rad], shape (n,).
     """
 
     cells: IntArray
@@ -75,7 +75,7 @@ class Edges:
 def find_edges(
     grid: OccupancyGrid, picture: Callable[[slice], Picture], *, among_free: bool, strip: int = STRIP
 ) -> Edges:
-    """Free cells where a picture rises at least :data:`STEEP` times as steeply as anywhere.
+    """Find free cells where a picture rises at least :data:`STEEP` times as steeply as anywhere.
 
     Some rows are drawn at a time: a large map in numbers of four bytes, several times over, fills the memory.
 

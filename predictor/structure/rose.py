@@ -136,4 +136,4 @@ def rose_directions(segments: FloatArray, structure: RoseStructure, config: Line
     order = order[strengths[order] > 0.0]
     rank = np.full(structure.angles.size + 1, -1, dtype=np.int64)
     rank[order] = np.arange(order.size)
-    return Directions(structure.angles[order], strengths[order], rank[labels])
+    return Directions(structure.angles[order], rank[labels])

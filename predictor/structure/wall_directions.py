@@ -1,4 +1,4 @@
-"""Directions of the walls of a map, modulo a right angle, and of the wall around each door (method ``best``)."""
+"""Directions of the walls of a map, modulo a right angle, and of the wall around each door."""
 
 import math
 from dataclasses import dataclass
@@ -17,6 +17,8 @@ MIN_SHARE = 0.12
 APART = math.radians(8.0)
 # Below this the map is not turned at all [rad]: 0.35 degrees are 0.12 m over a room row of 20 m.
 UPRIGHT = math.radians(0.35)
+# A direction is refined within this of where edges vote for it [rad], at so many angles.
+WINDOW, TRIES = math.radians(1.5), 31
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +38,7 @@ class WallDirections:
     edge_angles: FloatArray
 
     def at(self, door: ClosedDoor, *, reach: float = 2.0) -> float:
-        """The direction that the wall around a door follows; its segment decides where it is known.
+        """Find the direction that the wall around a door follows; its segment decides where it is known.
 
         Args:
             door: In the map frame.
@@ -66,10 +68,10 @@ class WallDirections:
 
 
 def find_wall_directions(grid: OccupancyGrid) -> WallDirections | None:
-    """Peaks of the directions of the edges of free space.
+    """Find the peaks of the directions of the edges of free space.
 
     Args:
-        grid: The map in cells of 0.05 m, cropped to what is known.
+        grid: The map, cropped to what is known.
 
     Returns:
         Directions, strongest first; ``None`` with fewer than 20 occupied cells or no edge.
@@ -93,14 +95,13 @@ def find_wall_directions(grid: OccupancyGrid) -> WallDirections | None:
             near = np.abs(wrapped(angles - angle)) < math.radians(4.0)
             peaks.append(float(wrapped(angle + float(wrapped(angles[near] - angle).mean()))))
     points = grid.frame.to_points(occupied)
-    refined = [_sharpest(points, peak) for peak in peaks]
+    refined = [_sharpest(points, peak, grid.frame.resolution) for peak in peaks]
     return WallDirections(np.array(refined), grid.frame, edges.cells, angles)
 
 
-def _sharpest(points: FloatArray, angle: float, *, window: float = math.radians(1.5), steps: int = 31) -> float:
-    """The angle near ``angle`` along which occupied cells pile up most: the sum of squares of both projections."""
+def _sharpest(points: FloatArray, angle: float, step: float) -> float:
+    """Find the angle near ``angle`` along which occupied cells pile up most: sum of squares of both projections."""
     points = points - points.mean(axis=0)
-    step = 0.05
 
     def pile(candidate: float) -> float:
         c, s = math.cos(candidate), math.sin(candidate)
@@ -110,7 +111,7 @@ def _sharpest(points: FloatArray, angle: float, *, window: float = math.radians(
             total += float((np.bincount(bins).astype(float) ** 2).sum())
         return total
 
-    candidates = [0.0] if abs(angle) <= 2 * window else []
-    candidates += [float(a) for a in angle + np.linspace(-window, window, steps)]
+    candidates = [0.0] if abs(angle) <= 2 * WINDOW else []
+    candidates += [float(a) for a in angle + np.linspace(-WINDOW, WINDOW, TRIES)]
     best = max(candidates, key=pile)
     return 0.0 if abs(best) < UPRIGHT else best

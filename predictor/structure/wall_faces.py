@@ -1,4 +1,4 @@
-"""The faces of walls in an occupancy grid: where free cells meet occupied ones, and which ways they run."""
+"""The faces of walls in an occupancy grid: where free cells meet occupied ones, and where the free space lies."""
 
 from dataclasses import dataclass
 
@@ -10,14 +10,6 @@ from closedrooms.core.grid import OccupancyGrid
 
 # Blur with which the direction of a face is measured [m]: a few cells, so that the stairs of a slanted wall vanish.
 BLUR = 0.075
-# Steps over half a turn in which wall directions are counted, and the kernel that smooths the counts [steps].
-STEPS, KERNEL = 180, 2.5
-# Directions closer than this are one [steps]; weaker ones than this share of the strongest are corners and clutter.
-APART, WEAKEST, MOST = 8, 0.1, 8
-# Refined directions closer than this are one [rad].
-SAME = np.radians(4.0)
-# A direction is refined over this range at this step: the faces then fall into few lines [rad].
-REFINE_RANGE, REFINE_STEP, REFINE_NEAR = np.radians(4.0), np.radians(0.25), np.radians(12.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,47 +74,8 @@ def find_faces(grid: OccupancyGrid) -> WallFaces:
         if d_row + d_col > 0:
             # The occupied cell is the one before the edge.
             rows, cols = rows - d_row, cols - d_col
-        way = np.array([d_col, d_row], dtype=np.float64)
-        points.append(frame.to_points(np.stack((rows, cols), axis=-1)) + way * frame.resolution / 2)
-        outward.append(np.tile(way, (rows.size, 1)))
+        outside = np.array([d_col, d_row], dtype=np.float64)
+        points.append(frame.to_points(np.stack((rows, cols), axis=-1)) + outside * frame.resolution / 2)
+        outward.append(np.tile(outside, (rows.size, 1)))
         angles.append(np.arctan2(slope_y[rows, cols], slope_x[rows, cols]).astype(np.float64))
     return WallFaces(np.vstack(points), np.vstack(outward), np.concatenate(angles))
-
-
-def face_directions(faces: WallFaces, resolution: float) -> list[float]:
-    """Find the directions across the walls in [0, pi), the one with most wall first [rad].
-
-    Args:
-        faces: Of one map.
-        resolution: Metres per cell.
-    """
-    steps = np.floor(np.mod(faces.angles, np.pi) / np.pi * STEPS).astype(np.int64) % STEPS
-    counts = np.bincount(steps, minlength=STEPS).astype(np.float64)
-    reach = np.arange(-APART, APART + 1)
-    kernel = np.exp(-0.5 * (reach / KERNEL) ** 2)
-    smooth = np.convolve(np.concatenate((counts[-APART:], counts, counts[:APART])), kernel, "valid")
-    chosen: list[int] = []
-    for step in np.argsort(-smooth, kind="stable"):
-        if smooth[step] < WEAKEST * smooth.max() or len(chosen) == MOST:
-            break
-        if all(min(abs(step - other), STEPS - abs(step - other)) > APART for other in chosen):
-            chosen.append(int(step))
-    refined: list[float] = []
-    for step in chosen:
-        angle = _refine(faces, (step + 0.5) / STEPS * np.pi, resolution)
-        if all(abs((angle - other + np.pi / 2) % np.pi - np.pi / 2) > SAME for other in refined):
-            refined.append(angle)
-    return refined
-
-
-def _refine(faces: WallFaces, angle: float, resolution: float) -> float:
-    """Find the direction near ``angle`` across which the faces fall into the fewest lines."""
-    near = np.abs(np.mod(faces.angles - angle + np.pi / 2, np.pi) - np.pi / 2) < REFINE_NEAR
-    points = faces.points[near]
-    tries = angle + np.arange(-REFINE_RANGE, REFINE_RANGE + REFINE_STEP / 2, REFINE_STEP)
-    sharpness = []
-    for way in tries:
-        across = points @ np.array([np.cos(way), np.sin(way)])
-        counts = np.bincount(np.floor((across - across.min()) / resolution + 0.5).astype(np.int64))
-        sharpness.append(float((counts.astype(np.float64) ** 2).sum()))
-    return float(tries[int(np.argmax(sharpness))])

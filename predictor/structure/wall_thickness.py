@@ -2,6 +2,8 @@
 
 import itertools
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -10,8 +12,8 @@ from shapely.geometry import LineString, Polygon
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.grid import UNKNOWN, OccupancyGrid, is_free, is_occupied
 
-# Thicker than this is no interior wall but something built in [m].
-MAX_WALL = 0.60
+# Thicker than this is no wall but a shaft or something built in [m].
+MAX_WALL = 0.95
 # Both sides of a wall show this much free space across [m]: less is a speck beside a wall, or a hole in one.
 CLEAR = 0.40
 # Walls take at most this much of a room [m]. The authors drew rooms up to the lines; without this limit agreement with
@@ -20,39 +22,66 @@ CLEAR = 0.40
 MOST_TAKEN = 0.20
 # Cells looked at at once: 50 MB.
 AT_ONCE = 100_000
-# With less wall than this seen from both sides [m], nothing is measured and walls are taken to be thin [m].
-MIN_EVIDENCE, THIN_WALL = 2.0, 0.10
+# With less wall than this seen from both sides nothing is measured [m].
+MIN_EVIDENCE = 1.0
+# What walls of which nothing was measured take of a room [m].
+THIN_WALL = 0.10
 # The share of a side beyond which free space must have been seen, for the wall to be placed by it.
 SEEN = 0.3
 # How far beside a line its surroundings are sampled [cells].
 BESIDE = 0.21
 
 
-def measure_thickness(grid: OccupancyGrid, directions: FloatArray) -> float:
-    """Typical thickness of the walls that are seen from both sides, face to face, at most ``MOST_TAKEN`` [m].
+@dataclass(frozen=True, slots=True)
+class WallThickness:
+    """Thickness of the walls of a map, face to face [m].
 
-    Along the normal of each main direction, runs that begin and end with an occupied cell, with ``CLEAR`` free on
-    either side, are walls; each cell of a wall's length counts once.
+    Attributes:
+        usual: Half of all wall is thinner: what a wall that was not seen is expected to have.
+        least: A quarter of all wall is thinner: what is left of a room that lies behind a wall has at least this.
+    """
+
+    usual: float
+    least: float
+
+
+def measure_walls(grid: OccupancyGrid, directions: Sequence[float] | FloatArray) -> WallThickness | None:
+    """Measure the walls that are seen from both sides, by their length.
+
+    Along the normal of each direction, runs that begin and end with an occupied cell, with ``CLEAR`` free on either
+    side, are walls; each cell of a wall's length counts once.
 
     Args:
         grid: The map, cropped to what is known.
-        directions: Directions of walls, strongest first [rad], shape (k,).
+        directions: Directions of walls [rad], shape (k,).
 
     Returns:
-        The median; ``THIN_WALL`` where hardly any wall is seen from both sides.
+        ``None`` where hardly any wall is seen from both sides.
     """
     resolution = grid.frame.resolution
     longest, clear = int(MAX_WALL / resolution), round(CLEAR / resolution)
     starts = np.argwhere(grid.occupied)
     runs = [
         _runs(grid, starts[first : first + AT_ONCE], float(angle), longest, clear)
-        for angle in directions[:2]
+        for angle in directions
         for first in range(0, len(starts), AT_ONCE)
     ]
     lengths = np.concatenate(runs) if runs else np.zeros(0)
     if lengths.size * resolution < MIN_EVIDENCE:
-        return THIN_WALL
-    return min(float(np.median(lengths)) * resolution, MOST_TAKEN)
+        return None
+    usual, least = np.quantile(lengths, (0.5, 0.25)) * resolution
+    return WallThickness(float(usual), float(least))
+
+
+def measure_taken(grid: OccupancyGrid, directions: FloatArray) -> float:
+    """Measure what walls take of a layout: their usual thickness, at most ``MOST_TAKEN`` [m].
+
+    Args:
+        grid: The map, cropped to what is known.
+        directions: Directions of walls, strongest first [rad]; two are looked at, shape (k,).
+    """
+    walls = measure_walls(grid, directions[:2])
+    return THIN_WALL if walls is None else min(walls.usual, MOST_TAKEN)
 
 
 def _runs(grid: OccupancyGrid, starts: IntArray, angle: float, longest: int, clear: int) -> FloatArray:

@@ -46,7 +46,7 @@ class Niche:
 
 
 def find_window_rows(grid: OccupancyGrid, niches: Sequence[Niche]) -> BoolArray:
-    """Which of some niches stand in a row of windows, shape (n,).
+    """Find which of some niches stand in a row of windows, shape (n,).
 
     Args:
         grid: The map.

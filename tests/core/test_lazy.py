@@ -1,6 +1,8 @@
 """Public faces: every name is there, and nothing is imported before it is asked for."""
 
+import ast
 import importlib
+import re
 import subprocess
 import sys
 import tomllib
@@ -9,7 +11,11 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-FACES = ["predictor", "pipeline", "experiments", "visualization", "cli"]
+FACES = [
+    "core", "worlds", "worlds.formats", "mapping", "mapping.logs", "predictor", "coverage", "visualization", "pipeline",
+    "experiments", "cli",
+]  # fmt: skip
+CONSTANTS = {"METHODS", "FREE", "OCCUPIED", "UNKNOWN", "DEFAULT_WORLD"}
 
 
 @pytest.mark.parametrize("package", FACES)
@@ -17,7 +23,8 @@ def test_every_public_name_is_there(package):
     face = importlib.import_module(f"closedrooms.{package}")
     assert face.__all__
     for name in face.__all__:
-        assert getattr(face, name).__name__ == name if name != "METHODS" else getattr(face, name)
+        value = getattr(face, name)
+        assert name in CONSTANTS or value.__name__ == name
         assert name in dir(face)
 
 
@@ -29,10 +36,32 @@ def test_an_unknown_name_is_an_attribute_error(package):
 
 @pytest.mark.parametrize("package", FACES)
 def test_importing_a_face_imports_no_library(package):
-    heavy = "{'numpy', 'scipy', 'cv2', 'shapely', 'tyro', 'rich', 'matplotlib', 'rerun', 'pybullet'}"
+    heavy = (
+        "{'numpy', 'scipy', 'cv2', 'shapely', 'tyro', 'rich', 'matplotlib', 'rerun', 'pybullet', 'yaml', 'networkx'}"
+    )
     code = f"import sys, closedrooms.{package}; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_the_version_is_that_of_the_installation():
+    from importlib.metadata import PackageNotFoundError, version
+
+    from closedrooms import core
+
+    try:
+        assert core.__version__ == version("closedrooms")
+    except PackageNotFoundError:  # a checkout that nobody installed
+        pytest.skip("closedrooms is not installed")
+
+
+def test_the_docstring_of_a_folder_names_no_file_that_is_gone():
+    tools = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+    for package in tools["packages"]:
+        folder = ROOT.joinpath(*package.split(".")[1:])
+        said = set(re.findall(r"``(\w+)``", ast.get_docstring(ast.parse((folder / "__init__.py").read_text())) or ""))
+        files = {path.stem for path in folder.glob("*.py")}
+        assert said <= files | {"best"}, package  # a method that is named like its folder
 
 
 def test_the_face_of_the_predictor_predicts(tmp_path):

@@ -3,8 +3,9 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame
-from closedrooms.core.shapes import cells_inside, fill_shape, trace_outline
+from closedrooms.core.shapes import cells_inside, fill_shape, mark_doorways, trace_outline
 
 # Quarters of a cell, so that sides and corners often lie on centres of cells.
 PLACES = st.integers(-20, 60).map(lambda quarter: quarter / 4)
@@ -57,3 +58,10 @@ def test_an_outline_passes_only_cells_that_it_touches_and_all_that_it_crosses_we
     within = shapely.length(shapely.intersection(shapely.buffer(cells, -1e-6, join_style="mitre"), shape.boundary))
     assert not (mask & (shapely.distance(cells, shape.boundary) > 1e-9)).any()
     assert mask[within > 1.0].all()
+
+
+def test_a_doorway_reaches_as_far_before_its_leaf_as_behind_and_no_farther_than_its_jambs():
+    doors = [ClosedDoor("level", (5.0, 5.0), ((3.0, 5.0), (7.0, 5.0))), ClosedDoor("no leaf", (5.0, 9.0))]
+    rows, cols = np.nonzero(mark_doorways(doors, GridFrame(1.0, 0.0, 0.0, 12, 12), reach=2.0))
+    assert set(rows) == {3, 4, 5, 6}
+    assert set(cols) == {3, 4, 5, 6}

@@ -5,7 +5,7 @@ from closedrooms.core.door import DoorSighting
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.door_fusion import fuse_doors
-from closedrooms.mapping.keyframe import Keyframe
+from closedrooms.mapping.graph.keyframe import Keyframe
 
 NOTHING = np.empty((0, 2))
 DOOR = ((3.0, 1.0), (3.0, 1.9))

@@ -6,13 +6,19 @@ from hypothesis import strategies as st
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.costmap import NavigationMap, build_costmap, pooled
+from closedrooms.navigation.costmap import Costmap, NavigationMap, pooled
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
 
 
 def grid_of(cells: np.ndarray, origin: tuple[float, float] = (0.0, 0.0)) -> OccupancyGrid:
     return OccupancyGrid(GridFrame(0.05, *origin, *cells.shape), cells.astype(np.int8))
+
+
+def costmap_of(cells: np.ndarray) -> Costmap:
+    navigation = NavigationMap(CONFIG)
+    navigation.update(grid_of(cells))
+    return navigation.costmap
 
 
 def box(rows: int, cols: int) -> np.ndarray:
@@ -22,7 +28,7 @@ def box(rows: int, cols: int) -> np.ndarray:
 
 
 def test_clearance_is_the_distance_to_the_nearest_occupied_edge() -> None:
-    costmap = build_costmap(grid_of(box(41, 201)), CONFIG)
+    costmap = costmap_of(box(41, 201))
     # The middle row lies 20 cells above the wall's row: 0.975 m to its edge, cut at what matters for planning.
     assert costmap.clearance_at(np.array([[5.0, 0.325]]))[0] == pytest.approx(0.275, abs=1e-6)
     assert costmap.clearance_at(np.array([[5.0, 1.0]]))[0] >= CONFIG.preferred_clearance
@@ -31,13 +37,13 @@ def test_clearance_is_the_distance_to_the_nearest_occupied_edge() -> None:
 def test_unknown_and_occupied_cells_have_no_clearance() -> None:
     cells = box(41, 41)
     cells[20:, 20:] = -1
-    costmap = build_costmap(grid_of(cells), CONFIG)
+    costmap = costmap_of(cells)
     points = np.array([[1.5, 1.5], [0.01, 0.01], [99.0, 99.0]])
     assert costmap.clearance_at(points).tolist() == [0.0, 0.0, 0.0]
 
 
 def test_an_anchor_is_the_roomiest_map_cell_of_its_coarse_cell() -> None:
-    costmap = build_costmap(grid_of(box(40, 80)), CONFIG)
+    costmap = costmap_of(box(40, 80))
     cells = np.argwhere(costmap.clearance > 0.0)
     assert np.allclose(costmap.clearance_at(costmap.anchors(cells)), costmap.clearance[cells[:, 0], cells[:, 1]])
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.costmap import Costmap, build_costmap
+from closedrooms.navigation.costmap import Costmap, NavigationMap
 from closedrooms.navigation.planner import Path, plan_path, reachable_cells
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
@@ -23,7 +23,9 @@ def two_rooms(door: float, *, thickness: int = 3, at: int = 80) -> np.ndarray:
 
 
 def costmap_of(cells: np.ndarray) -> Costmap:
-    return build_costmap(OccupancyGrid(GridFrame(0.05, 0.0, 0.0, *cells.shape), cells), CONFIG)
+    navigation = NavigationMap(CONFIG)
+    navigation.update(OccupancyGrid(GridFrame(0.05, 0.0, 0.0, *cells.shape), cells))
+    return navigation.costmap
 
 
 def path_between(cells: np.ndarray, start: tuple[float, float], goal: tuple[float, float]) -> Path | None:

@@ -15,7 +15,7 @@ from closedrooms.predictor.methods import predict
 from closedrooms.predictor.structure.clutter import filter_clutter, free_islands
 from closedrooms.predictor.structure.doorways import FacingDoor
 from closedrooms.predictor.structure.rose import find_rose
-from closedrooms.predictor.structure.wall_thickness import free_interior, measure_thickness
+from closedrooms.predictor.structure.wall_thickness import free_interior, measure_taken
 
 FACES = FacesConfig()
 
@@ -111,7 +111,7 @@ def test_geometric_takes_the_faces_in_sight(mapped, iou):
 @pytest.mark.parametrize("degrees", [0, 30])
 def test_the_thickness_of_walls_is_measured(mapped, degrees):
     angle = math.radians(degrees)
-    measured = measure_thickness(mapped(angle=angle).grid, np.array([angle, angle + math.pi / 2]))
+    measured = measure_taken(mapped(angle=angle).grid, np.array([angle, angle + math.pi / 2]))
     assert measured == pytest.approx(0.2, abs=0.05)
 
 
@@ -127,17 +127,17 @@ def _two_rooms(gap, specks=()):
 
 def test_specks_beside_a_wall_have_no_thickness():
     upright = np.array([math.pi / 2])
-    assert measure_thickness(_two_rooms(0.15), upright) == pytest.approx(0.15)
-    assert measure_thickness(_two_rooms(0.15, specks=range(0, 110)), upright) != pytest.approx(0.05)
+    assert measure_taken(_two_rooms(0.15), upright) == pytest.approx(0.15)
+    assert measure_taken(_two_rooms(0.15, specks=range(0, 110)), upright) != pytest.approx(0.05)
 
 
 def test_thick_walls_take_no_more_of_a_room_than_usual_ones():
-    assert measure_thickness(_two_rooms(0.45), np.array([math.pi / 2])) == pytest.approx(0.20)
+    assert measure_taken(_two_rooms(0.45), np.array([math.pi / 2])) == pytest.approx(0.20)
 
 
 def test_thin_walls_are_assumed_where_none_is_seen_from_both_sides():
     grid = OccupancyGrid(GridFrame(0.05, 0, 0, 40, 40), np.full((40, 40), FREE, dtype=np.int8))
-    assert measure_thickness(grid, np.array([0.0, math.pi / 2])) == pytest.approx(0.10)
+    assert measure_taken(grid, np.array([0.0, math.pi / 2])) == pytest.approx(0.10)
 
 
 def test_walls_take_half_their_thickness_and_all_of_it_beside_known_space():

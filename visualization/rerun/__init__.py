@@ -1,1 +1,5 @@
-"""The recording of a run for the rerun viewer; the only rooms that import rerun."""
+"""The recording of a run for the rerun viewer; nobody else imports rerun.
+
+``opening`` gives a ``recorder`` or none. The recorder writes into a ``stream`` what ``drawables`` make of our values:
+the ``building``, the map as it grows, the ``prediction`` with the tours; ``blueprint`` says how the viewer opens.
+"""

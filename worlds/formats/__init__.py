@@ -1,48 +1,41 @@
 """Floor plans in the formats of others: one file a format, each reads into a :class:`~closedrooms.worlds.FloorPlan`.
 
-The names below are loaded when they are first used.
+``settlement`` is every importer's last step. ``portals`` and ``room_outlines`` serve formats of rooms without walls,
+``hallways`` pyrobosim, ``raster_rooms`` and ``raster_walls`` maps, ``xml_text`` XML.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from closedrooms.core.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from closedrooms.worlds.formats.houseexpo import read_houseexpo
-    from closedrooms.worlds.formats.kth import read_kth
-    from closedrooms.worlds.formats.luperto import read_luperto
-    from closedrooms.worlds.formats.native import plan_from, plan_text, read_plan, write_plan
-    from closedrooms.worlds.formats.pyrobosim import read_pyrobosim
-    from closedrooms.worlds.formats.rmf import read_rmf
-    from closedrooms.worlds.formats.rosmap import read_raster
-    from closedrooms.worlds.formats.sdf import write_sdf
-    from closedrooms.worlds.formats.settlement import Source, settle
-    from closedrooms.worlds.formats.stage import write_stage
+    from closedrooms.worlds.formats.houseexpo import read_houseexpo as read_houseexpo
+    from closedrooms.worlds.formats.kth import read_kth as read_kth
+    from closedrooms.worlds.formats.luperto import read_luperto as read_luperto
+    from closedrooms.worlds.formats.native import plan_from as plan_from
+    from closedrooms.worlds.formats.native import plan_text as plan_text
+    from closedrooms.worlds.formats.native import read_plan as read_plan
+    from closedrooms.worlds.formats.native import write_plan as write_plan
+    from closedrooms.worlds.formats.pyrobosim import read_pyrobosim as read_pyrobosim
+    from closedrooms.worlds.formats.rmf import read_rmf as read_rmf
+    from closedrooms.worlds.formats.rosmap import read_raster as read_raster
+    from closedrooms.worlds.formats.sdf import write_sdf as write_sdf
+    from closedrooms.worlds.formats.settlement import Source as Source
+    from closedrooms.worlds.formats.settlement import settle as settle
+    from closedrooms.worlds.formats.stage import write_stage as write_stage
 
-_HOMES = {
-    "houseexpo": ("read_houseexpo",),
-    "kth": ("read_kth",),
-    "luperto": ("read_luperto",),
-    "native": ("plan_from", "plan_text", "read_plan", "write_plan"),
-    "pyrobosim": ("read_pyrobosim",),
-    "rmf": ("read_rmf",),
-    "rosmap": ("read_raster",),
-    "sdf": ("write_sdf",),
-    "settlement": ("Source", "settle"),
-    "stage": ("write_stage",),
-}
-_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
-
-__all__ = [
-    "Source", "plan_from", "plan_text", "read_houseexpo", "read_kth", "read_luperto", "read_plan", "read_pyrobosim",
-    "read_raster", "read_rmf", "settle", "write_plan", "write_sdf", "write_stage",
-]  # fmt: skip
-
-
-def __getattr__(name: str) -> Any:
-    if name in _HOME_OF:
-        return getattr(import_module(f"{__name__}.{_HOME_OF[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__, __all__ = lazy_face(
+    __name__,
+    {
+        "houseexpo": ("read_houseexpo",),
+        "kth": ("read_kth",),
+        "luperto": ("read_luperto",),
+        "native": ("plan_from", "plan_text", "read_plan", "write_plan"),
+        "pyrobosim": ("read_pyrobosim",),
+        "rmf": ("read_rmf",),
+        "rosmap": ("read_raster",),
+        "sdf": ("write_sdf",),
+        "settlement": ("Source", "settle"),
+        "stage": ("write_stage",),
+    },
+)

@@ -107,7 +107,7 @@ def plan_of_portals(
     fits: tuple[tuple[float, float], ...] = FITS,
     deep_doors: Sequence[DeepDoor] = (),
 ) -> FloorPlan:
-    """A plan whose walls run along the rooms' outlines, with the portals' doors and openings in them.
+    """Make a plan whose walls run along the rooms' outlines, with the portals' doors and openings in them.
 
     Args:
         rooms: Their outlines share edges.

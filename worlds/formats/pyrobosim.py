@@ -2,34 +2,28 @@
 
 import math
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import shapely
-import shapely.ops
 from shapely.geometry import LineString, Polygon
 
-from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import Point
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.core.yaml_text import parse_yaml
-from closedrooms.worlds.formats.portals import DeepDoor, Portal, plan_of_portals
+from closedrooms.worlds.formats.hallways import Hallway, JoinedRooms, extend_into_rooms
+from closedrooms.worlds.formats.portals import plan_of_portals
 from closedrooms.worlds.formats.settlement import Source, settle
-from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
 from closedrooms.worlds.wall_assembly import coverage
 
 WHAT = "a pyrobosim world (YAML)"
 # pyrobosim's own default [m].
 WALL = 0.2
-# A hallway with less floor than this between the walls of its rooms is a deep doorway: no robot stands in it [m].
-STANDING_ROOM = 0.6
-# A hallway whose points stop short of its room is drawn on so far into it [m].
-INTO_ROOM = 0.3
 # Lengths and coordinates beyond this are mistakes [m].
 LARGEST = 10_000.0
 MAX_ELEMENTS = 5000
@@ -65,7 +59,7 @@ def read_pyrobosim(path: str | Path) -> FloorPlan:
         remarks.append(Remark(action="repaired", what="overlaps of rooms", why=why))
     outlines = [footprint.buffer(wall / 2, join_style="mitre") for footprint in footprints]
     hallways = _hallways(halls, names, footprints, path, remarks)
-    building = _Building(footprints, [*outlines], [*names], wall)
+    building = JoinedRooms(footprints, [*outlines], [*names], wall)
     ends = Counter(room for hallway in hallways for room in (hallway.start, hallway.end))
     for hallway in hallways:
         fewer = ends[hallway.start] < ends[hallway.end]
@@ -91,90 +85,9 @@ def read_pyrobosim(path: str | Path) -> FloorPlan:
     return settle(plan, remarks, source, path)
 
 
-@dataclass(frozen=True, slots=True)
-class _Hallway:
-    """A way between two rooms as the file gives it: their numbers, its middle line and clear width [m]."""
-
-    name: str
-    start: int
-    end: int
-    line: LineString
-    width: float
-
-
-class _Building:
-    """Outlines of rooms that hallways are added to one by one."""
-
-    def __init__(self, floors: list[Polygon], polygons: list[Polygon], labels: list[str], wall: float) -> None:
-        self.polygons = polygons
-        self.labels = labels
-        self.portals: list[Portal] = []
-        self.deep_doors: list[DeepDoor] = []
-        self._floors = floors
-        self._wall = wall
-
-    def add(self, hallway: _Hallway, *, door_at_start: bool) -> None:
-        """Join two rooms by a hallway: a room of its own, or a door."""
-        ends = (hallway.start, hallway.end)
-        door_at, open_at = ends if door_at_start else ends[::-1]
-        deep = self._deep_door(hallway)
-        if deep is not None:
-            self.deep_doors.append(deep)
-            return
-        strip = hallway.line.buffer((hallway.width + self._wall) / 2, cap_style="flat", join_style="mitre")
-        area = _between(strip, self.polygons, hallway.start, hallway.end)
-        if area is None or area.buffer(-self._wall / 2).is_empty:
-            self._add_door(hallway.line.interpolate(0.5, normalized=True), door_at, open_at, hallway)
-            return
-        self.polygons.append(area)
-        self.labels.append("hallway")
-        middle = len(self.polygons) - 1
-        for room, has_door in ((open_at, False), (door_at, True)):
-            self._straighten(middle, room)
-            point = _meeting(self.polygons[middle], self.polygons[room])
-            self._add_door(point, room, middle, hallway, has_door=has_door)
-
-    def _deep_door(self, hallway: _Hallway) -> DeepDoor | None:
-        """The door through the walls of two rooms that face each other; ``None`` where a robot fits between them."""
-        start, end = self._floors[hallway.start], self._floors[hallway.end]
-        between = hallway.line.difference(shapely.union_all([start, end]))
-        ways = [part for part in shapely.get_parts(between) if max(part.distance(start), part.distance(end)) < 1e-6]
-        if len(ways) != 1:
-            return None
-        square = _square_to(start, ways[0], end)
-        if square is None:
-            return None
-        first, last = square
-        depth = float(np.hypot(*(last - first)))
-        # Walls that touch are one wall with an ordinary door.
-        if not self._wall + 0.002 < depth < 2 * self._wall + STANDING_ROOM:
-            return None
-        along = (last - first) / depth
-        across = np.array([-along[1], along[0]]) * hallway.width / 2
-        # Both rooms' faces have to lie square to the hallway over its whole width: floor behind them, none before.
-        floors = shapely.union_all([start, end])
-        for tip, inwards in ((first, -0.02 * along), (last, 0.02 * along)):
-            sill = Polygon([tip - across, tip + across, tip + across + inwards, tip - across + inwards])
-            before = Polygon([tip - across, tip + across, tip + across - inwards, tip - across - inwards])
-            if floors.intersection(sill).area < 0.9 * sill.area or floors.intersection(before).area > 0.1 * sill.area:
-                return None
-        middle = (first + last) / 2
-        (x0, y0), (x1, y1) = (middle - across).tolist(), (middle + across).tolist()
-        segment = ((round(x0, 4), round(y0, 4)), (round(x1, 4), round(y1, 4)))
-        pair = (min(hallway.start, hallway.end), max(hallway.start, hallway.end))
-        return DeepDoor(segment, pair, round(depth, 4), self._wall)
-
-    def _straighten(self, hall: int, room: int) -> None:
-        self.polygons[hall], self.polygons[room] = _straight_end(self.polygons[hall], self.polygons[room])
-
-    def _add_door(self, point: shapely.Point, a: int, b: int, hallway: _Hallway, *, has_door: bool = True) -> None:
-        pair = (min(a, b), max(a, b))
-        self.portals.append(Portal((point.x, point.y), pair, has_door, hallway.width, hallway.name))
-
-
 def _hallways(
     rows: list[dict[str, Any]], names: list[str], footprints: list[Polygon], path: Path, remarks: list[Remark]
-) -> list[_Hallway]:
+) -> list[Hallway]:
     """The hallways that can be read; each of the others costs itself only."""
     found = []
     for number, row in enumerate(rows):
@@ -189,7 +102,7 @@ def _hallways(
             why = str(error).removesuffix(f": {path}")
             remarks.append(Remark(action="dropped", what="doors", why=why, names=(name,), loss=True))
             continue
-        found.append(_Hallway(name, start, end, line, width))
+        found.append(Hallway(name, start, end, line, width))
         if row.get("is_open") is False:
             why = "closed in the file, here their doors may be opened and closed"
             remarks.append(Remark(action="guessed", what="hallways", why=why, names=(name,)))
@@ -235,7 +148,7 @@ def _placed_footprints(rows: list[dict[str, Any]], names: list[str], path: Path)
 
 
 def read_pose(value: Any, what: str, path: Path) -> Pose2:
-    """A pose in any form of the world schema, seen from above; what is not given is 0.
+    """Read a pose in any form of the world schema, seen from above; what is not given is 0.
 
     ``[x, y]``, ``[x, y, z]``, ``[x, y, z, yaw]``, ``[x, y, z, qw, qx, qy, qz]``, or a mapping of ``position`` (x, y, z)
     with ``rotation_eul`` (yaw, in radians unless ``angle_units`` says degrees) or ``rotation_quat`` (w, x, y, z).
@@ -333,7 +246,7 @@ def _centre_line(hall: dict[str, Any], name: str, start: Polygon, end: Polygon, 
     """The middle of a hallway: from centroid to centroid, at an angle from the first, or through given points."""
     method = hall.get("conn_method", "auto")
     if method == "points":
-        return _reaching(_points(hall.get("conn_points"), f"{name} conn_points", path), start, end)
+        return extend_into_rooms(_points(hall.get("conn_points"), f"{name} conn_points", path), start, end)
     if method not in ("auto", "angle"):
         raise InvalidInputError(f"{name} has the conn_method {method!r}", expected="auto, angle or points", where=path)
     a, b = start.centroid, end.centroid
@@ -344,71 +257,3 @@ def _centre_line(hall: dict[str, Any], name: str, start: Polygon, end: Polygon, 
     offset = _number(hall.get("offset", 0.0), f"{name} offset", path, above=-1e6)
     x, y = a.x - offset * math.sin(angle), a.y + offset * math.cos(angle)
     return LineString([(x, y), (x + length * math.cos(angle), y + length * math.sin(angle))])
-
-
-def _reaching(points: list[Point], start: Polygon, end: Polygon) -> LineString:
-    """The line through points, drawn on into the rooms at its ends where it stops short of them."""
-    line = [*points]
-    for room, at in ((start, 0), (end, len(points) + 1)):
-        last = shapely.Point(points[0] if at == 0 else points[-1])
-        if not room.contains(last):
-            near, inner = shapely.ops.nearest_points(room, last)[0], room.representative_point()
-            # A little beyond the wall's face, towards the middle of the room.
-            depth = min(INTO_ROOM / max(near.distance(inner), 1e-9), 1.0)
-            line.insert(at if at == 0 else len(line), (
-                near.x + depth * (inner.x - near.x), near.y + depth * (inner.y - near.y)
-            ))  # fmt: skip
-    return LineString(line)
-
-
-def _square_to(start: Polygon, way: LineString, end: Polygon) -> tuple[FloatArray, FloatArray] | None:
-    """The shortest way from one room to the other through the middle of ``way``, square to the first room's face."""
-    middle = way.interpolate(0.5, normalized=True)
-    near = shapely.ops.nearest_points(start, middle)[0]
-    centre = np.array([middle.x, middle.y])
-    normal = centre - np.array([near.x, near.y])
-    if np.hypot(*normal) < 1e-6:
-        return None
-    reach = 10.0 * way.length * normal / np.hypot(*normal)
-    ends = []
-    for room, tip in ((start, centre - reach), (end, centre + reach)):
-        hit = LineString([centre, tip]).intersection(room)
-        if hit.is_empty:
-            return None
-        near = shapely.ops.nearest_points(hit, middle)[0]
-        ends.append(np.array([near.x, near.y]))
-    return ends[0], ends[1]
-
-
-def _between(strip: Polygon, polygons: list[Polygon], start: int, end: int) -> Polygon | None:
-    """What a hallway adds between its rooms; ``None`` where they touch."""
-    left = areal(shapely.difference(strip, shapely.union_all(polygons)))
-    between = [
-        part
-        for part in shapely.get_parts(left)
-        if isinstance(part, Polygon) and max(part.distance(polygons[start]), part.distance(polygons[end])) < 0.01
-    ]
-    return max(between, key=lambda part: part.area, default=None)
-
-
-def _meeting(hall: Polygon, room: Polygon) -> shapely.Point:
-    """The middle of the border that a hallway shares with a room."""
-    shared = hall.boundary.intersection(room.buffer(0.01))
-    return shared.centroid if not shared.is_empty else hall.centroid
-
-
-def _straight_end(hall: Polygon, room: Polygon) -> tuple[Polygon, Polygon]:
-    """A hallway that meets a round or bent wall cut straight; what is cut off goes to the room: a door is straight."""
-    shared = shapely.line_merge(hall.boundary.intersection(room.boundary))
-    points = shapely.get_coordinates(shared)
-    if shared.geom_type != "LineString" or len(points) < 3:
-        return hall, room
-    chord = points[-1] - points[0]
-    normal = np.array([-chord[1], chord[0]]) / np.hypot(*chord)
-    if (np.array(hall.centroid.coords[0]) - points[0]) @ normal < 0.0:
-        normal = -normal
-    reach = float(((points - points[0]) @ normal).max())
-    low, high = points[0] - 10.0 * chord, points[-1] + 10.0 * chord
-    strip = Polygon([low - 50.0 * normal, high - 50.0 * normal, high + reach * normal, low + reach * normal])
-    kept, grown = areal(hall.difference(strip)), areal(room.union(hall.intersection(strip)))
-    return (kept, grown) if isinstance(kept, Polygon) and isinstance(grown, Polygon) else (hall, room)

@@ -5,13 +5,13 @@ from typing import Any
 from xml.etree.ElementTree import ParseError
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import read_text
+from closedrooms.core.incoming import read_text
 
 MAX_BYTES = 100_000_000
 
 
 def parse_xml(path: Path, *, what: str) -> Any:
-    """The root element of an XML file.
+    """Parse the root element of an XML file.
 
     Raises:
         InvalidInputError: Missing, too large, no XML, or XML with entities.

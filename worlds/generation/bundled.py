@@ -5,11 +5,9 @@ nine times, where 15 is the limit of its experiments and the building may have m
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 
-from closedrooms.worlds.formats.native import plan_text, write_plan
+from closedrooms.worlds.formats.native import plan_text
 from closedrooms.worlds.generation.generator import generate
-from closedrooms.worlds.library import PLANS
 from closedrooms.worlds.plan import FloorPlan
 
 # Table 1 of the paper: the most doors that are closed at once.
@@ -80,13 +78,3 @@ def bundled_plan(name: str) -> FloorPlan:
 def bundled_text(name: str) -> str:
     """The JSON text of a bundled world made anew; equal to its file, byte for byte."""
     return plan_text(bundled_plan(name))
-
-
-def write_bundled(folder: Path = PLANS) -> None:
-    """Write all bundled worlds.
-
-    Raises:
-        OutputError: The folder cannot be written.
-    """
-    for name in RECIPES:
-        write_plan(folder / f"{name}.json", bundled_plan(name))

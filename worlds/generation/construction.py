@@ -30,7 +30,7 @@ def turned_sketch(sketch: Sketch, angle: float) -> Sketch:
 
 
 def build_plan(rng: np.random.Generator, sketch: Sketch) -> FloorPlan:
-    """Walls between the rooms, doors in the walls; rooms that no door fits are left out."""
+    """Build walls between the rooms, doors in the walls; rooms that no door fits are left out."""
     outer = float(rng.choice([0.25, 0.3, 0.3]))
     corridor = float(rng.choice([0.15, 0.2, 0.24]))
     partition = float(rng.choice([0.1, 0.12, 0.15]))

@@ -49,7 +49,7 @@ IN_MIDDLE = {"meeting room": TABLE, "conference room": TABLE, "staff room": TABL
 
 
 def furnish(plan: FloorPlan, rng: np.random.Generator) -> FloorPlan:
-    """The plan with furniture in its rooms; every door stays reachable for a small robot."""
+    """Put furniture into the rooms of a plan; every door stays reachable for a small robot."""
     interiors = room_interiors(plan, [room.id for room in plan.rooms])
     things: list[Polygon] = []
     for room in plan.rooms:

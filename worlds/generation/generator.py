@@ -36,7 +36,7 @@ def generate(
     name: str | None = None,
     version: int = GENERATOR_VERSION,
 ) -> FloorPlan:
-    """A building of its own for each seed.
+    """Generate a building of its own for each seed.
 
     Args:
         kind: ``office`` or ``school``.

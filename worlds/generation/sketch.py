@@ -50,7 +50,7 @@ class Sketch:
 
 
 def draw_rooms(rng: np.random.Generator, kind: str, skeleton: Skeleton) -> Sketch:
-    """Rooms along every run and at dead ends, none overlapping another."""
+    """Draw rooms along every run and at dead ends, none overlapping another."""
     sketch = Sketch(["corridor"], [skeleton.corridor], [])
     counts: dict[str, int] = {}
     for run in skeleton.runs:
@@ -99,7 +99,7 @@ def _depth(rng: np.random.Generator, run: Run, bay: Bay, width: float, section: 
 def _draw_bay(
     rng: np.random.Generator, run: Run, bay: Bay, s0: float, s1: float, depth: float, sketch: Sketch
 ) -> list[int]:
-    """Rooms of one bay; the indices of those that were kept."""
+    """Draw rooms of one bay; gives the indices of those that were kept."""
     where = _door_place(rng, bay)
     width = _door_width(rng)
     if bay.layout == "pair":
@@ -140,7 +140,7 @@ def _draw_bay(
 def _draw_end(
     rng: np.random.Generator, kind: str, point: Point, direction: float, corridor: float, sketch: Sketch
 ) -> None:
-    """A room across the dead end of a corridor."""
+    """Draw a room across the dead end of a corridor."""
     options = END_ROOMS[kind]
     label, widths, depths = options[int(rng.integers(len(options)))]
     width, depth = (round(float(rng.uniform(*bounds)) * 10) / 10 for bounds in (widths, depths))

@@ -18,7 +18,6 @@ from closedrooms.predictor.best.hypotheses import Hypotheses
 from closedrooms.predictor.best.method import predict_best
 from closedrooms.predictor.best.pair_features import PAIR_FEATURES, Pairs
 from closedrooms.predictor.best.selection import choose
-from closedrooms.predictor.best.wall_thickness import NOT_MEASURED, WallThickness, measure_walls
 from closedrooms.predictor.config import BestConfig
 from closedrooms.predictor.structure.wall_directions import find_wall_directions
 from closedrooms.predictor.structure.wall_faces import find_face_edges, find_faces
@@ -94,32 +93,6 @@ def test_finds_the_direction_of_a_turned_box(degrees: float) -> None:
     found = find_wall_directions(OccupancyGrid(frame, cells))
     assert found is not None
     assert abs(math.degrees(float(found.angles[0])) - degrees) < 0.5
-
-
-def _walled(thickness: int) -> OccupancyGrid:
-    cells = np.full((100, 100), UNKNOWN, dtype=np.int8)
-    cells[10:90, 10:40] = FREE
-    cells[10:90, 40 + thickness : 90] = FREE
-    cells[10:90, 40] = OCCUPIED
-    cells[10:90, 40 + thickness - 1] = OCCUPIED
-    return OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 100, 100), cells)
-
-
-@pytest.mark.parametrize("thickness", [2, 4, 9])
-def test_measures_the_thickness_of_a_wall_seen_from_both_sides(thickness: int) -> None:
-    assert measure_walls(turn_map(_walled(thickness), 0.0, margin=1.0)).usual == thickness
-
-
-def test_a_map_without_walls_seen_twice_has_the_usual_thickness() -> None:
-    cells = np.full((40, 40), FREE, dtype=np.int8)
-    turned = turn_map(OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 40, 40), cells), 0.0, margin=1.0)
-    assert measure_walls(turned) == NOT_MEASURED
-
-
-def test_the_least_thickness_is_that_of_thin_walls_and_the_usual_one_that_of_most() -> None:
-    cells = np.concatenate((_walled(9).cells[10:70], _walled(4).cells[10:40]))
-    grid = OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 90, 100), cells)
-    assert measure_walls(turn_map(grid, 0.0, margin=1.0)) == WallThickness(usual=9, least=4)
 
 
 def test_pair_features_are_the_same_seen_from_either_door() -> None:

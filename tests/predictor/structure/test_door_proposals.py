@@ -11,7 +11,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.predictor.structure.door_proposal_config import ProposalConfig
 from closedrooms.predictor.structure.door_proposals import propose_doors
-from closedrooms.predictor.structure.wall_faces import face_directions, find_faces
+from closedrooms.predictor.structure.wall_directions import find_wall_directions
 
 RESOLUTION = 0.05
 SIZE = 200
@@ -112,8 +112,9 @@ def test_coarse_cells_find_what_they_can_show() -> None:
 
 def test_wall_directions_are_found_to_half_a_degree() -> None:
     for degrees in (0.0, 20.0, 45.0, 110.0):
-        angles = face_directions(find_faces(corridor(recess=0.0, angle=math.radians(degrees))), RESOLUTION)
-        off = (np.degrees(angles[0]) - 90.0 - degrees + 90.0) % 180.0 - 90.0
+        directions = find_wall_directions(corridor(recess=0.0, angle=math.radians(degrees)))
+        assert directions is not None
+        off = (np.degrees(directions.angles[0]) - degrees + 45.0) % 90.0 - 45.0
         assert abs(off) <= 0.5
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
-from closedrooms.mapping.likelihood_field import LikelihoodField
+from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 
 STEP_DONE = 3e-4
 """Step [m and rad, the latter halved] below which a refinement has converged. Remembered stiffness shortens the steps,

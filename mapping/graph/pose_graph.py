@@ -7,8 +7,8 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.pose import Pose2
+from closedrooms.mapping.graph.normal_equations import Pattern
 from closedrooms.mapping.growing_array import GrowingArray
-from closedrooms.mapping.normal_equations import Pattern
 
 DAMPING = 1e-4
 """First Levenberg-Marquardt damping, relative to the diagonal: nearly Gauss-Newton, since the guess is good."""

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
-from closedrooms.mapping.pose_graph import Edge, PoseGraph, optimise
+from closedrooms.mapping.graph.pose_graph import Edge, PoseGraph, optimise
 
 STRONG = np.diag([1e4, 1e4, 1e5])
 

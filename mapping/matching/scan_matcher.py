@@ -8,10 +8,10 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MatcherConfig
-from closedrooms.mapping.correlative_matcher import Search, Window
-from closedrooms.mapping.gauss_newton_matcher import Refined, refine
-from closedrooms.mapping.heading_search import search_heading
-from closedrooms.mapping.likelihood_field import LikelihoodField
+from closedrooms.mapping.matching.correlative_matcher import Search, Window
+from closedrooms.mapping.matching.gauss_newton_matcher import Refined, refine
+from closedrooms.mapping.matching.heading_search import search_heading
+from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 from closedrooms.mapping.motion import Motion
 
 ADVANTAGE = 0.03
@@ -26,14 +26,12 @@ class Match:
         pose: ``map_T_robot``.
         score: Mean likelihood [0..1].
         hessian: Curvature of the field at the pose, shape (3, 3).
-        searched: The refinement alone was not trusted.
         relocalised: It was found in a wider window than the odometry leaves open.
     """
 
     pose: Pose2
     score: float
     hessian: FloatArray
-    searched: bool
     relocalised: bool = False
 
 
@@ -78,7 +76,7 @@ def match_scan(
         start = search_heading(field, points, guess, sigma_angle, config.window_sigmas)
     direct = refined(start)
     if direct.score >= doubted and motion.unmeasured is None:
-        return Match(direct.pose, direct.score, direct.hessian, searched=False)
+        return Match(direct.pose, direct.score, direct.hessian)
     if motion.unmeasured is None:
         window = Window(
             min(max(config.window_sigmas * sigma_distance, 3 * field.lattice.resolution), config.max_window),
@@ -95,4 +93,4 @@ def match_scan(
             best = other
     if best.score < config.lost_score:
         return None
-    return Match(best.pose, best.score, best.hessian, searched=True)
+    return Match(best.pose, best.score, best.hessian)

@@ -7,13 +7,13 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.gauss_newton_matcher import refine
+from closedrooms.mapping.graph.keyframe import Keyframe
+from closedrooms.mapping.graph.loop_closure import Loop, find_loop
+from closedrooms.mapping.graph.pose_graph import Edge, PoseGraph, optimise
 from closedrooms.mapping.growing_array import GrowingArray
-from closedrooms.mapping.keyframe import Keyframe
-from closedrooms.mapping.likelihood_field import LikelihoodField
-from closedrooms.mapping.loop_closure import Loop, find_loop
+from closedrooms.mapping.matching.gauss_newton_matcher import refine
+from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 from closedrooms.mapping.motion import Motion
-from closedrooms.mapping.pose_graph import Edge, PoseGraph, optimise
 
 
 class KeyframeGraph:

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import RecoveryConfig
-from closedrooms.mapping.correlative_matcher import Search, Window
-from closedrooms.mapping.gauss_newton_matcher import refine
-from closedrooms.mapping.likelihood_field import LikelihoodField
-from closedrooms.mapping.scan_matcher import Match
+from closedrooms.mapping.matching.correlative_matcher import Search, Window
+from closedrooms.mapping.matching.gauss_newton_matcher import refine
+from closedrooms.mapping.matching.likelihood_field import LikelihoodField
+from closedrooms.mapping.matching.scan_matcher import Match
 
 RIVAL_DISTANCE = 0.5
 """Distance [m] from the best pose beyond which another one is a rival."""
@@ -54,7 +54,7 @@ def relocalise(
 
     def refined(pose: Pose2) -> _Candidate:
         match = refine(field, points, pose, iterations=12)
-        return _Candidate(Match(match.pose, match.score, match.hessian, searched=True, relocalised=True), conflict_at)
+        return _Candidate(Match(match.pose, match.score, match.hessian, relocalised=True), conflict_at)
 
     # On the lattice a scan scores less than where the refinement takes it.
     lowest = LATTICE_LOSS * (least if direct is None else min(least, direct.score))

@@ -9,11 +9,11 @@ import numpy as np
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.correlative_matcher import Search, Window
-from closedrooms.mapping.gauss_newton_matcher import refine
-from closedrooms.mapping.keyframe import Keyframe
-from closedrooms.mapping.likelihood_field import LikelihoodField
-from closedrooms.mapping.pose_graph import PoseGraph
+from closedrooms.mapping.graph.keyframe import Keyframe
+from closedrooms.mapping.graph.pose_graph import PoseGraph
+from closedrooms.mapping.matching.correlative_matcher import Search, Window
+from closedrooms.mapping.matching.gauss_newton_matcher import refine
+from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 from closedrooms.mapping.visibility import conflict
 
 RIVAL_DISTANCE = 1.0

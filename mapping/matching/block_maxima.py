@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
-from closedrooms.mapping.likelihood_field import Float32Array
+from closedrooms.mapping.matching.likelihood_field import Float32Array
 
 Mask = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 FEW_BLOCKS = 5

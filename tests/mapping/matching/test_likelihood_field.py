@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from closedrooms.mapping.config import MatcherConfig
-from closedrooms.mapping.likelihood_field import LikelihoodField
+from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 
 
 def value(field: LikelihoodField, x: float, y: float) -> float:

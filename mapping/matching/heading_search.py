@@ -6,7 +6,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
-from closedrooms.mapping.likelihood_field import LikelihoodField
+from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 
 MAX_POINTS = 160
 """Points of a scan that a search looks at; the refinement that follows takes all."""

@@ -27,7 +27,7 @@ class LikelihoodField:
     """
 
     def __init__(self, resolution: float, config: MatcherConfig) -> None:
-        self._sigma, self._new_surface = config.field_sigma, config.new_surface
+        self._new_surface = config.new_surface
         self._reach = max(1, round(REACH_SIGMAS * config.field_sigma / resolution))
         self.lattice = Lattice(resolution)
         self.values: Float32Array = np.zeros(self.lattice.frame.shape, dtype=np.float32)

@@ -7,9 +7,9 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.pose import Pose2
-from closedrooms.mapping.block_maxima import BlockMaxima, pairs
-from closedrooms.mapping.heading_search import MAX_POINTS, PRIOR_COST, angle_step
-from closedrooms.mapping.likelihood_field import Float32Array, LikelihoodField
+from closedrooms.mapping.matching.block_maxima import BlockMaxima, pairs
+from closedrooms.mapping.matching.heading_search import MAX_POINTS, PRIOR_COST, angle_step
+from closedrooms.mapping.matching.likelihood_field import Float32Array, LikelihoodField
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import hit_points, thin
 from closedrooms.mapping.config import MatcherConfig
-from closedrooms.mapping.correlative_matcher import Search, Window
-from closedrooms.mapping.gauss_newton_matcher import refine
-from closedrooms.mapping.heading_search import search_heading
-from closedrooms.mapping.likelihood_field import LikelihoodField
+from closedrooms.mapping.matching.correlative_matcher import Search, Window
+from closedrooms.mapping.matching.gauss_newton_matcher import refine
+from closedrooms.mapping.matching.heading_search import search_heading
+from closedrooms.mapping.matching.likelihood_field import LikelihoodField
+from closedrooms.mapping.matching.scan_matcher import match_scan
 from closedrooms.mapping.motion import Motion
-from closedrooms.mapping.scan_matcher import match_scan
 
 
 def shape(n: int = 240) -> np.ndarray:
