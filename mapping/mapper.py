@@ -22,6 +22,7 @@ from closedrooms.mapping.loop_closure import Loop, find_loop
 from closedrooms.mapping.pose_graph import Edge, PoseGraph, optimise
 from closedrooms.mapping.scan_matcher import Motion, match_scan
 from closedrooms.mapping.scan_preparation import Sweep
+from closedrooms.mapping.sweep_motion import SweepMotion
 
 MOVED = (0.015, 0.003)
 """Correction of a keyframe ([m], [rad]) beyond which it is drawn anew."""
@@ -90,16 +91,18 @@ class Mapper:
         Returns:
             ``map_T_robot`` as estimated.
         """
+        motion = self._sweep_motion(scan, odometry)
         self._predict(odometry)
         matcher, max_range = self._config.matcher, self._config.max_range
-        if sweep is not None:
-            points = sweep.points
+        if sweep is not None and motion is None:
+            points, beams = sweep.points, sweep.beams
         else:
-            points = thin(hit_points(scan, max_range=max_range), matcher.point_spacing, matcher.max_points)
+            hits = hit_points(scan, max_range=max_range, motion=motion)
+            points, beams = thin(hits, matcher.point_spacing, matcher.max_points), None
         if self._keyframes:
             self._match(points)
         if self._wants_keyframe():
-            beams = clean(scan, max_range=max_range) if sweep is None else sweep.beams
+            beams = clean(scan, max_range=max_range, motion=motion) if beams is None else beams
             self._insert(Keyframe(len(self._keyframes), scan.stamp, self._pose, beams, points, self._way))
         latest = self._keyframes[-1]
         keyframe_T_robot = latest.pose.inverse() @ self._pose
@@ -108,6 +111,13 @@ class Mapper:
         self._stamps.append(scan.stamp)
         self._references.append((latest.index, keyframe_T_robot))
         return self._pose
+
+    def _sweep_motion(self, scan: LaserScan, odometry: Pose2) -> SweepMotion | None:
+        """How the robot moved while a sweep was taken, ``None`` where that does not matter or is not known."""
+        if scan.sweep == 0.0 or not self._config.undistort or self._odometry is None or not self._stamps:
+            return None
+        seconds = scan.stamp - self._stamps[-1]
+        return SweepMotion.between(self._odometry, odometry, seconds) if seconds > 0.0 else None
 
     def _predict(self, odometry: Pose2) -> None:
         if self._odometry is not None:

@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.sim.config import STEPS
 
 # PyBullet returns nothing at exactly 16384 rays and raises above (MAX_RAY_INTERSECTION_BATCH_SIZE).
 MAX_RAYS = 16_383
@@ -18,8 +19,18 @@ MAX_RAYS = 16_383
 MAX_TRIANGLES = 30_000
 # Links of one body are truncated silently at 127.
 MAX_LINKS = 126
-# Collision groups that rays meet: static bodies are in group 2, moving ones in group 1.
+# Collision groups. PyBullet puts static bodies into group 2 and moving ones into group 1, and so
+# are rays: a body whose mask leaves group 1 out is not seen.
+MOVING, LEAVES, FLOOR, ROBOT, WHEELS = 1, 4, 32, 64, 128
 EVERYTHING = -1
+# What rays meet: neither the robot that casts them nor the floor.
+SEEN = ~(FLOOR | ROBOT | WHEELS)
+# Iterations of the contact solver; more change no figure of the drives tried.
+ITERATIONS = 20
+# Door leaves: density of a light inner door, 20 kg at 0.9 x 2.1 x 0.05 m [kg/m^3].
+LEAF_DENSITY = 210.0
+# Damping of a leaf's joint [Nm s/rad or N s/m].
+LEAF_DAMPING = 1.0
 # A face whose normal is steeper than this against the floor is floor or ceiling.
 UPRIGHT = 0.5
 
@@ -54,11 +65,13 @@ def upright(vertices: FloatArray, triangles: IntArray) -> IntArray:
 class PhysicsWorld:
     """One PyBullet client; a context manager that always disconnects.
 
-    Every body is a concave triangle mesh (convex hulls are wrong by metres for a building, boxes are slower and let
-    rays that start inside pass). Nothing is stepped: what moves is placed, so that a run costs its rays and no more.
+    Every body of a building is a concave triangle mesh (convex hulls are wrong by metres for a building, boxes are
+    slower and let rays that start inside pass). Without ``stepped`` what moves is placed, so that a run costs its rays
+    and no more; with it there are a floor, gravity and contacts, and time passes in steps of ``1 / STEPS`` seconds.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, stepped: bool = False) -> None:
+        self.stepped = stepped
         self._bullet: Any = None
         self._client = -1
 
@@ -67,7 +80,43 @@ class PhysicsWorld:
         self._client = self._bullet.connect(self._bullet.DIRECT)
         if self._client < 0:
             raise RuntimeError("PyBullet has no client left to give")
+        if self.stepped:
+            self._begin_physics()
         return self
+
+    def _begin_physics(self) -> None:
+        """Set what a prototype found to work, and lay the floor.
+
+        Cone friction turns a robot that grazes a wall into it; file caching would load a rewritten URDF as it was.
+        """
+        bullet, client = self._bullet, self._client
+        bullet.setPhysicsEngineParameter(
+            fixedTimeStep=1.0 / STEPS,
+            numSolverIterations=ITERATIONS,
+            enableConeFriction=0,
+            deterministicOverlappingPairs=1,
+            enableFileCaching=0,
+            physicsClientId=client,
+        )
+        bullet.setGravity(0.0, 0.0, -9.81, physicsClientId=client)
+        plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
+        self.floor = bullet.createMultiBody(0.0, plane, physicsClientId=client)
+        bullet.setCollisionFilterGroupMask(self.floor, -1, FLOOR, WHEELS, physicsClientId=client)
+        bullet.changeDynamics(self.floor, -1, lateralFriction=1.0, physicsClientId=client)
+
+    @property
+    def bullet(self) -> Any:
+        """The ``pybullet`` module, for bodies with joints of their own; every call takes ``client``."""
+        return self._bullet
+
+    @property
+    def client(self) -> int:
+        """``physicsClientId`` of every call."""
+        return self._client
+
+    def step(self) -> None:
+        """Let ``1 / STEPS`` seconds pass."""
+        self._bullet.stepSimulation(physicsClientId=self._client)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -121,15 +170,79 @@ class PhysicsWorld:
             self.move_joint(body, link, 0.0)
         return body
 
+    def add_hung(self, parts: Sequence[MovingPart], limits: Sequence[float]) -> int:
+        """A body whose links hang on one joint each and move by forces between 0 and ``limits`` [rad or m].
+
+        Leaves meet the robot alone: they would jam in the frame that they fill.
+        """
+        bullet, client = self._bullet, self._client
+        sizes = [np.ptp(part.vertices, axis=0) for part in parts]
+        centres = [(part.vertices.min(axis=0) + part.vertices.max(axis=0)) / 2.0 for part in parts]
+        masses = [LEAF_DENSITY * _volume(part) for part in parts]
+        n = len(parts)
+        body: int = bullet.createMultiBody(
+            0.0,
+            -1,
+            linkMasses=masses,
+            linkCollisionShapeIndices=[
+                self._mesh(part.vertices - np.array(part.anchor), part.triangles) for part in parts
+            ],
+            linkVisualShapeIndices=[-1] * n,
+            linkPositions=[list(part.anchor) for part in parts],
+            linkOrientations=[[0.0, 0.0, 0.0, 1.0]] * n,
+            linkInertialFramePositions=[(c - part.anchor).tolist() for c, part in zip(centres, parts, strict=True)],
+            linkInertialFrameOrientations=[[0.0, 0.0, 0.0, 1.0]] * n,
+            linkParentIndices=[0] * n,
+            linkJointTypes=[bullet.JOINT_PRISMATIC if part.slides else bullet.JOINT_REVOLUTE for part in parts],
+            linkJointAxis=[list(part.axis) for part in parts],
+            flags=bullet.URDF_ENABLE_SLEEPING,
+            physicsClientId=client,
+        )
+        for link, (mass, size, limit) in enumerate(zip(masses, sizes, limits, strict=True)):
+            # Limits go by themselves: beside damping they are silently ignored.
+            bullet.changeDynamics(body, link, jointLowerLimit=0.0, jointUpperLimit=limit, physicsClientId=client)
+            squares = size * size
+            inertia = mass / 12.0 * (squares.sum() - squares)
+            bullet.changeDynamics(
+                body, link, localInertiaDiagonal=inertia.tolist(), jointDamping=LEAF_DAMPING, lateralFriction=0.2,
+                physicsClientId=client,
+            )  # fmt: skip
+            bullet.setCollisionFilterGroupMask(body, link, LEAVES, ROBOT | MOVING, physicsClientId=client)
+            self.move_joint(body, link, 0.0)
+        return body
+
+    def drive_joint(self, body: int, link: int, target: float, *, force: float, speed: float) -> None:
+        """Let a motor move a joint to ``target`` [rad or m] at ``speed`` [1/s] with at most ``force`` [Nm or N]."""
+        self._bullet.setJointMotorControl2(
+            body, link, self._bullet.POSITION_CONTROL, targetPosition=target, force=force, maxVelocity=speed,
+            physicsClientId=self._client,
+        )  # fmt: skip
+        self.wake(body)
+
+    def brake_joint(self, body: int, link: int, force: float) -> None:
+        """Hold a joint by friction of ``force`` [Nm or N] and nothing else."""
+        self._bullet.setJointMotorControl2(
+            body, link, self._bullet.VELOCITY_CONTROL, targetVelocity=0.0, force=force, physicsClientId=self._client
+        )
+
+    def wake(self, body: int) -> None:
+        """A sleeping body ignores its motors."""
+        bullet = self._bullet
+        bullet.changeDynamics(body, -1, activationState=bullet.ACTIVATION_STATE_WAKE_UP, physicsClientId=self._client)
+
+    def joint_position(self, body: int, link: int) -> float:
+        """Where a joint is [rad or m]."""
+        return float(self._bullet.getJointState(body, link, physicsClientId=self._client)[0])
+
     def move_joint(self, body: int, link: int, position: float) -> None:
         """Put a joint at ``position`` [rad or m]; rays see it at once."""
         self._bullet.resetJointState(body, link, position, physicsClientId=self._client)
 
-    def cast(self, start: tuple[float, float, float], ends: FloatArray) -> tuple[FloatArray, IntArray]:
+    def cast(self, start: FloatArray, ends: FloatArray) -> tuple[FloatArray, IntArray]:
         """The first thing that each ray hits.
 
         Args:
-            start: Where all rays start, world frame [m].
+            start: Where all rays start, shape (3,), or each, shape (n, 3), world frame [m].
             ends: Where they end at the latest, shape (n, 3).
 
         Returns:
@@ -142,9 +255,9 @@ class PhysicsWorld:
             part = slice(first, min(first + MAX_RAYS, n))
             count = part.stop - part.start
             hits = self._bullet.rayTestBatch(
-                [start] * count,
+                [start.tolist()] * count if start.ndim == 1 else start[part].tolist(),
                 ends[part].tolist(),
-                collisionFilterMask=EVERYTHING,
+                collisionFilterMask=SEEN,
                 physicsClientId=self._client,
             )
             bodies[part] = np.fromiter(map(itemgetter(0), hits), dtype=np.int64, count=count)
@@ -161,6 +274,14 @@ class PhysicsWorld:
         if shape < 0:
             raise RuntimeError(f"PyBullet took no mesh of {len(vertices)} vertices, {len(triangles)} triangles")
         return shape
+
+
+def _volume(part: MovingPart) -> float:
+    """Of the upright prism that a part is [m^3]; its triangles are its sides alone."""
+    a, b, c = (part.vertices[part.triangles[:, i]] for i in range(3))
+    # The divergence of (x, y, 0) is 2, and top and bottom do not count.
+    flux = np.cross(b - a, c - a) * (a + b + c)
+    return float(abs(flux[:, :2].sum()) / 12.0)
 
 
 def _import_pybullet() -> Any:

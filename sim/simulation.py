@@ -6,6 +6,7 @@ from collections.abc import Collection
 from types import TracebackType
 from typing import Self
 
+import numpy as np
 from shapely.geometry import Polygon
 
 from closedrooms.core.arrays import FloatArray
@@ -15,11 +16,13 @@ from closedrooms.core.observation import Observation
 from closedrooms.core.pose import Pose2
 from closedrooms.sim.building import Building, gap_from
 from closedrooms.sim.config import SimConfig
-from closedrooms.sim.contacts import SKIN
+from closedrooms.sim.contacts import SKIN, distance
 from closedrooms.sim.differential_drive import RAMP_SECONDS, Drive
 from closedrooms.sim.lidar import Lidar
 from closedrooms.sim.odometry import Odometry
 from closedrooms.sim.physics_world import PhysicsWorld
+from closedrooms.sim.robot_model import make_model
+from closedrooms.sim.wheeled_robot import WheeledRobot
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start_pose import start_pose
 
@@ -55,14 +58,21 @@ class Simulation:
             InvalidInputError: A door to close that the plan does not have, or a start where the robot does not fit.
         """
         with contextlib.ExitStack() as stack:
-            physics = stack.enter_context(PhysicsWorld())
+            wheels = self.config.body == "wheels"
+            physics = stack.enter_context(PhysicsWorld(stepped=wheels))
             self._building = Building(self.plan, self._closed, self.config, physics)
             start, robot = self.world_T_map, self.config.robot
-            self._drive = Drive(robot, self._building.obstacles, start.x, start.y, start.theta)
             self._check_start()
+            self._drive: Drive | WheeledRobot = (
+                WheeledRobot(physics, make_model(robot, self.config.lidar.height), robot, start.as_tuple())
+                if wheels
+                else Drive(robot, self._building.obstacles, start.x, start.y, start.theta)
+            )
             self._odometry = Odometry(self.config.noise, self._seed)
             self._lidar = Lidar(self.config.lidar, self.config.noise, physics, self._seed)
             self._time = 0.0
+            self._rolls = self.config.lidar.sweep == "rolling"
+            self._way = np.array([[0.0, start.x, start.y, start.theta]])
             self.physics = physics
             self._stack = stack.pop_all()
         return self
@@ -88,11 +98,6 @@ class Simulation:
         return self._drive.collided
 
     @property
-    def velocity(self) -> tuple[float, float]:
-        """True speed [m/s] and turn rate [rad/s]."""
-        return (self._drive.v, self._drive.w)
-
-    @property
     def world_T_robot(self) -> Pose2:  # noqa: N802
         """The true pose in the building frame."""
         return Pose2(self._drive.x, self._drive.y, self._drive.theta)
@@ -108,7 +113,7 @@ class Simulation:
         Two calls at one time see the same world with fresh noise.
         """
         world_T_robot = self.world_T_robot
-        scan, bodies = self._lidar.sweep(world_T_robot, self._time)
+        scan, bodies = self._lidar.sweep(world_T_robot, self._time, self._beam_poses())
         hit = set(bodies.tolist())
         doors = self._building.door_of_body
         seen = [doors[body] for body in sorted(hit & doors.keys()) if doors[body].closed]
@@ -121,7 +126,24 @@ class Simulation:
             )
             for door in seen
         )
-        return Observation(scan, self._odometry.pose, sightings)
+        return Observation(scan, self._odometry.pose, sightings, self._drive.bumps)
+
+    def _beam_poses(self) -> FloatArray | None:
+        """Where the robot was at each beam of a rolling sweep, shape (beams, 3), building frame."""
+        if not self._rolls:
+            return None
+        stamps, poses = self._way[:, 0], self._way[:, 1:]
+        when = self._lidar.beam_stamps(self._time)
+        return np.column_stack([np.interp(when, stamps, axis) for axis in poses.T])
+
+    def _note_way(self) -> None:
+        """Remember the last sweep's way, heading unwrapped."""
+        drive = self._drive
+        row = np.array([[self._time, drive.x, drive.y, drive.theta]])
+        way = np.concatenate((self._way, row))
+        # One row from before the sweep's first beam must stay.
+        first = int(np.searchsorted(way[:, 0], self._time - self.period, side="right")) - 1
+        self._way = way[max(first, 0) :]
 
     def true_ranges(self, world_T_robot: Pose2) -> FloatArray:
         """What the lidar would measure without noise from anywhere, shape (beams,) [m], infinity without a return."""
@@ -143,13 +165,15 @@ class Simulation:
         if math.isnan(v) or math.isnan(w) or not (math.isfinite(duration) and duration > 0.0):
             raise InvalidInputError(f"command v={v}, w={w} for {duration} s", expected="numbers, a duration above 0")
         drive, building = self._drive, self._building
-        drive.collided = False
+        drive.bumps = ()
         end = self._time + duration
-        while building.moving and end - self._time > 1e-9:
+        while (building.moving or self._rolls) and end - self._time > 1e-9:
             part = min(RAMP_SECONDS, end - self._time)
             drive.advance(v, w, part, self._odometry.add)
             building.advance(part, drive.x, drive.y, drive.config.radius)
             self._time += part
+            if self._rolls:
+                self._note_way()
         if end - self._time > 1e-9:
             drive.advance(v, w, end - self._time, self._odometry.add)
         self._time = end
@@ -169,11 +193,12 @@ class Simulation:
     def door_leaves(self, door_id: str) -> list[Polygon]:
         """Where the leaves of a door are now, building frame [m]."""
         door = self._building.doors[door_id]
-        return [Polygon(corners) for corners in door.corners(door.opening)]
+        return [Polygon(corners) for corners in door.corners()]
 
     def _check_start(self) -> None:
         start, radius = self.world_T_map, self.config.robot.radius
-        free = min(gap_from(self._building.solids, start.x, start.y), self._drive.clearance() + radius)
+        near = distance(start.x, start.y, self._building.obstacles.near(start.x, start.y))
+        free = min(gap_from(self._building.solids, start.x, start.y), near)
         if free < radius + SKIN:
             raise InvalidInputError(
                 f"the start ({start.x:g}, {start.y:g}) is {free:.3f} m from a wall, door or furniture",

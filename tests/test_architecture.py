@@ -102,7 +102,7 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
 
 
 def test_an_observation_carries_no_truth() -> None:
-    assert {field.name for field in dataclasses.fields(Observation)} == {"scan", "odometry", "sightings"}
+    assert {field.name for field in dataclasses.fields(Observation)} == {"scan", "odometry", "sightings", "bumps"}
 
 
 @pytest.mark.parametrize("folder", DECIDING)
