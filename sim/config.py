@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
 from typing import Literal
 
@@ -208,6 +209,10 @@ class SimConfig:
     """Errors of lidar and odometry; the default is the level ``medium``."""
     body: Body = "kinematic"
     """What the robot is: a body on driven wheels with contacts and friction, or a disc that code moves exactly."""
+    robot_urdf: Path | None = None
+    """A robot of one's own (URDF) that drives on two sides: its size, wheels and lidar in place of those set here."""
+    robot_wheels: str | None = None
+    """Its driven wheels, names of joints with commas between them; found by themselves where not given."""
     doors: Literal["latched", "unlatched"] = "latched"
     """Closed doors that are latched open by their motor alone; unlatched ones also when the robot pushes (wheels)."""
     heading: float | None = None
@@ -223,6 +228,10 @@ class SimConfig:
         _check("simulation", 0 < self.swing <= math.pi, f"swing {self.swing:g} rad", "above 0, at most half a turn")
         seconds_ok = math.isfinite(self.door_seconds) and self.door_seconds >= 0
         _check("simulation", seconds_ok, f"door_seconds {self.door_seconds:g}", "a finite time, at least 0")
+        if self.robot_urdf is not None or self.robot_wheels is not None:
+            _check("simulation", self.body == "wheels", "of a robot_urdf with a kinematic body", "--sim.body wheels")
+            _check("simulation", self.robot_urdf is not None, f"wheels {self.robot_wheels!r} of no robot",
+                   "a robot_urdf that has them")  # fmt: skip
         if self.body == "wheels":
             steps = STEPS / self.lidar.rate
             _check("simulation", abs(steps - round(steps)) < 1e-9 and steps >= 1.0,

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
@@ -29,6 +30,8 @@ SEEN = ~(FLOOR | ROBOT | WHEELS)
 ITERATIONS = 20
 # Door leaves: density of a light inner door, 20 kg at 0.9 x 2.1 x 0.05 m [kg/m^3].
 LEAF_DENSITY = 210.0
+# Of the earth [m/s^2].
+GRAVITY = 9.81
 # Damping of a leaf's joint [Nm s/rad or N s/m].
 LEAF_DAMPING = 1.0
 # A face whose normal is steeper than this against the floor is floor or ceiling.
@@ -98,7 +101,7 @@ class PhysicsWorld:
             enableFileCaching=0,
             physicsClientId=client,
         )
-        bullet.setGravity(0.0, 0.0, -9.81, physicsClientId=client)
+        bullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
         plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
         self.floor = bullet.createMultiBody(0.0, plane, physicsClientId=client)
         bullet.setCollisionFilterGroupMask(self.floor, -1, FLOOR, WHEELS, physicsClientId=client)
@@ -286,28 +289,29 @@ def _volume(part: MovingPart) -> float:
 
 def _import_pybullet() -> Any:
     """Import PyBullet without the line that it writes to the terminal from C."""
-    with _quiet_stderr():
+    if "pybullet" in sys.modules:
+        return sys.modules["pybullet"]
+    with quiet():
         import pybullet
     return pybullet
 
 
 @contextlib.contextmanager
-def _quiet_stderr() -> Iterator[None]:
-    import sys
-
-    if "pybullet" in sys.modules:
-        yield
-        return
+def quiet() -> Iterator[None]:
+    """Keep what PyBullet writes from C off the terminal."""
     try:
-        kept = os.dup(2)
+        kept = [os.dup(number) for number in (1, 2)]
     except OSError:  # there is no terminal to keep quiet
         yield
         return
+    sys.stdout.flush()
     silent = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(silent, 2)
+        for number in (1, 2):
+            os.dup2(silent, number)
         yield
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
+        for number, descriptor in zip((1, 2), kept, strict=True):
+            os.dup2(descriptor, number)
+            os.close(descriptor)
         os.close(silent)

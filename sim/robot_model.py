@@ -1,6 +1,7 @@
 """The robot as a URDF: the one made from the configuration, and what is known of any that drives on two sides."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from closedrooms.core.robot import RobotConfig
 
@@ -39,22 +40,26 @@ class RobotModel:
     """A robot that drives by the wheels of its two sides.
 
     Attributes:
-        urdf: The description, as text.
+        urdf: The description, as text, or the file that holds it.
         wheels: Driven wheels.
         wheel_radius: Metres.
         track: Distance between the sides that a turn on the spot goes by [m]; of a skid steer more than it measures.
         torque: Of each motor, at most [Nm].
         base_height: Of the base frame above the floor when the robot stands [m].
         heading: Of the direction of travel in the base frame [rad].
+        offset: Middle of the driven wheels in the base frame [m].
+        foreign: It is not ours: frictions are as described, wheels meet walls too, and other joints are let go.
     """
 
-    urdf: str
+    urdf: str | Path
     wheels: tuple[Wheel, ...]
     wheel_radius: float
     track: float
     torque: float
     base_height: float = 0.0
     heading: float = 0.0
+    offset: tuple[float, float] = (0.0, 0.0)
+    foreign: bool = False
 
 
 def robot_mass(config: RobotConfig) -> float:

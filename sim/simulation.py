@@ -21,7 +21,8 @@ from closedrooms.sim.differential_drive import RAMP_SECONDS, Drive
 from closedrooms.sim.lidar import Lidar
 from closedrooms.sim.odometry import Odometry
 from closedrooms.sim.physics_world import PhysicsWorld
-from closedrooms.sim.robot_model import make_model
+from closedrooms.sim.robot_model import RobotModel, make_model
+from closedrooms.sim.robot_urdf import read_robot
 from closedrooms.sim.wheeled_robot import WheeledRobot
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start_pose import start_pose
@@ -44,6 +45,9 @@ class Simulation:
         """
         self.plan = plan
         self.config = config
+        self._model: RobotModel | None = None
+        if config.robot_urdf is not None:
+            self.config, self._model = read_robot(config)
         self._closed = frozenset(closed)
         self._stack = contextlib.ExitStack()
         self._seed = seed
@@ -64,7 +68,9 @@ class Simulation:
             start, robot = self.world_T_map, self.config.robot
             self._check_start()
             self._drive: Drive | WheeledRobot = (
-                WheeledRobot(physics, make_model(robot, self.config.lidar.height), robot, start.as_tuple())
+                WheeledRobot(
+                    physics, self._model or make_model(robot, self.config.lidar.height), robot, start.as_tuple()
+                )
                 if wheels
                 else Drive(robot, self._building.obstacles, start.x, start.y, start.theta)
             )

@@ -8,7 +8,7 @@ from pathlib import Path
 from closedrooms.core.robot import RobotConfig
 from closedrooms.sim.config import STEPS
 from closedrooms.sim.differential_drive import Motion, chord, towards
-from closedrooms.sim.physics_world import EVERYTHING, FLOOR, ROBOT, WHEELS, PhysicsWorld
+from closedrooms.sim.physics_world import EVERYTHING, FLOOR, GRAVITY, ROBOT, WHEELS, PhysicsWorld, quiet
 from closedrooms.sim.robot_model import RobotModel, Wheel
 
 # Encoders are read every so many steps [steps]: the ticks of 20 ms, in which wheel speeds change by little.
@@ -42,6 +42,7 @@ class WheeledRobot:
         self._wheels = self._find_wheels()
         self._joints = [joint for joint, _ in self._wheels]
         self._commanded: tuple[float, float] | None = None
+        self._torque = model.torque if math.isfinite(model.torque) else self._enough_torque()
         self._angles = self._read_wheels()
 
     @property
@@ -73,6 +74,20 @@ class WheeledRobot:
         if steps:
             self._locate()
 
+    @property
+    def tilt(self) -> float:
+        """How far the body leans [rad]."""
+        bullet, client = self._physics.bullet, self._physics.client
+        q = bullet.getBasePositionAndOrientation(self._body, physicsClientId=client)[1]
+        return math.acos(max(-1.0, min(1.0, 1.0 - 2.0 * (q[0] ** 2 + q[1] ** 2))))
+
+    def _enough_torque(self) -> float:
+        """Torque of each motor with which the wheels rather slip than stall [Nm]."""
+        bullet, client = self._physics.bullet, self._physics.client
+        links = range(-1, bullet.getNumJoints(self._body, physicsClientId=client))
+        mass: float = sum(bullet.getDynamicsInfo(self._body, link, physicsClientId=client)[0] for link in links)
+        return 2.0 * mass * GRAVITY * self.model.wheel_radius / len(self._joints)
+
     def _command(self, v: float, w: float) -> None:
         """One step of the ramp; the motors are told when it changes anything."""
         limits = self.config
@@ -90,7 +105,7 @@ class WheeledRobot:
             targetVelocities=[
                 wheel.sign * (self.v - wheel.side * half) / model.wheel_radius for _, wheel in self._wheels
             ],
-            forces=[model.torque] * len(self._joints),
+            forces=[self._torque] * len(self._joints),
             physicsClientId=self._physics.client,
         )
 
@@ -124,25 +139,34 @@ class WheeledRobot:
         base = math.atan2(2.0 * (q[3] * q[2] + q[0] * q[1]), 1.0 - 2.0 * (q[1] ** 2 + q[2] ** 2))
         c, s = math.cos(base), math.sin(base)
         # Bullet tells where the centre of mass is.
-        self.x = x - c * self._centre[0] + s * self._centre[1]
-        self.y = y - s * self._centre[0] - c * self._centre[1]
+        dx, dy = self.model.offset[0] - self._centre[0], self.model.offset[1] - self._centre[1]
+        self.x = x + c * dx - s * dy
+        self.y = y + s * dx + c * dy
         self.theta += _wrapped(base + self.model.heading - self.theta)
 
     def _load(self) -> int:
         """Put the body on the floor."""
         bullet, client, model = self._physics.bullet, self._physics.client, self.model
         base = self.theta - model.heading
+        c, s = math.cos(base), math.sin(base)
+        x, y = self.x - c * model.offset[0] + s * model.offset[1], self.y - s * model.offset[0] - c * model.offset[1]
         with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "robot.urdf"
-            path.write_text(model.urdf)
-            body: int = bullet.loadURDF(
-                str(path),
-                [self.x, self.y, model.base_height],
-                [0.0, 0.0, math.sin(base / 2.0), math.cos(base / 2.0)],
-                flags=bullet.URDF_USE_IMPLICIT_CYLINDER | bullet.URDF_USE_INERTIA_FROM_FILE,
-                physicsClientId=client,
-            )
+            path = model.urdf
+            if isinstance(path, str):
+                (Path(folder) / "robot.urdf").write_text(path)
+                path = Path(folder) / "robot.urdf"
+            with quiet():
+                body: int = bullet.loadURDF(
+                    str(path),
+                    [x, y, model.base_height],
+                    [0.0, 0.0, math.sin(base / 2.0), math.cos(base / 2.0)],
+                    flags=bullet.URDF_USE_IMPLICIT_CYLINDER | bullet.URDF_USE_INERTIA_FROM_FILE,
+                    physicsClientId=client,
+                )
         self._centre = bullet.getDynamicsInfo(body, -1, physicsClientId=client)[3]
+        if model.foreign:
+            self._release(body)
+            return body
         bullet.setCollisionFilterGroupMask(body, -1, ROBOT, EVERYTHING & ~FLOOR, physicsClientId=client)
         bullet.changeDynamics(
             body, -1, lateralFriction=0.0, linearDamping=0.0, angularDamping=0.0, physicsClientId=client
@@ -152,13 +176,23 @@ class WheeledRobot:
             bullet.changeDynamics(body, link, lateralFriction=0.0, physicsClientId=client)
         return body
 
+    def _release(self, body: int) -> None:
+        """Let every link meet floor and walls, and hold no free joint: swivel casters must swivel."""
+        bullet, client = self._physics.bullet, self._physics.client
+        for link in range(-1, bullet.getNumJoints(body, physicsClientId=client)):
+            bullet.setCollisionFilterGroupMask(body, link, ROBOT | WHEELS, EVERYTHING, physicsClientId=client)
+            if link >= 0:
+                info = bullet.getJointInfo(body, link, physicsClientId=client)
+                if info[2] == bullet.JOINT_REVOLUTE and info[8] > info[9]:
+                    bullet.setJointMotorControl2(body, link, bullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client)
+
     def _find_wheels(self) -> list[tuple[int, Wheel]]:
         bullet, client = self._physics.bullet, self._physics.client
         names = {
             bullet.getJointInfo(self._body, link, physicsClientId=client)[1].decode(): link
             for link in range(bullet.getNumJoints(self._body, physicsClientId=client))
         }
-        for wheel in self.model.wheels:
+        for wheel in () if self.model.foreign else self.model.wheels:
             bullet.changeDynamics(self._body, names[wheel.joint], lateralFriction=1.0, physicsClientId=client)
         return [(names[wheel.joint], wheel) for wheel in self.model.wheels]
 
