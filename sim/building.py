@@ -12,6 +12,7 @@ from closedrooms.sim.contacts import Obstacles, edges_of
 from closedrooms.sim.differential_drive import Drive
 from closedrooms.sim.door_leaves import door_leaves
 from closedrooms.sim.doors import Door, HungDoor, PlacedDoor
+from closedrooms.sim.glass import glass_area
 from closedrooms.sim.physics_world import PhysicsWorld, upright
 from closedrooms.worlds.extrusion import extrude
 from closedrooms.worlds.geometry import areal, door_gap, wall_area
@@ -36,7 +37,11 @@ class Building:
         walls = building_solids(plan)
         furniture = areal(shapely.union_all([thing.polygon for thing in plan.furniture]))
         solids = areal(shapely.union_all([walls, furniture]))
-        self._add_static(walls, None)
+        panes = glass_area(plan, walls)
+        self._add_static(areal(walls.difference(panes)) if not panes.is_empty else walls, None)
+        if not panes.is_empty:
+            for body in self._add_static(panes, None):
+                physics.make_glass(body)
         if not furniture.is_empty:
             self._add_static(furniture, FURNITURE_HEIGHT)
         self.obstacles = Obstacles(edges_of(solids), Drive.reach(config.robot))
@@ -46,6 +51,8 @@ class Building:
         for plan_door in inner:
             leaves = door_leaves(plan, plan_door, solids, config.swing)
             door = self.doors[plan_door.id] = hang(plan_door, leaves, physics, self.obstacles, config)
+            if plan_door.material == "glass":
+                physics.make_glass(door.body, len(leaves))
             door.place(0.0 if plan_door.id in closed else 1.0)
         self._opening: list[Door] = []
         self.door_of_body = {door.body: door for door in self.doors.values()}
@@ -80,9 +87,9 @@ class Building:
             door.advance(duration, x, y, radius)
         self._opening = [door for door in self._opening if door.opens]
 
-    def _add_static(self, area: Polygon | shapely.MultiPolygon, height: float | None) -> None:
+    def _add_static(self, area: Polygon | shapely.MultiPolygon, height: float | None) -> list[int]:
         vertices, triangles = extrude(area) if height is None else extrude(area, height=height)
-        self._physics.add_static(vertices, upright(vertices, triangles))
+        return self._physics.add_static(vertices, upright(vertices, triangles))
 
 
 def building_solids(plan: FloorPlan) -> Polygon | shapely.MultiPolygon:

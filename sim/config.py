@@ -198,6 +198,32 @@ def lidar_preset(name: str) -> LidarConfig:
 
 
 @dataclass(frozen=True, kw_only=True)
+class FaultConfig:
+    """What fails on the robot; nothing by default."""
+
+    lost_scans: float = 0.0
+    """Share of sweeps that arrive without a measurement [0..1]."""
+    odometry_freezes: float = 0.0
+    """How often the odometry stands still for a while and then tells the whole way [1/min]."""
+    freeze_seconds: float = 1.0
+    """How long it does [s]."""
+    odometry_drops: float = 0.0
+    """How often the way between two sweeps is never counted [1/min]."""
+    unequal_wheels: float = 0.0
+    """How much larger the right wheel is than the left, unknown to the odometry, as a share of it."""
+    phantom_doors: int = 0
+    """Places on plain walls where the detector often reports a closed door."""
+
+    def __post_init__(self) -> None:
+        for name in ("odometry_freezes", "freeze_seconds", "odometry_drops"):
+            value = getattr(self, name)
+            _check("faults", math.isfinite(value) and value >= 0, f"{name} {value:g}", "a finite number, at least 0")
+        _check("faults", 0 <= self.lost_scans <= 1, f"lost_scans {self.lost_scans:g}", "a share from 0 to 1")
+        _check("faults", abs(self.unequal_wheels) < 0.5, f"unequal_wheels {self.unequal_wheels:g}", "within +-0.5")
+        _check("faults", 0 <= self.phantom_doors <= 1000, f"{self.phantom_doors} phantom_doors", "0 to 1000")
+
+
+@dataclass(frozen=True, kw_only=True)
 class SimConfig:
     """The simulated world and the robot in it."""
 
@@ -215,6 +241,14 @@ class SimConfig:
     """Its driven wheels, names of joints with commas between them; found by themselves where not given."""
     doors: Literal["latched", "unlatched"] = "latched"
     """Closed doors that are latched open by their motor alone; unlatched ones also when the robot pushes (wheels)."""
+    glass: float = 0.0
+    """Share of the walls, drawn by the seed, that are of glass beside those that the plan says are [0..1]."""
+    people: int = 0
+    """People who walk from room to room."""
+    clutter: int = 0
+    """Boxes that somebody puts elsewhere about every minute while the robot is away."""
+    faults: FaultConfig = field(default_factory=FaultConfig)
+    """What fails."""
     heading: float | None = None
     """Heading of the start, and so of the map frame, against the building [rad]; the plan's where not given."""
     swing: float = math.radians(95.0)
@@ -228,6 +262,10 @@ class SimConfig:
         _check("simulation", 0 < self.swing <= math.pi, f"swing {self.swing:g} rad", "above 0, at most half a turn")
         seconds_ok = math.isfinite(self.door_seconds) and self.door_seconds >= 0
         _check("simulation", seconds_ok, f"door_seconds {self.door_seconds:g}", "a finite time, at least 0")
+        _check("simulation", 0 <= self.glass <= 1, f"glass {self.glass:g}", "a share from 0 to 1")
+        for name in ("people", "clutter"):
+            value = getattr(self, name)
+            _check("simulation", 0 <= value <= 200, f"{name} {value}", "0 to 200")
         if self.robot_urdf is not None or self.robot_wheels is not None:
             _check("simulation", self.body == "wheels", "of a robot_urdf with a kinematic body", "--sim.body wheels")
             _check("simulation", self.robot_urdf is not None, f"wheels {self.robot_wheels!r} of no robot",

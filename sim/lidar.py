@@ -9,6 +9,7 @@ from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.random import stream
 from closedrooms.core.scan import LaserScan
 from closedrooms.sim.config import LidarConfig, NoiseConfig
+from closedrooms.sim.glass import comes_back
 from closedrooms.sim.physics_world import PhysicsWorld
 
 # A ray is first cast this much further than its neighbours went last time [share, m]; see ``Lidar.track``.
@@ -31,11 +32,12 @@ class Lidar:
         self._range_noise = stream(seed, "lidar", "range")
         self._outliers = stream(seed, "lidar", "outliers")
         self._dropouts = stream(seed, "lidar", "dropouts")
+        self._glass = stream(seed, "lidar", "glass")
         self._last: FloatArray | None = None
         self._last_heading = 0.0
 
     def cast(self, world_T_robot: Pose2) -> tuple[FloatArray, IntArray]:
-        """True distances of the first hits, every ray cast whole.
+        """True distances of the first hits, every ray cast whole; glass is as if it were not there.
 
         Args:
             world_T_robot: Where the robot stands.
@@ -48,7 +50,7 @@ class Lidar:
         return self._shoot(start, directions, np.full(self.config.beams, self.config.range_max))
 
     def track(self, world_T_robot: Pose2, poses: FloatArray | None = None) -> tuple[FloatArray, IntArray]:
-        """The same as :meth:`cast`, sooner, for poses that follow each other.
+        """The same as :meth:`cast`, sooner, for poses that follow each other; panes return what they return.
 
         A ray's cost grows with its length, and most end after a few metres of the twenty they may go. So each is cast
         as far as its neighbours went in the last sweep and a little further; the few that hit nothing are cast whole.
@@ -67,6 +69,8 @@ class Lidar:
             origin = start if poses is None else start[missed]
             distances[missed], bodies[missed] = self._shoot(origin, directions[missed], whole)
         self._last, self._last_heading = np.minimum(distances, self.config.range_max), heading
+        if self._physics.has_glass:
+            return self._behind_glass(start, directions, distances, bodies)
         return distances, bodies
 
     def _rays(self, world_T_robot: Pose2) -> tuple[FloatArray, FloatArray, float]:
@@ -110,6 +114,21 @@ class Lidar:
         ends[:, :2] = start + directions * lengths[:, None]
         fractions, bodies = self._physics.cast(starts, ends)
         return np.where(bodies >= 0, fractions * lengths, math.inf), bodies
+
+    def _behind_glass(
+        self, start: FloatArray, directions: FloatArray, distances: FloatArray, bodies: IntArray
+    ) -> tuple[FloatArray, IntArray]:
+        """Distances and bodies with the beams that panes before them return."""
+        starts = np.full((*start.shape[:-1], 3), self.config.height)
+        starts[..., :2] = start
+        ends = np.full((len(directions), 3), self.config.height)
+        ends[:, :2] = start + directions * self.config.range_max
+        fractions, panes, normals = self._physics.cast_at_glass(starts, ends)
+        away = fractions * self.config.range_max
+        incidence = np.arccos(np.clip(np.abs((normals[:, :2] * directions).sum(axis=1)), 0.0, 1.0))
+        returned = comes_back(incidence, self._glass.random(len(directions)))
+        first = (panes >= 0) & returned & (away < distances)
+        return np.where(first, away, distances), np.where(first, panes, bodies)
 
     def sweep(self, world_T_robot: Pose2, stamp: float, poses: FloatArray | None = None) -> tuple[LaserScan, IntArray]:
         """One scan with its errors.

@@ -22,10 +22,10 @@ MAX_TRIANGLES = 30_000
 MAX_LINKS = 126
 # Collision groups. PyBullet puts static bodies into group 2 and moving ones into group 1, and so
 # are rays: a body whose mask leaves group 1 out is not seen.
-MOVING, LEAVES, FLOOR, ROBOT, WHEELS = 1, 4, 32, 64, 128
+MOVING, LEAVES, GLASS, FLOOR, ROBOT, WHEELS = 1, 4, 16, 32, 64, 128
 EVERYTHING = -1
-# What rays meet: neither the robot that casts them nor the floor.
-SEEN = ~(FLOOR | ROBOT | WHEELS)
+# What rays meet: neither the robot that casts them nor the floor, and glass not as a rule.
+SEEN = ~(GLASS | FLOOR | ROBOT | WHEELS)
 # Iterations of the contact solver; more change no figure of the drives tried.
 ITERATIONS = 20
 # Door leaves: density of a light inner door, 20 kg at 0.9 x 2.1 x 0.05 m [kg/m^3].
@@ -75,6 +75,7 @@ class PhysicsWorld:
 
     def __init__(self, *, stepped: bool = False) -> None:
         self.stepped = stepped
+        self.has_glass = False
         self._bullet: Any = None
         self._client = -1
 
@@ -146,6 +147,19 @@ class PhysicsWorld:
             shape = self._mesh(vertices[used], local.reshape(-1, 3))
             bodies.append(self._bullet.createMultiBody(0.0, shape, physicsClientId=self._client))
         return bodies
+
+    def make_glass(self, body: int, links: int = 0) -> None:
+        """Let rays pass a static body, or the links of a moving one; :meth:`cast` can ask for glass alone."""
+        bullet, client = self._bullet, self._client
+        for link in range(links) if links else (-1,):
+            bullet.setCollisionFilterGroupMask(body, link, GLASS, ROBOT | MOVING, physicsClientId=client)
+        self.has_glass = True
+
+    def move_body(self, body: int, x: float, y: float) -> None:
+        """Put a static body, its origin first at the world's, at ``(x, y)`` [m]; rays see it at once."""
+        self._bullet.resetBasePositionAndOrientation(
+            body, [x, y, 0.0], [0.0, 0.0, 0.0, 1.0], physicsClientId=self._client
+        )
 
     def add_moving(self, parts: Sequence[MovingPart]) -> int:
         """A body whose links hang on one joint each, fixed to the world; returns the body."""
@@ -242,7 +256,7 @@ class PhysicsWorld:
         self._bullet.resetJointState(body, link, position, physicsClientId=self._client)
 
     def cast(self, start: FloatArray, ends: FloatArray) -> tuple[FloatArray, IntArray]:
-        """The first thing that each ray hits.
+        """The first thing that each ray hits, glass left out.
 
         Args:
             start: Where all rays start, shape (3,), or each, shape (n, 3), world frame [m].
@@ -252,20 +266,33 @@ class PhysicsWorld:
             The share of the way to the end at the hit, shape (n,), 1 without one, and the body hit, shape (n,), -1
             without one.
         """
+        fractions, bodies, _ = self._cast(start, ends, SEEN, normals=False)
+        return fractions, bodies
+
+    def cast_at_glass(self, start: FloatArray, ends: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
+        """As :meth:`cast` for glass alone, with the normals where it is hit, shape (n, 3)."""
+        return self._cast(start, ends, GLASS, normals=True)
+
+    def _cast(
+        self, start: FloatArray, ends: FloatArray, mask: int, *, normals: bool
+    ) -> tuple[FloatArray, IntArray, FloatArray]:
         n = len(ends)
         fractions, bodies = np.empty(n), np.empty(n, dtype=np.int64)
+        found = np.zeros((n if normals else 0, 3))
         for first in range(0, n, MAX_RAYS):
             part = slice(first, min(first + MAX_RAYS, n))
             count = part.stop - part.start
             hits = self._bullet.rayTestBatch(
                 [start.tolist()] * count if start.ndim == 1 else start[part].tolist(),
                 ends[part].tolist(),
-                collisionFilterMask=SEEN,
+                collisionFilterMask=mask,
                 physicsClientId=self._client,
             )
             bodies[part] = np.fromiter(map(itemgetter(0), hits), dtype=np.int64, count=count)
             fractions[part] = np.fromiter(map(itemgetter(2), hits), dtype=np.float64, count=count)
-        return fractions, bodies
+            if normals:
+                found[part] = [hit[4] for hit in hits]
+        return fractions, bodies, found
 
     def _mesh(self, vertices: FloatArray, triangles: IntArray) -> int:
         shape: int = self._bullet.createCollisionShape(

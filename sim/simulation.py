@@ -3,10 +3,12 @@
 import contextlib
 import math
 from collections.abc import Collection
+from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
 import numpy as np
+import shapely
 from shapely.geometry import Polygon
 
 from closedrooms.core.arrays import FloatArray
@@ -15,15 +17,19 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.observation import Observation
 from closedrooms.core.pose import Pose2
 from closedrooms.sim.building import Building, gap_from
-from closedrooms.sim.config import SimConfig
+from closedrooms.sim.bystanders import Floor, MovedBox, Person
+from closedrooms.sim.config import FaultConfig, NoiseConfig, SimConfig
 from closedrooms.sim.contacts import SKIN, distance
 from closedrooms.sim.differential_drive import RAMP_SECONDS, Drive
+from closedrooms.sim.faults import Faults
+from closedrooms.sim.glass import glazed
 from closedrooms.sim.lidar import Lidar
 from closedrooms.sim.odometry import Odometry
 from closedrooms.sim.physics_world import PhysicsWorld
-from closedrooms.sim.robot_model import RobotModel, make_model
+from closedrooms.sim.robot_model import TRACK_SHARE, RobotModel, make_model
 from closedrooms.sim.robot_urdf import read_robot
 from closedrooms.sim.wheeled_robot import WheeledRobot
+from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start_pose import start_pose
 
@@ -43,7 +49,7 @@ class Simulation:
             config: Lidar, robot, noise, doors.
             seed: Of every source of noise.
         """
-        self.plan = plan
+        self.plan = glazed(plan, config.glass, seed)
         self.config = config
         self._model: RobotModel | None = None
         if config.robot_urdf is not None:
@@ -74,7 +80,11 @@ class Simulation:
                 if wheels
                 else Drive(robot, self._building.obstacles, start.x, start.y, start.theta)
             )
-            self._odometry = Odometry(self.config.noise, self._seed)
+            self._odometry = Odometry(self._odometry_noise(), self._seed)
+            self._faults = (
+                None if self.config.faults == FaultConfig() else Faults(self.config.faults, self.plan, self._seed)
+            )
+            self.movers = self._let_in(physics)
             self._lidar = Lidar(self.config.lidar, self.config.noise, physics, self._seed)
             self._time = 0.0
             self._rolls = self.config.lidar.sweep == "rolling"
@@ -132,7 +142,34 @@ class Simulation:
             )
             for door in seen
         )
-        return Observation(scan, self._odometry.pose, sightings, self._drive.bumps)
+        odometry, bumps, faults = self._odometry.pose, self._drive.bumps, self._faults
+        if faults is None:
+            return Observation(scan, odometry, sightings, bumps)
+        sightings = (*sightings, *faults.phantoms(scan, world_T_robot))
+        whole = faults.scan(scan)
+        return Observation(whole, faults.odometry(odometry, self._time), sightings if whole is scan else (), bumps)
+
+    def _odometry_noise(self) -> NoiseConfig:
+        """The noise with what unequal wheels add: a curve where the wheels turn alike."""
+        noise, unequal = self.config.noise, self.config.faults.unequal_wheels
+        track = TRACK_SHARE * self.config.robot.radius if self._model is None else self._model.track
+        return replace(noise, bias_turn_per_metre=noise.bias_turn_per_metre + unequal / track)
+
+    def _let_in(self, physics: PhysicsWorld) -> list[Person | MovedBox]:
+        """People and boxes, none at the robot's start."""
+        config, start, building = self.config, self.world_T_map, self._building
+        if not config.people + config.clutter:
+            return []
+        leaves = [leaf for name in building.doors for leaf in self.door_leaves(name)]
+        solids = areal(shapely.union_all([building.solids, *leaves]))
+        floor = Floor(self.plan, solids, (start.x, start.y))
+        movers: list[Person | MovedBox] = [
+            *(Person(number, floor, physics, building.obstacles, self._seed) for number in range(config.people)),
+            *(MovedBox(number, floor, physics, building.obstacles, self._seed) for number in range(config.clutter)),
+        ]
+        for mover in movers:
+            mover.keep_off(start.x, start.y, 2.0 * config.robot.radius + 1.0)
+        return movers
 
     def _beam_poses(self) -> FloatArray | None:
         """Where the robot was at each beam of a rolling sweep, shape (beams, 3), building frame."""
@@ -173,10 +210,12 @@ class Simulation:
         drive, building = self._drive, self._building
         drive.bumps = ()
         end = self._time + duration
-        while (building.moving or self._rolls) and end - self._time > 1e-9:
+        while (building.moving or self._rolls or self.movers) and end - self._time > 1e-9:
             part = min(RAMP_SECONDS, end - self._time)
             drive.advance(v, w, part, self._odometry.add)
             building.advance(part, drive.x, drive.y, drive.config.radius)
+            for mover in self.movers:
+                mover.advance(part, drive.x, drive.y, drive.config.radius)
             self._time += part
             if self._rolls:
                 self._note_way()

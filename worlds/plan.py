@@ -8,6 +8,7 @@ from shapely.geometry import Polygon
 from closedrooms.core.door import Point, Segment
 
 DoorKind = Literal["hinged", "double", "sliding"]
+Material = Literal["solid", "glass"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,7 @@ class Wall:
     id: str
     segment: Segment
     thickness: float
+    material: Material = "solid"
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +47,7 @@ class PlanDoor:
         kind: How it moves.
         hinge: Which end of ``segment`` the leaf hangs on (0 or 1).
         opens_into: Id of the room into which it swings; ``None`` is outside.
+        material: Of the leaf.
     """
 
     id: str
@@ -53,6 +56,7 @@ class PlanDoor:
     kind: DoorKind = "hinged"
     hinge: Literal[0, 1] = 0
     opens_into: str | None = None
+    material: Material = "solid"
 
     @property
     def width(self) -> float:
