@@ -1,6 +1,6 @@
 """Options of every command. Nothing heavy is imported, so that ``--help`` is quick."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
@@ -60,6 +60,9 @@ class RunConfig:
     out: Path | None = None
     """The run directory; ``runs/<world>-<seed>`` when not given."""
 
+    gui: bool = False
+    """Watch the bodies in PyBullet's window while the robot drives; needs a display."""
+
     level: str | None = None
     """Which level of a file with several."""
 
@@ -87,6 +90,8 @@ class RunConfig:
             raise InvalidInputError(f"--seed {self.seed}", expected="a whole number of at least 0")
         if self.sim is None:
             object.__setattr__(self, "sim", named_sim(self.noise, self.lidar, self.BODY))
+        if self.gui:
+            object.__setattr__(self, "sim", replace(self.sim, gui=True))
         object.__setattr__(self, "predictor", find_method(self.method).checked(self.predictor))
 
 

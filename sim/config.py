@@ -233,6 +233,8 @@ class SimConfig:
     """Body and drive."""
     noise: NoiseConfig = field(default_factory=NoiseConfig)
     """Errors of lidar and odometry; the default is the level ``medium``."""
+    gui: bool = False
+    """Show the bodies in PyBullet's window while they move (wheels); needs a display."""
     body: Body = "kinematic"
     """What the robot is: a body on driven wheels with contacts and friction, or a disc that code moves exactly."""
     robot_urdf: Path | None = None
@@ -266,6 +268,12 @@ class SimConfig:
         for name in ("people", "clutter"):
             value = getattr(self, name)
             _check("simulation", 0 <= value <= 200, f"{name} {value}", "0 to 200")
+        _check(
+            "simulation",
+            not self.gui or self.body == "wheels",
+            "with a window and a kinematic body",
+            "--sim.body wheels",
+        )
         if self.robot_urdf is not None or self.robot_wheels is not None:
             _check("simulation", self.body == "wheels", "of a robot_urdf with a kinematic body", "--sim.body wheels")
             _check("simulation", self.robot_urdf is not None, f"wheels {self.robot_wheels!r} of no robot",

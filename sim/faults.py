@@ -27,7 +27,7 @@ class Faults:
         self._freezes = stream(seed, "faults", "frozen odometry")
         self._drops = stream(seed, "faults", "dropped odometry")
         self._seen = stream(seed, "faults", "phantoms seen")
-        self._phantoms = _phantoms(plan, config.phantom_doors, seed)
+        self._phantoms = phantom_places(plan, config.phantom_doors, seed)
         self._frozen: Pose2 | None = None
         self._frozen_until = -math.inf
         self._stamp = 0.0
@@ -73,18 +73,20 @@ class Faults:
         return tuple(found)
 
 
-def _phantoms(plan: FloorPlan, count: int, seed: int) -> list[tuple[Point, Point]]:
-    """Places on walls that are long enough, drawn by length, building frame [m]."""
+def phantom_places(plan: FloorPlan, count: int, seed: int) -> list[tuple[Point, Point]]:
+    """Places on walls, drawn by length, building frame [m]; the first ones are the same however many are drawn."""
     rng = stream(seed, "faults", "phantoms", plan.name)
     walls = [wall.segment for wall in plan.walls if math.dist(*wall.segment) > PHANTOM_WIDTH]
     if not walls or count == 0:
         return []
     lengths = np.array([math.dist(*segment) for segment in walls])
+    ends = np.cumsum(lengths)
     found = []
-    for index in rng.choice(len(walls), count, p=lengths / lengths.sum()):
-        a, b = np.array(walls[int(index)])
+    for where, along_it in rng.random((count, 2)):
+        index = min(int(np.searchsorted(ends, where * ends[-1])), len(walls) - 1)
+        a, b = np.array(walls[index])
         along = (b - a) / lengths[index]
-        first = a + along * rng.uniform(0.0, lengths[index] - PHANTOM_WIDTH)
+        first = a + along * along_it * (lengths[index] - PHANTOM_WIDTH)
         last = first + along * PHANTOM_WIDTH
         found.append(((float(first[0]), float(first[1])), (float(last[0]), float(last[1]))))
     return found

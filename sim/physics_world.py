@@ -1,6 +1,8 @@
 """PyBullet behind an interface of its own: bodies, joints and rays, nothing about buildings."""
 
 import contextlib
+import ctypes
+import ctypes.util
 import os
 import sys
 from collections.abc import Iterator, Sequence
@@ -12,6 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.errors import InvalidInputError
 from closedrooms.sim.config import STEPS
 
 # PyBullet returns nothing at exactly 16384 rays and raises above (MAX_RAY_INTERSECTION_BATCH_SIZE).
@@ -73,15 +76,19 @@ class PhysicsWorld:
     and no more; with it there are a floor, gravity and contacts, and time passes in steps of ``1 / STEPS`` seconds.
     """
 
-    def __init__(self, *, stepped: bool = False) -> None:
+    def __init__(self, *, stepped: bool = False, window: bool = False) -> None:
         self.stepped = stepped
+        self._window = window
         self.has_glass = False
         self._bullet: Any = None
         self._client = -1
 
     def __enter__(self) -> Self:
+        if self._window:
+            check_display()
         self._bullet = _import_pybullet()
-        self._client = self._bullet.connect(self._bullet.DIRECT)
+        with quiet() if self._window else contextlib.nullcontext():
+            self._client = self._bullet.connect(self._bullet.GUI if self._window else self._bullet.DIRECT)
         if self._client < 0:
             raise RuntimeError("PyBullet has no client left to give")
         if self.stepped:
@@ -304,6 +311,28 @@ class PhysicsWorld:
         if shape < 0:
             raise RuntimeError(f"PyBullet took no mesh of {len(vertices)} vertices, {len(triangles)} triangles")
         return shape
+
+
+def check_display() -> None:
+    """Make sure that there is a display: without one PyBullet ends the whole process when it opens its window.
+
+    Raises:
+        InvalidInputError: There is none, or it does not answer.
+    """
+    if sys.platform != "linux":
+        return
+    display = os.environ.get("DISPLAY", "")
+    library = ctypes.util.find_library("X11")
+    if display and library:
+        x11 = ctypes.CDLL(library)
+        x11.XOpenDisplay.restype = ctypes.c_void_p
+        handle = x11.XOpenDisplay(display.encode())
+        if handle:
+            x11.XCloseDisplay.argtypes = [ctypes.c_void_p]
+            x11.XCloseDisplay(handle)
+            return
+    shown = f"DISPLAY is {display!r}" if display else "DISPLAY is not set"
+    raise InvalidInputError(f"no display for PyBullet's window ({shown})", expected="an X server, or no --gui")
 
 
 def _volume(part: MovingPart) -> float:

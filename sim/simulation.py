@@ -69,7 +69,7 @@ class Simulation:
         """
         with contextlib.ExitStack() as stack:
             wheels = self.config.body == "wheels"
-            physics = stack.enter_context(PhysicsWorld(stepped=wheels))
+            physics = stack.enter_context(PhysicsWorld(stepped=wheels, window=self.config.gui))
             self._building = Building(self.plan, self._closed, self.config, physics)
             start, robot = self.world_T_map, self.config.robot
             self._check_start()
