@@ -13,7 +13,7 @@ from closedrooms.sim.differential_drive import Drive
 from closedrooms.sim.door_leaves import door_leaves
 from closedrooms.sim.doors import Door, HungDoor, PlacedDoor
 from closedrooms.sim.glass import glass_area
-from closedrooms.sim.physics_world import PhysicsWorld, upright
+from closedrooms.sim.physics_world import FURNITURE, PANE, WALLS, Colour, PhysicsWorld, upright
 from closedrooms.worlds.extrusion import extrude
 from closedrooms.worlds.geometry import areal, door_gap, wall_area
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
@@ -38,12 +38,12 @@ class Building:
         furniture = areal(shapely.union_all([thing.polygon for thing in plan.furniture]))
         solids = areal(shapely.union_all([walls, furniture]))
         panes = glass_area(plan, walls)
-        self._add_static(areal(walls.difference(panes)) if not panes.is_empty else walls, None)
+        self._add_static(areal(walls.difference(panes)) if not panes.is_empty else walls, None, WALLS)
         if not panes.is_empty:
-            for body in self._add_static(panes, None):
+            for body in self._add_static(panes, None, PANE):
                 physics.make_glass(body)
         if not furniture.is_empty:
-            self._add_static(furniture, FURNITURE_HEIGHT)
+            self._add_static(furniture, FURNITURE_HEIGHT, FURNITURE)
         self.obstacles = Obstacles(edges_of(solids), Drive.reach(config.robot))
         self.solids = solids
         self.doors: dict[str, Door] = {}
@@ -87,9 +87,9 @@ class Building:
             door.advance(duration, x, y, radius)
         self._opening = [door for door in self._opening if door.opens]
 
-    def _add_static(self, area: Polygon | shapely.MultiPolygon, height: float | None) -> list[int]:
+    def _add_static(self, area: Polygon | shapely.MultiPolygon, height: float | None, colour: Colour) -> list[int]:
         vertices, triangles = extrude(area) if height is None else extrude(area, height=height)
-        return self._physics.add_static(vertices, upright(vertices, triangles))
+        return self._physics.add_static(vertices, upright(vertices, triangles), colour)
 
 
 def building_solids(plan: FloorPlan) -> Polygon | shapely.MultiPolygon:

@@ -12,7 +12,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.random import stream
 from closedrooms.sim.contacts import Obstacles, leaf_edges
-from closedrooms.sim.physics_world import PhysicsWorld, upright
+from closedrooms.sim.physics_world import PERSON, PhysicsWorld, upright
 from closedrooms.worlds.extrusion import extrude
 from closedrooms.worlds.plan import FloorPlan
 
@@ -48,7 +48,7 @@ class _Body:
     ) -> None:
         self._corners, self._name, self._physics, self._obstacles = corners, name, physics, obstacles
         vertices, triangles = extrude(Polygon(corners), height=PERSON_HEIGHT)
-        self._id = physics.add_static(vertices, upright(vertices, triangles))[0]
+        self._id = physics.add_static(vertices, upright(vertices, triangles), PERSON)[0]
         low, high = room.min(axis=0), room.max(axis=0)
         obstacles.add_leaf(name, (*low, *high))
         self.place = (0.0, 0.0)

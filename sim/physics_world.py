@@ -41,6 +41,12 @@ LEAF_DAMPING = 1.0
 UPRIGHT = 0.5
 
 
+Colour = tuple[float, float, float, float]
+WALLS, FURNITURE, LEAF, PANE, PERSON = (
+    (0.75, 0.76, 0.8, 1.0), (0.62, 0.5, 0.38, 1.0), (0.75, 0.4, 0.2, 1.0), (0.5, 0.8, 0.95, 0.4), (0.95, 0.6, 0.1, 1.0),
+)  # fmt: skip
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class MovingPart:
     """A solid on one joint.
@@ -78,7 +84,7 @@ class PhysicsWorld:
 
     def __init__(self, *, stepped: bool = False, window: bool = False) -> None:
         self.stepped = stepped
-        self._window = window
+        self._window = self.visible = window
         self.has_glass = False
         self._bullet: Any = None
         self._client = -1
@@ -141,18 +147,20 @@ class PhysicsWorld:
         """Whether the client is there."""
         return self._client >= 0
 
-    def add_static(self, vertices: FloatArray, triangles: IntArray) -> list[int]:
+    def add_static(self, vertices: FloatArray, triangles: IntArray, colour: Colour = WALLS) -> list[int]:
         """A solid that never moves; returns its bodies (several only beyond PyBullet's limit on vertices).
 
         Args:
             vertices: Shape (n, 3), metres, world frame.
             triangles: Shape (m, 3).
+            colour: Where bodies are shown.
         """
         bodies = []
         for first in range(0, len(triangles), MAX_TRIANGLES):
             used, local = np.unique(triangles[first : first + MAX_TRIANGLES], return_inverse=True)
-            shape = self._mesh(vertices[used], local.reshape(-1, 3))
-            bodies.append(self._bullet.createMultiBody(0.0, shape, physicsClientId=self._client))
+            mesh = vertices[used], local.reshape(-1, 3)
+            shape, seen = self._mesh(*mesh), self._visual(*mesh, colour)
+            bodies.append(self._bullet.createMultiBody(0.0, shape, seen, physicsClientId=self._client))
         return bodies
 
     def make_glass(self, body: int, links: int = 0) -> None:
@@ -211,7 +219,9 @@ class PhysicsWorld:
             linkCollisionShapeIndices=[
                 self._mesh(part.vertices - np.array(part.anchor), part.triangles) for part in parts
             ],
-            linkVisualShapeIndices=[-1] * n,
+            linkVisualShapeIndices=[
+                self._visual(part.vertices - np.array(part.anchor), part.triangles, LEAF) for part in parts
+            ],
             linkPositions=[list(part.anchor) for part in parts],
             linkOrientations=[[0.0, 0.0, 0.0, 1.0]] * n,
             linkInertialFramePositions=[(c - part.anchor).tolist() for c, part in zip(centres, parts, strict=True)],
@@ -300,6 +310,25 @@ class PhysicsWorld:
             if normals:
                 found[part] = [hit[4] for hit in hits]
         return fractions, bodies, found
+
+    def _visual(self, vertices: FloatArray, triangles: IntArray, colour: Colour) -> int:
+        """What is drawn of a mesh, flat faces from both sides; -1, nothing, where nobody looks."""
+        if not self.visible:
+            return -1
+        # Every face has corners and a normal of its own, and once more turned round.
+        faces = np.concatenate((triangles, triangles[:, ::-1]))
+        a, b, c = (vertices[faces[:, i]] for i in range(3))
+        normals = np.cross(b - a, c - a)
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+        shape: int = self._bullet.createVisualShape(
+            self._bullet.GEOM_MESH,
+            vertices=vertices[faces.ravel()].tolist(),
+            indices=list(range(faces.size)),
+            normals=np.repeat(normals, 3, axis=0).tolist(),
+            rgbaColor=list(colour),
+            physicsClientId=self._client,
+        )
+        return shape
 
     def _mesh(self, vertices: FloatArray, triangles: IntArray) -> int:
         shape: int = self._bullet.createCollisionShape(
