@@ -156,13 +156,15 @@ def _starts(config: type[Any], line: _Named, saved: Mapping[str, Any]) -> dict[s
     }
     if "sim" in hints and "noise" in hints:
         from closedrooms.pipeline.config import named_sim
+        from closedrooms.sim.config import Body
 
         named = {
             name: next((v for v in (getattr(line, name), saved.get(name)) if v in get_args(hints[name])), None)
             for name in ("noise", "lidar")
             if name in hints
         }
-        starts["sim"] = named_sim(**{name: value for name, value in named.items() if value is not None})
+        body: Body = getattr(config, "BODY", "kinematic")
+        starts["sim"] = named_sim(**{name: value for name, value in named.items() if value is not None}, body=body)
     if "method" in hints:
         from closedrooms.predictor.methods import METHODS, find_method
 

@@ -17,11 +17,13 @@ class Observation:
         scan: The sweep as measured; its stamp is the observation's.
         odometry: ``odom_T_robot`` as accumulated by the odometry; the identity at the start of a run.
         sightings: Closed doors that a ray of this sweep hit, robot frame.
+        bumps: Directions from which something pressed against the robot since the last observation, robot frame [rad].
     """
 
     scan: LaserScan
     odometry: Pose2
     sightings: tuple[DoorSighting, ...] = ()
+    bumps: tuple[float, ...] = ()
 
     @property
     def stamp(self) -> float:

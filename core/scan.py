@@ -21,6 +21,8 @@ class LaserScan:
         range_min: Shortest range that the sensor reports [m].
         stamp: Time of the sweep [s].
         robot_T_sensor: Where the sensor sits on the robot, ``(x, y, theta)`` in metres and radians.
+        sweep: Time from the first beam to the last [s], negative where the last was measured first, 0 where all are of
+            one instant; the stamp is that of the latest.
     """
 
     ranges: FloatArray
@@ -30,6 +32,7 @@ class LaserScan:
     range_min: float = 0.0
     stamp: float = 0.0
     robot_T_sensor: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    sweep: float = 0.0
 
     def __post_init__(self) -> None:
         ranges = frozen(self.ranges)

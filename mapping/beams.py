@@ -10,6 +10,7 @@ import numpy as np
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
+from closedrooms.mapping.sweep_motion import SweepMotion, beam_ages
 
 OUTLIER_GAP = 0.30
 """A beam that is longer than its surroundings, or shorter than both its neighbours, by this [m] (six sigma of a noisy
@@ -43,13 +44,18 @@ class Beams:
     origin: FloatArray
 
 
-def hit_points(scan: LaserScan, *, max_range: float) -> FloatArray:
-    """End points of all beams that ended on something up to ``max_range`` [m], robot frame, shape (n, 2)."""
+def hit_points(scan: LaserScan, *, max_range: float, motion: SweepMotion | None = None) -> FloatArray:
+    """End points of all beams that ended on something up to ``max_range`` [m], robot frame, shape (n, 2).
+
+    A sweep that took time is straightened by the robot's ``motion``, where that is given.
+    """
     ranges = scan.ranges
     hits = (ranges >= scan.range_min) & (ranges < min(max_range, scan.range_max))
     units, _ = directions(scan.angle_min, scan.angle_increment, ranges.size)
     points: FloatArray = units[hits] * ranges[hits, None]
-    return points if scan.robot_T_sensor == (0.0, 0.0, 0.0) else Pose2(*scan.robot_T_sensor).transform(points)
+    if scan.robot_T_sensor != (0.0, 0.0, 0.0):
+        points = Pose2(*scan.robot_T_sensor).transform(points)
+    return points if motion is None else motion.straighten(points, beam_ages(scan)[hits])
 
 
 def matched_range(scan: LaserScan, *, max_range: float, margin: float) -> float:
@@ -62,7 +68,7 @@ def matched_range(scan: LaserScan, *, max_range: float, margin: float) -> float:
     return scan.range_max - min(margin, MARGIN_SHARE * scan.range_max)
 
 
-def clean(scan: LaserScan, *, max_range: float) -> Beams:
+def clean(scan: LaserScan, *, max_range: float, motion: SweepMotion | None = None) -> Beams:
     """Sort out what a scan says.
 
     Beams far beyond their surroundings (outliers, mixed pixels at edges) are no surface and count as free only as far
@@ -74,11 +80,12 @@ def clean(scan: LaserScan, *, max_range: float) -> Beams:
     Args:
         scan: NaN is a drop-out, infinity (or anything from ``range_max``) is no return up to ``range_max``.
         max_range: Longer ranges are cut to this [m].
+        motion: Of the robot during a sweep that took time; the beams are put where they are seen from at its end.
     """
-    return clean_alike([scan], max_range=max_range)[0]
+    return clean_alike([scan], max_range=max_range, motion=motion)[0]
 
 
-def clean_alike(scans: Sequence[LaserScan], *, max_range: float) -> list[Beams]:
+def clean_alike(scans: Sequence[LaserScan], *, max_range: float, motion: SweepMotion | None = None) -> list[Beams]:
     """As :func:`clean`, for several scans that differ in ranges and stamps only."""
     # Arrays below are of shape (scans, beams).
     first = scans[0]
@@ -119,6 +126,13 @@ def clean_alike(scans: Sequence[LaserScan], *, max_range: float) -> list[Beams]:
     ends = units * np.where(surface, steady, 0.0)[:, :, None]
     if first.robot_T_sensor != (0.0, 0.0, 0.0):
         ends, outlines = sensor.transform(ends), sensor.transform(outlines)
+    if motion is not None:
+        ages = beam_ages(first)
+        # Two points of the outline a beam, and one more at its start where the beams do not close a circle.
+        each = np.repeat(ages, 2)
+        each = each if wrap else np.concatenate((ages[:1], each[:-1]))
+        ends = np.stack([motion.straighten(end, ages) for end in ends])
+        outlines = np.stack([motion.straighten(outline, each) for outline in outlines])
     origin = np.array([sensor.x, sensor.y])
     # Copies: a scan that is kept must not keep the others.
     return [Beams(end[on], outline.copy(), origin) for end, on, outline in zip(ends, surface, outlines, strict=True)]

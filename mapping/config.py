@@ -222,6 +222,9 @@ class MapperConfig:
     log_odds_limit: float = 12.0
     """Largest evidence either way that a cell reports (natural log-odds)."""
 
+    undistort: bool = True
+    """Straighten sweeps that took time by the odometry's motion; scans of one instant stay as they are."""
+
     matcher: MatcherConfig = field(default_factory=MatcherConfig)
     """Scan matching."""
 

@@ -27,6 +27,7 @@ from closedrooms.mapping.matching.scan_matcher import ADVANTAGE, Match, match_sc
 from closedrooms.mapping.motion import Motion
 from closedrooms.mapping.motion_prediction import MotionPrediction
 from closedrooms.mapping.scan_preparation import Sweep
+from closedrooms.mapping.sweep_motion import SweepMotion
 from closedrooms.mapping.visibility import conflict
 
 MOVED = (0.015, 0.003)
@@ -59,6 +60,7 @@ class Mapper:
         self._prediction = MotionPrediction(self._config.recovery, self._events)
         self._motion = Motion()
         self._measured = True
+        self._last_odometry: Pose2 | None = None
         self._usual_score = 0.0
         self._stamps: list[float] = []
         self._references: list[tuple[int, Pose2]] = []
@@ -103,16 +105,19 @@ class Mapper:
         Returns:
             ``map_T_robot`` as estimated.
         """
+        motion = self._sweep_motion(scan, odometry)
         matcher, max_range = self._config.matcher, self._config.max_range
-        if sweep is not None:
+        if sweep is not None and motion is None:
             points = sweep.points
         else:
             reach = matched_range(scan, max_range=max_range, margin=matcher.range_margin)
-            points = thin(hit_points(scan, max_range=reach), matcher.point_spacing, matcher.max_points)
+            hits = hit_points(scan, max_range=reach, motion=motion)
+            points = thin(hits, matcher.point_spacing, matcher.max_points)
 
         @functools.cache
         def beams() -> Beams:
-            return clean(scan, max_range=max_range) if sweep is None else sweep.beams
+            made = None if sweep is None or motion is not None else sweep.beams
+            return clean(scan, max_range=max_range, motion=motion) if made is None else made
 
         before = self._pose
         alternative = self._predict(odometry, scan.stamp)
@@ -121,6 +126,7 @@ class Mapper:
         self._prediction.moved(before.inverse() @ self._pose)
         if self._wants_keyframe():
             self._insert(Keyframe(len(self.keyframes), scan.stamp, self._pose, beams(), points, self._travelled))
+        self._last_odometry = odometry
         latest = self.keyframes[-1]
         keyframe_T_robot = latest.pose.inverse() @ self._pose
         for sighting in sightings:
@@ -128,6 +134,15 @@ class Mapper:
         self._stamps.append(scan.stamp)
         self._references.append((latest.index, keyframe_T_robot))
         return self._pose
+
+    def _sweep_motion(self, scan: LaserScan, odometry: Pose2 | None) -> SweepMotion | None:
+        """How the robot moved while a sweep was taken, ``None`` where that does not matter or is not known."""
+        if scan.sweep == 0.0 or not self._config.undistort or not self._stamps:
+            return None
+        if self._last_odometry is None or odometry is None:
+            return None
+        seconds = scan.stamp - self._stamps[-1]
+        return SweepMotion.between(self._last_odometry, odometry, seconds) if seconds > 0.0 else None
 
     def _predict(self, odometry: Pose2 | None, stamp: float) -> Pose2 | None:
         """Move the pose as the odometry says; the pose that it may mean instead, ``None`` as a rule."""

@@ -53,7 +53,13 @@ class Decider(Protocol):
     def status(self) -> Outcome | None:
         """How it ended, ``None`` before."""
 
-    def command(self, pose: Pose2, scan: LaserScan, grid: Callable[[], OccupancyGrid]) -> tuple[float, float]:
+    def command(
+        self,
+        pose: Pose2,
+        scan: LaserScan,
+        grid: Callable[[], OccupancyGrid],
+        bumps: Sequence[float] = (),
+    ) -> tuple[float, float]:
         """Speed [m/s] and turn rate [rad/s] for now."""
 
 
@@ -150,7 +156,7 @@ def run_loop(
         clock.lap("sense")
         pose = mapper.process(observation.scan, observation.odometry, observation.sightings)
         clock.lap("map")
-        v, w = decider.command(pose, observation.scan, limits.grid)
+        v, w = decider.command(pose, observation.scan, limits.grid, observation.bumps)
         clock.lap("navigate")
         step = Step(observation, pose)
         stamps.append(step.stamp)

@@ -1,6 +1,7 @@
 """Driving along one path: pursuit, obstacles in the scan, and getting free again when stuck."""
 
 import math
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -18,6 +19,9 @@ from closedrooms.navigation.path_follower import (
     steer,
     turn_rate,
 )
+
+# How many times sooner a robot is stuck that something presses against from ahead.
+HELD = 4.0
 
 DriveState = Literal["idle", "driving", "arrived", "stuck", "recovering"]
 
@@ -78,10 +82,17 @@ class Driver:
         self.state = "idle"
         self.recoveries = 0
 
-    def command(self, pose: Pose2, scan: LaserScan, stamp: float) -> tuple[float, float]:
-        """Speed [m/s] and turn rate [rad/s] for now; ``state`` says what they are about."""
+    def command(self, pose: Pose2, scan: LaserScan, stamp: float, bumps: Sequence[float] = ()) -> tuple[float, float]:
+        """Speed [m/s] and turn rate [rad/s] for now; ``state`` says what they are about.
+
+        Args:
+            pose: ``map_T_robot`` as estimated.
+            scan: What the robot sees now.
+            stamp: Time [s].
+            bumps: Directions from which something presses, robot frame [rad].
+        """
         if self.state in {"stuck", "recovering"}:
-            return self._recover(pose, scan, stamp)
+            return self._recover(pose, scan, stamp, bumps)
         if self._track is None:
             self.state = "idle"
             return (0.0, 0.0)
@@ -100,7 +111,8 @@ class Driver:
             # What keeps the robot from the very end stands there: it is as near as it gets.
             self.state = "arrived"
             return (0.0, 0.0)
-        if waited > self.config.stuck_time:
+        # What presses from ahead lets nothing more be hoped for.
+        if waited > self.config.stuck_time / (HELD if any(map(_is_ahead, bumps)) else 1.0):
             self.state = "stuck"
             self.recoveries += 1
             self._back_until, self._started_at = pose, stamp
@@ -121,8 +133,8 @@ class Driver:
         """A turn in place is allowed the time of half a turn on top."""
         return math.pi / self.config.robot.max_turn_rate if wish.v == 0.0 else 0.0
 
-    def _recover(self, pose: Pose2, scan: LaserScan, stamp: float) -> tuple[float, float]:
-        """Back off as far as the scan allows, then turn a little, to alternating sides."""
+    def _recover(self, pose: Pose2, scan: LaserScan, stamp: float, bumps: Sequence[float]) -> tuple[float, float]:
+        """Back off as far as scan and bumps allow, then turn a little, to alternating sides."""
         started, origin = self._started_at, self._back_until
         self.state = "recovering"
         if started is None:
@@ -130,7 +142,8 @@ class Driver:
         limit = self.config.back_off / BACK_SPEED * 2.0
         if origin is not None:
             room = free_distance(near_points(scan, self.config), -BACK_SPEED, 0.0, self.config)
-            if pose.distance(origin) < self.config.back_off and stamp - started < limit and room > 0.0:
+            free = room > 0.0 and all(map(_is_ahead, bumps))
+            if pose.distance(origin) < self.config.back_off and stamp - started < limit and free:
                 return (-BACK_SPEED, 0.0)
             self._back_until, self._started_at = None, stamp
             started = stamp
@@ -139,3 +152,8 @@ class Driver:
             return (0.0, side * self.config.robot.max_turn_rate)
         self._track, self.state = None, "idle"
         return (0.0, 0.0)
+
+
+def _is_ahead(bump: float) -> bool:
+    """Whether a bump is on the front half [rad]."""
+    return math.cos(bump) > 0.0

@@ -1,7 +1,7 @@
 """Exploration: where to look next, until nothing that can be reached is left unknown."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -62,13 +62,20 @@ class Explorer:
         """Searches for a goal so far; changes when ``frontiers``, ``goal`` or its path do."""
         return self._search.count
 
-    def command(self, pose: Pose2, scan: LaserScan, grid: Callable[[], OccupancyGrid]) -> tuple[float, float]:
+    def command(
+        self,
+        pose: Pose2,
+        scan: LaserScan,
+        grid: Callable[[], OccupancyGrid],
+        bumps: Sequence[float] = (),
+    ) -> tuple[float, float]:
         """Speed [m/s] and turn rate [rad/s] for now.
 
         Args:
             pose: ``map_T_robot`` as estimated.
             scan: What the robot sees now.
             grid: Returns the map as estimated; only called when something is decided on it.
+            bumps: Directions from which something presses, robot frame [rad].
 
         Returns:
             The command; (0, 0) once ``status`` is set.
@@ -78,7 +85,7 @@ class Explorer:
         if self.status is not None:
             return (0.0, 0.0)
         if driver.state in {"stuck", "recovering"}:
-            return driver.command(pose, scan, now)
+            return driver.command(pose, scan, now, bumps)
         if self.goal is not None and now - self._checked_at >= self.config.check_interval - 1e-9:
             self._check(pose, grid(), now)
         if self.goal is None and not self._choose(pose, grid(), now):
@@ -86,11 +93,11 @@ class Explorer:
         assert self.goal is not None
         if self._facing_since is not None:
             return self._look(pose, grid, now)
-        command = driver.command(pose, scan, now)
+        command = driver.command(pose, scan, now, bumps)
         if driver.state == "arrived":
             self._facing_since = now
         elif driver.state == "stuck":
-            self._search.map.add_obstacles(touching_points(pose, scan, self.config))
+            self._search.map.add_obstacles(touching_points(pose, scan, self.config, bumps))
             if driver.recoveries % HELD_UP == 0:
                 # What the scan does not show (glass, a sill) holds the robot: what lies behind is reached another way,
                 # or not at all, and the search goes on elsewhere.

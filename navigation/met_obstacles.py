@@ -1,6 +1,7 @@
 """Obstacles that a robot meets and that its map does not show: paths planned later keep off them."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,10 +17,12 @@ TOUCHING = 0.12
 BARRIER_STEP = 0.05
 
 
-def touching_points(pose: Pose2, scan: LaserScan, config: RobotNavigation) -> FloatArray:
-    """Find what the scan shows at the footprint of a stuck robot, map frame, shape (n, 2) [m]."""
+def touching_points(pose: Pose2, scan: LaserScan, config: RobotNavigation, bumps: Sequence[float] = ()) -> FloatArray:
+    """Find what the scan shows at the footprint of a stuck robot, and what presses, map frame, shape (n, 2) [m]."""
     points = near_points(scan, config)
-    return pose.transform(points[np.hypot(*points.T) < config.required_clearance + TOUCHING])
+    felt = config.robot.radius * np.column_stack((np.cos(bumps), np.sin(bumps)))
+    seen = points[np.hypot(*points.T) < config.required_clearance + TOUCHING]
+    return pose.transform(np.concatenate((seen, felt.reshape(-1, 2))))
 
 
 def barrier(pose: Pose2, ahead: FloatArray, config: RobotNavigation) -> FloatArray:

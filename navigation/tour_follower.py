@@ -1,7 +1,7 @@
 """Follows a coverage tour through opened doors while prediction and tour are revised (beyond section 5)."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -128,13 +128,20 @@ class TourFollower:
         unreachable = np.array(self._unreachable).reshape(-1, 2)
         return TourOutcome(self.prediction, tuple(self.revisions), self._stops.visited, unreachable, self._replans)
 
-    def command(self, pose: Pose2, scan: LaserScan, grid: Callable[[], OccupancyGrid]) -> tuple[float, float]:
+    def command(
+        self,
+        pose: Pose2,
+        scan: LaserScan,
+        grid: Callable[[], OccupancyGrid],
+        bumps: Sequence[float] = (),
+    ) -> tuple[float, float]:
         """Speed [m/s] and turn rate [rad/s] for now; (0, 0) once ``status`` is set.
 
         Args:
             pose: ``map_T_robot`` as estimated.
             scan: What the robot sees now.
             grid: Returns the map as estimated; only called when something is decided on it.
+            bumps: Directions from which something presses, robot frame [rad].
         """
         now, driver = scan.stamp, self._driver
         self._started_at = now if self._started_at is None else self._started_at
@@ -142,16 +149,16 @@ class TourFollower:
             return (0.0, 0.0)
         self._note_place(pose)
         if driver.state in {"stuck", "recovering"}:
-            return driver.command(pose, scan, now)
+            return driver.command(pose, scan, now, bumps)
         if now - self._checked_at >= CHECK_INTERVAL - 1e-9:
             self._check(pose, grid(), now)
         if self._goal is None and not self._next(pose, grid(), now):
             return (0.0, 0.0)
-        command = driver.command(pose, scan, now)
+        command = driver.command(pose, scan, now, bumps)
         if driver.state == "arrived":
             self._arrive()
         elif driver.state == "stuck":
-            self._map.add_obstacles(touching_points(pose, scan, self.config))
+            self._map.add_obstacles(touching_points(pose, scan, self.config, bumps))
             self._goal, self._going_back = None, False
             self._attempts += 1
             if driver.recoveries > self.config.max_recoveries:

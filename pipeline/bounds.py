@@ -6,6 +6,7 @@ from shapely.geometry import Polygon
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
+from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig, RobotNavigation
 from closedrooms.navigation.control_loop import Stop
 from closedrooms.worlds.connectivity import connected_parts
@@ -54,6 +55,24 @@ def check_size(plan: FloorPlan, resolution: float, limits: NavigationConfig) -> 
         raise InvalidInputError(
             f"a building of {x_max - x_min:.0f} m x {y_max - y_min:.0f} m has {cells:.2g} cells of {resolution:g} m",
             expected=f"at most {most:.2g} (a larger --mapper.resolution)", where=plan.name,
+        )  # fmt: skip
+
+
+def check_width(plan: FloorPlan, robot: RobotConfig) -> None:
+    """Refuse a robot that no passage between two rooms lets through: it would map the room that it starts in.
+
+    Args:
+        plan: The building; one without passages is left to its one room.
+        robot: Its radius counts, as it counts for the planner.
+
+    Raises:
+        InvalidInputError: It is wider than every passage.
+    """
+    widths = [shapely.LineString(passage.segment).length for passage in plan.passages if None not in passage.rooms]
+    if widths and max(widths) < 2.0 * robot.radius:
+        raise InvalidInputError(
+            f"a robot {2.0 * robot.radius:.2f} m wide where the widest passage measures {max(widths):.2f} m",
+            expected="one that fits through a door", where=plan.name,
         )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import tyro
 
@@ -12,7 +12,7 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.predictor.config import MethodConfig
 from closedrooms.predictor.methods import DEFAULT_METHOD, find_method
-from closedrooms.sim.config import SimConfig, lidar_preset, noise_level
+from closedrooms.sim.config import Body, SimConfig, lidar_preset, noise_level
 
 NoiseName = Literal["none", "low", "medium", "high"]
 LidarName = Literal["default", "hokuyo-utm-30lx", "hokuyo-urg-04lx", "sick-lms111", "rplidar-a2", "robotis-lds-01"]
@@ -21,6 +21,8 @@ LidarName = Literal["default", "hokuyo-utm-30lx", "hokuyo-urg-04lx", "sick-lms11
 @dataclass(frozen=True, kw_only=True)
 class RunConfig:
     """Options of ``closedrooms run``."""
+
+    BODY: ClassVar[Body] = "wheels"
 
     world: tyro.conf.Positional[str] = "office-07"
     """Name of a bundled world (see ``closedrooms worlds list``) or a file that the importers read."""
@@ -58,6 +60,9 @@ class RunConfig:
     out: Path | None = None
     """The run directory; ``runs/<world>-<seed>`` when not given."""
 
+    gui: bool = False
+    """Watch the bodies in PyBullet's window while the robot drives; needs a display."""
+
     level: str | None = None
     """Which level of a file with several."""
 
@@ -84,7 +89,9 @@ class RunConfig:
         if self.seed < 0:
             raise InvalidInputError(f"--seed {self.seed}", expected="a whole number of at least 0")
         if self.sim is None:
-            object.__setattr__(self, "sim", named_sim(self.noise, self.lidar))
+            object.__setattr__(self, "sim", named_sim(self.noise, self.lidar, self.BODY))
+        if self.gui:
+            object.__setattr__(self, "sim", replace(self.sim, gui=True))
         object.__setattr__(self, "predictor", find_method(self.method).checked(self.predictor))
 
 
@@ -117,13 +124,13 @@ class PredictConfig:
         object.__setattr__(self, "predictor", find_method(self.method).checked(self.predictor))
 
 
-def named_sim(noise: str = "medium", lidar: str = "default") -> SimConfig:
+def named_sim(noise: str = "medium", lidar: str = "default", body: Body = "kinematic") -> SimConfig:
     """Settings of the simulation with the numbers that a level of noise and a lidar stand for.
 
     Raises:
         InvalidInputError: No such level or lidar.
     """
-    return SimConfig(noise=noise_level(noise), lidar=lidar_preset(lidar))
+    return SimConfig(noise=noise_level(noise), lidar=lidar_preset(lidar), body=body)
 
 
 @dataclass(frozen=True, kw_only=True)

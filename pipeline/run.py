@@ -23,7 +23,7 @@ from closedrooms.coverage.tour_planner import plan_coverage
 from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.tour_follower import TourPlan
-from closedrooms.pipeline.bounds import check_size, too_narrow
+from closedrooms.pipeline.bounds import check_size, check_width, too_narrow
 from closedrooms.pipeline.config import RunConfig
 from closedrooms.pipeline.drive import DriveResult, DriveSettings, drive_tour
 from closedrooms.pipeline.drive_report import draw_drive, drive_features, drive_metrics
@@ -87,12 +87,17 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
         OutputError: The run directory cannot be written, or holds something that is not ours.
     """
     progress, watch = progress or Silent(), Stopwatch()
+    if config.sim.robot_urdf is not None:
+        from closedrooms.sim.robot_urdf import with_own_robot
+
+        config = replace(config, sim=with_own_robot(config.sim))
     with watch.stage("world"):
         progress.stage("world")
         plan = load_world(config.world, level=config.level)
         closed = choose_closed(plan, config)
         folder = config.out or Path("runs") / f"{file_name(plan.name)}-{config.seed}"
         check_output_folder(folder, "run")
+        check_width(plan, config.sim.robot)
         check_size(plan, config.mapper.resolution, config.navigation)
     manifest: dict[str, Any] = {
         "command": "run",

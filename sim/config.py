@@ -3,12 +3,18 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
+from typing import Literal
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.robot import RobotConfig
 
 FULL_TURN = 2.0 * math.pi
+# Physics steps a second: a multiple of every lidar's rate of 5, 10, 40 and 50 Hz [1/s].
+STEPS = 200
+
+Body = Literal["wheels", "kinematic"]
 
 
 def _check(owner: str, condition: bool, what: str, expected: str) -> None:
@@ -36,6 +42,10 @@ class LidarConfig:
     """Sweeps a second [Hz]."""
     height: float = 0.3
     """Height of the scan plane above the floor [m]; below every wall, door and piece of furniture."""
+    sweep: Literal["instant", "rolling"] = "instant"
+    """Whether all beams of a sweep are of one instant, or measured one after the other as the sensor turns."""
+    turns: Literal["left", "right"] = "left"
+    """Which way the sensor turns, seen from above: left is counter-clockwise."""
     mount: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the sensor sits on the robot: x, y [m] and heading [rad]."""
 
@@ -56,6 +66,14 @@ class LidarConfig:
         if self.field_of_view > FULL_TURN - 1e-6:
             return FULL_TURN / self.beams
         return self.field_of_view / max(self.beams - 1, 1)
+
+    @property
+    def beam_times(self) -> tuple[float, float]:
+        """When the first and the last beam are measured, against the end of the sweep [s]."""
+        if self.sweep == "instant":
+            return (0.0, 0.0)
+        took = self.angle_increment * (self.beams - 1) / FULL_TURN / self.rate
+        return (-took, 0.0) if self.turns == "left" else (0.0, -took)
 
     @property
     def angle_min(self) -> float:
@@ -79,8 +97,8 @@ LIDAR_PRESETS: Mapping[str, LidarConfig] = MappingProxyType(
         "sick-lms111": LidarConfig(
             beams=541, field_of_view=math.radians(270), range_min=0.5, range_max=20.0, rate=50.0
         ),
-        # Slamtec RPLIDAR A2M8: 360 deg, 8000 samples a second at 10 Hz, 0.2 to 12 m.
-        "rplidar-a2": LidarConfig(beams=800, range_min=0.2, range_max=12.0, rate=10.0),
+        # Slamtec RPLIDAR A2M8: 360 deg, 8000 samples a second at 10 Hz, 0.2 to 12 m; clockwise, the others are not.
+        "rplidar-a2": LidarConfig(beams=800, range_min=0.2, range_max=12.0, rate=10.0, turns="right"),
         # Robotis LDS-01 (TurtleBot3): 360 beams of 1 deg, 0.12 to 3.5 m, 300 turns a minute.
         "robotis-lds-01": LidarConfig(beams=360, range_min=0.12, range_max=3.5, rate=5.0),
     }
@@ -180,6 +198,32 @@ def lidar_preset(name: str) -> LidarConfig:
 
 
 @dataclass(frozen=True, kw_only=True)
+class FaultConfig:
+    """What fails on the robot; nothing by default."""
+
+    lost_scans: float = 0.0
+    """Share of sweeps that arrive without a measurement [0..1]."""
+    odometry_freezes: float = 0.0
+    """How often the odometry stands still for a while and then tells the whole way [1/min]."""
+    freeze_seconds: float = 1.0
+    """How long it does [s]."""
+    odometry_drops: float = 0.0
+    """How often the way between two sweeps is never counted [1/min]."""
+    unequal_wheels: float = 0.0
+    """How much larger the right wheel is than the left, unknown to the odometry, as a share of it."""
+    phantom_doors: int = 0
+    """Places on plain walls where the detector often reports a closed door."""
+
+    def __post_init__(self) -> None:
+        for name in ("odometry_freezes", "freeze_seconds", "odometry_drops"):
+            value = getattr(self, name)
+            _check("faults", math.isfinite(value) and value >= 0, f"{name} {value:g}", "a finite number, at least 0")
+        _check("faults", 0 <= self.lost_scans <= 1, f"lost_scans {self.lost_scans:g}", "a share from 0 to 1")
+        _check("faults", abs(self.unequal_wheels) < 0.5, f"unequal_wheels {self.unequal_wheels:g}", "within +-0.5")
+        _check("faults", 0 <= self.phantom_doors <= 1000, f"{self.phantom_doors} phantom_doors", "0 to 1000")
+
+
+@dataclass(frozen=True, kw_only=True)
 class SimConfig:
     """The simulated world and the robot in it."""
 
@@ -189,6 +233,24 @@ class SimConfig:
     """Body and drive."""
     noise: NoiseConfig = field(default_factory=NoiseConfig)
     """Errors of lidar and odometry; the default is the level ``medium``."""
+    gui: bool = False
+    """Show the bodies in PyBullet's window while they move (wheels); needs a display."""
+    body: Body = "kinematic"
+    """What the robot is: a body on driven wheels with contacts and friction, or a disc that code moves exactly."""
+    robot_urdf: Path | None = None
+    """A robot of one's own (URDF) that drives on two sides: its size, wheels and lidar in place of those set here."""
+    robot_wheels: str | None = None
+    """Its driven wheels, names of joints with commas between them; found by themselves where not given."""
+    doors: Literal["latched", "unlatched"] = "latched"
+    """Closed doors that are latched open by their motor alone; unlatched ones also when the robot pushes (wheels)."""
+    glass: float = 0.0
+    """Share of the walls, drawn by the seed, that are of glass beside those that the plan says are [0..1]."""
+    people: int = 0
+    """People who walk from room to room."""
+    clutter: int = 0
+    """Boxes that somebody puts elsewhere about every minute while the robot is away."""
+    faults: FaultConfig = field(default_factory=FaultConfig)
+    """What fails."""
     heading: float | None = None
     """Heading of the start, and so of the map frame, against the building [rad]; the plan's where not given."""
     swing: float = math.radians(95.0)
@@ -202,6 +264,28 @@ class SimConfig:
         _check("simulation", 0 < self.swing <= math.pi, f"swing {self.swing:g} rad", "above 0, at most half a turn")
         seconds_ok = math.isfinite(self.door_seconds) and self.door_seconds >= 0
         _check("simulation", seconds_ok, f"door_seconds {self.door_seconds:g}", "a finite time, at least 0")
+        _check("simulation", 0 <= self.glass <= 1, f"glass {self.glass:g}", "a share from 0 to 1")
+        for name in ("people", "clutter"):
+            value = getattr(self, name)
+            _check("simulation", 0 <= value <= 200, f"{name} {value}", "0 to 200")
+        _check(
+            "simulation",
+            not self.gui or self.body == "wheels",
+            "with a window and a kinematic body",
+            "--sim.body wheels",
+        )
+        if self.robot_urdf is not None or self.robot_wheels is not None:
+            _check("simulation", self.body == "wheels", "of a robot_urdf with a kinematic body", "--sim.body wheels")
+            _check("simulation", self.robot_urdf is not None, f"wheels {self.robot_wheels!r} of no robot",
+                   "a robot_urdf that has them")  # fmt: skip
+        if self.body == "wheels":
+            steps = STEPS / self.lidar.rate
+            _check("simulation", abs(steps - round(steps)) < 1e-9 and steps >= 1.0,
+                   f"lidar rate {self.lidar.rate:g} Hz on a body that is stepped {STEPS} times a second",
+                   f"a rate that divides {STEPS}, or --sim.body kinematic")  # fmt: skip
+        else:
+            _check("simulation", self.doors == "latched", "of a kinematic robot with unlatched doors",
+                   "--sim.body wheels: only a body pushes doors open")  # fmt: skip
         x, y, _ = self.lidar.mount
         _check("simulation", math.hypot(x, y) <= self.robot.radius, f"lidar mounted at ({x:g}, {y:g}) m",
                f"a place on the robot (radius {self.robot.radius:g} m)")  # fmt: skip

@@ -106,10 +106,10 @@ def _grown(box: Sequence[float], margin: float) -> tuple[float, float, float, fl
 
 def distance(x: float, y: float, edges: Sequence[Edge]) -> float:
     """Distance of a point from the nearest edge [m], infinity where there is none."""
-    return min((math.hypot(*_offset(x, y, edge)) for edge in edges), default=math.inf)
+    return min((math.hypot(*offset(x, y, edge)) for edge in edges), default=math.inf)
 
 
-def _offset(x: float, y: float, edge: Edge) -> tuple[float, float]:
+def offset(x: float, y: float, edge: Edge) -> tuple[float, float]:
     """The vector from the nearest point of an edge to ``(x, y)`` [m]."""
     ax, ay, bx, by = edge
     dx, dy = bx - ax, by - ay
@@ -161,7 +161,7 @@ def _free_share(
     contact = None
     deepest = TOUCH
     for edge in edges:
-        ox, oy = _offset(x, y, edge)
+        ox, oy = offset(x, y, edge)
         away = math.hypot(ox, oy)
         gap = away - limit
         closing = -(ox * dx + oy * dy) / away if away > 0.0 else 0.0

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from closedrooms.core.robot import RobotConfig
-from closedrooms.sim.contacts import SKIN, Edge, Obstacles, distance, move_disc
+from closedrooms.sim.contacts import SKIN, Edge, Obstacles, distance, move_disc, offset
 
 # While velocities change, an arc is driven with the mean of so much time [s]: at the default limits this leaves the
 # true way by at most 0.1 mm in half a second (0.5 mm with 0.05 s).
@@ -37,6 +37,14 @@ class Motion(NamedTuple):
 class Drive:
     """Pose and velocity of the robot; it cannot pass through anything.
 
+    Attributes:
+        x: Building frame [m].
+        y: Building frame [m].
+        theta: Building frame [rad].
+        v: Speed [m/s].
+        w: Turn rate [rad/s].
+        bumps: Directions in the robot frame from which something touched since they were last cleared [rad].
+
     The robot is a disc that is moved, not pushed: contacts are found in the plane, against the very edges that the
     walls are extruded from. It slides along what it meets at an angle and stops at what it meets head-on. A wheeled
     body in PyBullet costs 65 microseconds for each step of some milliseconds; this is exact and nearly free. It has no
@@ -48,7 +56,7 @@ class Drive:
         self.x, self.y, self.theta = x, y, theta
         self.v = 0.0
         self.w = 0.0
-        self.collided = False
+        self.bumps: tuple[float, ...] = ()
         self._obstacles = obstacles
 
     @staticmethod
@@ -56,9 +64,10 @@ class Drive:
         """How far from its centre the robot may meet something within one arc [m]."""
         return config.radius + ARC_LENGTH + 2 * SKIN
 
-    def clearance(self) -> float:
-        """Distance of the body from what is near [m]; infinity where nothing is."""
-        return distance(self.x, self.y, self._obstacles.near(self.x, self.y)) - self.config.radius
+    @property
+    def collided(self) -> bool:
+        """Whether it touched anything since ``bumps`` were last cleared."""
+        return bool(self.bumps)
 
     def advance(self, v: float, w: float, duration: float, sink: Callable[[Motion], None]) -> None:
         """Follow a velocity command for some time.
@@ -76,8 +85,8 @@ class Drive:
         while left > 1e-12:
             time = self._piece(v, w, left)
             v0, w0 = self.v, self.w
-            self.v = _towards(v0, v, limits.max_acceleration * time)
-            self.w = _towards(w0, w, limits.max_turn_acceleration * time)
+            self.v = towards(v0, v, limits.max_acceleration * time)
+            self.w = towards(w0, w, limits.max_turn_acceleration * time)
             motion = self._arc((v0 + self.v) / 2 * time, (w0 + self.w) / 2 * time)
             sink(motion)
             left -= time
@@ -102,7 +111,7 @@ class Drive:
     def _arc(self, way: float, turn: float) -> Motion:
         edges = self._obstacles.near(self.x, self.y) if way else ()
         if not edges or distance(self.x, self.y, edges) > self.config.radius + SKIN + abs(way):
-            motion = Motion(*_chord(way, turn), turn)
+            motion = Motion(*chord(way, turn), turn)
             self._apply(motion)
             return motion
         return self._arc_beside(way, turn, edges)
@@ -111,7 +120,7 @@ class Drive:
         """An arc that may meet something, chord by chord."""
         x0, y0, theta0 = self.x, self.y, self.theta
         chords = max(math.ceil(abs(way) / CHORD_LENGTH), math.ceil(abs(turn) / CHORD_TURN), 1)
-        step_x, step_y = _chord(way / chords, turn / chords)
+        step_x, step_y = chord(way / chords, turn / chords)
         touched = False
         for _ in range(chords):
             c, s = math.cos(self.theta), math.sin(self.theta)
@@ -123,10 +132,16 @@ class Drive:
         c, s = math.cos(theta0), math.sin(theta0)
         motion = Motion(c * dx + s * dy, c * dy - s * dx, turn)
         if touched:
-            self.collided = True
+            self._feel(edges)
             if math.hypot(dx, dy) < STALLED * abs(way):
                 self.v = 0.0
         return motion
+
+    def _feel(self, edges: Sequence[Edge]) -> None:
+        """Note from which direction the nearest thing touches, in the robot frame [rad]."""
+        away = min((offset(self.x, self.y, edge) for edge in edges), key=lambda v: math.hypot(*v))
+        bearing = math.remainder(math.atan2(-away[1], -away[0]) - self.theta, 2.0 * math.pi)
+        self.bumps = tuple(sorted({round(bearing, 1), *self.bumps}))
 
     def _apply(self, motion: Motion) -> None:
         c, s = math.cos(self.theta), math.sin(self.theta)
@@ -135,14 +150,14 @@ class Drive:
         self.theta += motion.turn
 
 
-def _towards(now: float, wanted: float, change: float) -> float:
+def towards(now: float, wanted: float, change: float) -> float:
     """``wanted``, or as near to it as ``change`` allows."""
     if abs(wanted - now) <= change * (1 + 1e-9):
         return wanted
     return now + math.copysign(change, wanted - now)
 
 
-def _chord(way: float, turn: float) -> tuple[float, float]:
+def chord(way: float, turn: float) -> tuple[float, float]:
     """Where an arc of length ``way`` [m] that turns by ``turn`` [rad] ends, in the frame of its start [m]."""
     if abs(turn) < 1e-9:
         return (way, way * turn / 2)

@@ -9,6 +9,7 @@ from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.random import stream
 from closedrooms.core.scan import LaserScan
 from closedrooms.sim.config import LidarConfig, NoiseConfig
+from closedrooms.sim.glass import comes_back
 from closedrooms.sim.physics_world import PhysicsWorld
 
 # A ray is first cast this much further than its neighbours went last time [share, m]; see ``Lidar.track``.
@@ -18,7 +19,7 @@ FURTHER, MARGIN = 1.05, 0.2
 class Lidar:
     """A scanner that casts PyBullet's rays, one batch a sweep.
 
-    A sweep is taken at one instant: the robot does not move within it.
+    A sweep is taken at one instant, or beam after beam while the robot moves on.
     """
 
     def __init__(self, config: LidarConfig, noise: NoiseConfig, physics: PhysicsWorld, seed: int) -> None:
@@ -31,11 +32,12 @@ class Lidar:
         self._range_noise = stream(seed, "lidar", "range")
         self._outliers = stream(seed, "lidar", "outliers")
         self._dropouts = stream(seed, "lidar", "dropouts")
+        self._glass = stream(seed, "lidar", "glass")
         self._last: FloatArray | None = None
         self._last_heading = 0.0
 
     def cast(self, world_T_robot: Pose2) -> tuple[FloatArray, IntArray]:
-        """True distances of the first hits, every ray cast whole.
+        """True distances of the first hits, every ray cast whole; glass is as if it were not there.
 
         Args:
             world_T_robot: Where the robot stands.
@@ -47,28 +49,49 @@ class Lidar:
         start, directions, _ = self._rays(world_T_robot)
         return self._shoot(start, directions, np.full(self.config.beams, self.config.range_max))
 
-    def track(self, world_T_robot: Pose2) -> tuple[FloatArray, IntArray]:
-        """The same as :meth:`cast`, sooner, for poses that follow each other.
+    def track(self, world_T_robot: Pose2, poses: FloatArray | None = None) -> tuple[FloatArray, IntArray]:
+        """The same as :meth:`cast`, sooner, for poses that follow each other; panes return what they return.
 
         A ray's cost grows with its length, and most end after a few metres of the twenty they may go. So each is cast
         as far as its neighbours went in the last sweep and a little further; the few that hit nothing are cast whole.
         The first hit of a shorter ray is the first hit of the whole one: nothing is lost.
+
+        Args:
+            world_T_robot: Where the robot stands.
+            poses: Where it was at each beam, ``(x, y, theta)``, shape (beams, 3), of a rolling sweep.
         """
-        start, directions, heading = self._rays(world_T_robot)
+        start, directions, heading = self._rays(world_T_robot) if poses is None else self._rolling_rays(poses)
         lengths = self._expected(heading)
         distances, bodies = self._shoot(start, directions, lengths)
         missed = np.flatnonzero(np.isinf(distances) & (lengths < self.config.range_max))
         if missed.size:
             whole = np.full(missed.size, self.config.range_max)
-            distances[missed], bodies[missed] = self._shoot(start, directions[missed], whole)
+            origin = start if poses is None else start[missed]
+            distances[missed], bodies[missed] = self._shoot(origin, directions[missed], whole)
         self._last, self._last_heading = np.minimum(distances, self.config.range_max), heading
+        if self._physics.has_glass:
+            return self._behind_glass(start, directions, distances, bodies)
         return distances, bodies
 
-    def _rays(self, world_T_robot: Pose2) -> tuple[tuple[float, float], FloatArray, float]:
-        """Where the sensor is [m], the beams' directions, shape (beams, 2), and its heading [rad]."""
+    def _rays(self, world_T_robot: Pose2) -> tuple[FloatArray, FloatArray, float]:
+        """Where the sensor is, shape (2,) [m], the beams' directions, shape (beams, 2), and its heading [rad]."""
         sensor = world_T_robot @ self._mount
         angles = self._angles + sensor.theta
-        return (sensor.x, sensor.y), np.column_stack((np.cos(angles), np.sin(angles))), sensor.theta
+        return np.array([sensor.x, sensor.y]), np.column_stack((np.cos(angles), np.sin(angles))), sensor.theta
+
+    def _rolling_rays(self, poses: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+        """As :meth:`_rays` with a place of the sensor for each beam, shape (beams, 2) [m]."""
+        headings = poses[:, 2]
+        c, s = np.cos(headings), np.sin(headings)
+        x, y = self._mount.x, self._mount.y
+        starts = poses[:, :2] + np.column_stack((c * x - s * y, s * x + c * y))
+        angles = self._angles + headings + self._mount.theta
+        return starts, np.column_stack((np.cos(angles), np.sin(angles))), float(headings[-1]) + self._mount.theta
+
+    def beam_stamps(self, stamp: float) -> FloatArray:
+        """When each beam of a sweep that ends at ``stamp`` [s] is measured, shape (beams,) [s]."""
+        first, last = self.config.beam_times
+        return stamp + np.linspace(first, last, self.config.beams)
 
     def _expected(self, heading: float) -> FloatArray:
         """How far to cast each ray at first [m], shape (beams,)."""
@@ -84,27 +107,53 @@ class Lidar:
         expected: FloatArray = np.minimum(around * FURTHER + MARGIN, longest)
         return expected
 
-    def _shoot(
-        self, start: tuple[float, float], directions: FloatArray, lengths: FloatArray
-    ) -> tuple[FloatArray, IntArray]:
-        ends = np.empty((len(directions), 3))
-        ends[:, :2] = np.array(start) + directions * lengths[:, None]
-        ends[:, 2] = self.config.height
-        fractions, bodies = self._physics.cast((*start, self.config.height), ends)
+    def _shoot(self, start: FloatArray, directions: FloatArray, lengths: FloatArray) -> tuple[FloatArray, IntArray]:
+        starts = np.full((*start.shape[:-1], 3), self.config.height)
+        starts[..., :2] = start
+        ends = np.full((len(directions), 3), self.config.height)
+        ends[:, :2] = start + directions * lengths[:, None]
+        fractions, bodies = self._physics.cast(starts, ends)
         return np.where(bodies >= 0, fractions * lengths, math.inf), bodies
 
-    def sweep(self, world_T_robot: Pose2, stamp: float) -> tuple[LaserScan, IntArray]:
+    def _behind_glass(
+        self, start: FloatArray, directions: FloatArray, distances: FloatArray, bodies: IntArray
+    ) -> tuple[FloatArray, IntArray]:
+        """Distances and bodies with the beams that panes before them return."""
+        starts = np.full((*start.shape[:-1], 3), self.config.height)
+        starts[..., :2] = start
+        ends = np.full((len(directions), 3), self.config.height)
+        ends[:, :2] = start + directions * self.config.range_max
+        fractions, panes, normals = self._physics.cast_at_glass(starts, ends)
+        away = fractions * self.config.range_max
+        incidence = np.arccos(np.clip(np.abs((normals[:, :2] * directions).sum(axis=1)), 0.0, 1.0))
+        returned = comes_back(incidence, self._glass.random(len(directions)))
+        first = (panes >= 0) & returned & (away < distances)
+        return np.where(first, away, distances), np.where(first, panes, bodies)
+
+    def sweep(self, world_T_robot: Pose2, stamp: float, poses: FloatArray | None = None) -> tuple[LaserScan, IntArray]:
         """One scan with its errors.
+
+        Args:
+            world_T_robot: Where the robot stands.
+            stamp: Now [s].
+            poses: Where it was at each beam, shape (beams, 3), of a rolling sweep.
 
         Returns:
             The scan, and for each beam the body that it really measured, shape (beams,): -1 where it hit nothing,
             dropped out or gave an outlier.
         """
-        distances, bodies = self.track(world_T_robot)
+        distances, bodies = self.track(world_T_robot, poses)
         ranges, measured = self._disturbed(distances)
         config = self.config
         scan = LaserScan(
-            ranges, config.angle_min, config.angle_increment, config.range_max, config.range_min, stamp, config.mount
+            ranges,
+            config.angle_min,
+            config.angle_increment,
+            config.range_max,
+            config.range_min,
+            stamp,
+            config.mount,
+            config.beam_times[1] - config.beam_times[0],
         )
         return scan, np.where(measured, bodies, -1)
 

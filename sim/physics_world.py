@@ -1,7 +1,10 @@
 """PyBullet behind an interface of its own: bodies, joints and rays, nothing about buildings."""
 
 import contextlib
+import ctypes
+import ctypes.util
 import os
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
@@ -11,6 +14,8 @@ from typing import Any, Self
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.sim.config import STEPS
 
 # PyBullet returns nothing at exactly 16384 rays and raises above (MAX_RAY_INTERSECTION_BATCH_SIZE).
 MAX_RAYS = 16_383
@@ -18,10 +23,28 @@ MAX_RAYS = 16_383
 MAX_TRIANGLES = 30_000
 # Links of one body are truncated silently at 127.
 MAX_LINKS = 126
-# Collision groups that rays meet: static bodies are in group 2, moving ones in group 1.
+# Collision groups. PyBullet puts static bodies into group 2 and moving ones into group 1, and so
+# are rays: a body whose mask leaves group 1 out is not seen.
+MOVING, LEAVES, GLASS, FLOOR, ROBOT, WHEELS = 1, 4, 16, 32, 64, 128
 EVERYTHING = -1
+# What rays meet: neither the robot that casts them nor the floor, and glass not as a rule.
+SEEN = ~(GLASS | FLOOR | ROBOT | WHEELS)
+# Iterations of the contact solver; more change no figure of the drives tried.
+ITERATIONS = 20
+# Door leaves: density of a light inner door, 20 kg at 0.9 x 2.1 x 0.05 m [kg/m^3].
+LEAF_DENSITY = 210.0
+# Of the earth [m/s^2].
+GRAVITY = 9.81
+# Damping of a leaf's joint [Nm s/rad or N s/m].
+LEAF_DAMPING = 1.0
 # A face whose normal is steeper than this against the floor is floor or ceiling.
 UPRIGHT = 0.5
+
+
+Colour = tuple[float, float, float, float]
+WALLS, FURNITURE, LEAF, PANE, PERSON = (
+    (0.75, 0.76, 0.8, 1.0), (0.62, 0.5, 0.38, 1.0), (0.75, 0.4, 0.2, 1.0), (0.5, 0.8, 0.95, 0.4), (0.95, 0.6, 0.1, 1.0),
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,20 +77,63 @@ def upright(vertices: FloatArray, triangles: IntArray) -> IntArray:
 class PhysicsWorld:
     """One PyBullet client; a context manager that always disconnects.
 
-    Every body is a concave triangle mesh (convex hulls are wrong by metres for a building, boxes are slower and let
-    rays that start inside pass). Nothing is stepped: what moves is placed, so that a run costs its rays and no more.
+    Every body of a building is a concave triangle mesh (convex hulls are wrong by metres for a building, boxes are
+    slower and let rays that start inside pass). Without ``stepped`` what moves is placed, so that a run costs its rays
+    and no more; with it there are a floor, gravity and contacts, and time passes in steps of ``1 / STEPS`` seconds.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, stepped: bool = False, window: bool = False) -> None:
+        self.stepped = stepped
+        self._window = self.visible = window
+        self.has_glass = False
         self._bullet: Any = None
         self._client = -1
 
     def __enter__(self) -> Self:
+        if self._window:
+            check_display()
         self._bullet = _import_pybullet()
-        self._client = self._bullet.connect(self._bullet.DIRECT)
+        with quiet() if self._window else contextlib.nullcontext():
+            self._client = self._bullet.connect(self._bullet.GUI if self._window else self._bullet.DIRECT)
         if self._client < 0:
             raise RuntimeError("PyBullet has no client left to give")
+        if self.stepped:
+            self._begin_physics()
         return self
+
+    def _begin_physics(self) -> None:
+        """Set what a prototype found to work, and lay the floor.
+
+        Cone friction turns a robot that grazes a wall into it; file caching would load a rewritten URDF as it was.
+        """
+        bullet, client = self._bullet, self._client
+        bullet.setPhysicsEngineParameter(
+            fixedTimeStep=1.0 / STEPS,
+            numSolverIterations=ITERATIONS,
+            enableConeFriction=0,
+            deterministicOverlappingPairs=1,
+            enableFileCaching=0,
+            physicsClientId=client,
+        )
+        bullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
+        plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
+        self.floor = bullet.createMultiBody(0.0, plane, physicsClientId=client)
+        bullet.setCollisionFilterGroupMask(self.floor, -1, FLOOR, WHEELS, physicsClientId=client)
+        bullet.changeDynamics(self.floor, -1, lateralFriction=1.0, physicsClientId=client)
+
+    @property
+    def bullet(self) -> Any:
+        """The ``pybullet`` module, for bodies with joints of their own; every call takes ``client``."""
+        return self._bullet
+
+    @property
+    def client(self) -> int:
+        """``physicsClientId`` of every call."""
+        return self._client
+
+    def step(self) -> None:
+        """Let ``1 / STEPS`` seconds pass."""
+        self._bullet.stepSimulation(physicsClientId=self._client)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -81,19 +147,34 @@ class PhysicsWorld:
         """Whether the client is there."""
         return self._client >= 0
 
-    def add_static(self, vertices: FloatArray, triangles: IntArray) -> list[int]:
+    def add_static(self, vertices: FloatArray, triangles: IntArray, colour: Colour = WALLS) -> list[int]:
         """A solid that never moves; returns its bodies (several only beyond PyBullet's limit on vertices).
 
         Args:
             vertices: Shape (n, 3), metres, world frame.
             triangles: Shape (m, 3).
+            colour: Where bodies are shown.
         """
         bodies = []
         for first in range(0, len(triangles), MAX_TRIANGLES):
             used, local = np.unique(triangles[first : first + MAX_TRIANGLES], return_inverse=True)
-            shape = self._mesh(vertices[used], local.reshape(-1, 3))
-            bodies.append(self._bullet.createMultiBody(0.0, shape, physicsClientId=self._client))
+            mesh = vertices[used], local.reshape(-1, 3)
+            shape, seen = self._mesh(*mesh), self._visual(*mesh, colour)
+            bodies.append(self._bullet.createMultiBody(0.0, shape, seen, physicsClientId=self._client))
         return bodies
+
+    def make_glass(self, body: int, links: int = 0) -> None:
+        """Let rays pass a static body, or the links of a moving one; :meth:`cast` can ask for glass alone."""
+        bullet, client = self._bullet, self._client
+        for link in range(links) if links else (-1,):
+            bullet.setCollisionFilterGroupMask(body, link, GLASS, ROBOT | MOVING, physicsClientId=client)
+        self.has_glass = True
+
+    def move_body(self, body: int, x: float, y: float) -> None:
+        """Put a static body, its origin first at the world's, at ``(x, y)`` [m]; rays see it at once."""
+        self._bullet.resetBasePositionAndOrientation(
+            body, [x, y, 0.0], [0.0, 0.0, 0.0, 1.0], physicsClientId=self._client
+        )
 
     def add_moving(self, parts: Sequence[MovingPart]) -> int:
         """A body whose links hang on one joint each, fixed to the world; returns the body."""
@@ -121,35 +202,133 @@ class PhysicsWorld:
             self.move_joint(body, link, 0.0)
         return body
 
+    def add_hung(self, parts: Sequence[MovingPart], limits: Sequence[float]) -> int:
+        """A body whose links hang on one joint each and move by forces between 0 and ``limits`` [rad or m].
+
+        Leaves meet the robot alone: they would jam in the frame that they fill.
+        """
+        bullet, client = self._bullet, self._client
+        sizes = [np.ptp(part.vertices, axis=0) for part in parts]
+        centres = [(part.vertices.min(axis=0) + part.vertices.max(axis=0)) / 2.0 for part in parts]
+        masses = [LEAF_DENSITY * _volume(part) for part in parts]
+        n = len(parts)
+        body: int = bullet.createMultiBody(
+            0.0,
+            -1,
+            linkMasses=masses,
+            linkCollisionShapeIndices=[
+                self._mesh(part.vertices - np.array(part.anchor), part.triangles) for part in parts
+            ],
+            linkVisualShapeIndices=[
+                self._visual(part.vertices - np.array(part.anchor), part.triangles, LEAF) for part in parts
+            ],
+            linkPositions=[list(part.anchor) for part in parts],
+            linkOrientations=[[0.0, 0.0, 0.0, 1.0]] * n,
+            linkInertialFramePositions=[(c - part.anchor).tolist() for c, part in zip(centres, parts, strict=True)],
+            linkInertialFrameOrientations=[[0.0, 0.0, 0.0, 1.0]] * n,
+            linkParentIndices=[0] * n,
+            linkJointTypes=[bullet.JOINT_PRISMATIC if part.slides else bullet.JOINT_REVOLUTE for part in parts],
+            linkJointAxis=[list(part.axis) for part in parts],
+            flags=bullet.URDF_ENABLE_SLEEPING,
+            physicsClientId=client,
+        )
+        for link, (mass, size, limit) in enumerate(zip(masses, sizes, limits, strict=True)):
+            # Limits go by themselves: beside damping they are silently ignored.
+            bullet.changeDynamics(body, link, jointLowerLimit=0.0, jointUpperLimit=limit, physicsClientId=client)
+            squares = size * size
+            inertia = mass / 12.0 * (squares.sum() - squares)
+            bullet.changeDynamics(
+                body, link, localInertiaDiagonal=inertia.tolist(), jointDamping=LEAF_DAMPING, lateralFriction=0.2,
+                physicsClientId=client,
+            )  # fmt: skip
+            bullet.setCollisionFilterGroupMask(body, link, LEAVES, ROBOT | MOVING, physicsClientId=client)
+            self.move_joint(body, link, 0.0)
+        return body
+
+    def drive_joint(self, body: int, link: int, target: float, *, force: float, speed: float) -> None:
+        """Let a motor move a joint to ``target`` [rad or m] at ``speed`` [1/s] with at most ``force`` [Nm or N]."""
+        self._bullet.setJointMotorControl2(
+            body, link, self._bullet.POSITION_CONTROL, targetPosition=target, force=force, maxVelocity=speed,
+            physicsClientId=self._client,
+        )  # fmt: skip
+        self.wake(body)
+
+    def brake_joint(self, body: int, link: int, force: float) -> None:
+        """Hold a joint by friction of ``force`` [Nm or N] and nothing else."""
+        self._bullet.setJointMotorControl2(
+            body, link, self._bullet.VELOCITY_CONTROL, targetVelocity=0.0, force=force, physicsClientId=self._client
+        )
+
+    def wake(self, body: int) -> None:
+        """A sleeping body ignores its motors."""
+        bullet = self._bullet
+        bullet.changeDynamics(body, -1, activationState=bullet.ACTIVATION_STATE_WAKE_UP, physicsClientId=self._client)
+
+    def joint_position(self, body: int, link: int) -> float:
+        """Where a joint is [rad or m]."""
+        return float(self._bullet.getJointState(body, link, physicsClientId=self._client)[0])
+
     def move_joint(self, body: int, link: int, position: float) -> None:
         """Put a joint at ``position`` [rad or m]; rays see it at once."""
         self._bullet.resetJointState(body, link, position, physicsClientId=self._client)
 
-    def cast(self, start: tuple[float, float, float], ends: FloatArray) -> tuple[FloatArray, IntArray]:
-        """The first thing that each ray hits.
+    def cast(self, start: FloatArray, ends: FloatArray) -> tuple[FloatArray, IntArray]:
+        """The first thing that each ray hits, glass left out.
 
         Args:
-            start: Where all rays start, world frame [m].
+            start: Where all rays start, shape (3,), or each, shape (n, 3), world frame [m].
             ends: Where they end at the latest, shape (n, 3).
 
         Returns:
             The share of the way to the end at the hit, shape (n,), 1 without one, and the body hit, shape (n,), -1
             without one.
         """
+        fractions, bodies, _ = self._cast(start, ends, SEEN, normals=False)
+        return fractions, bodies
+
+    def cast_at_glass(self, start: FloatArray, ends: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
+        """As :meth:`cast` for glass alone, with the normals where it is hit, shape (n, 3)."""
+        return self._cast(start, ends, GLASS, normals=True)
+
+    def _cast(
+        self, start: FloatArray, ends: FloatArray, mask: int, *, normals: bool
+    ) -> tuple[FloatArray, IntArray, FloatArray]:
         n = len(ends)
         fractions, bodies = np.empty(n), np.empty(n, dtype=np.int64)
+        found = np.zeros((n if normals else 0, 3))
         for first in range(0, n, MAX_RAYS):
             part = slice(first, min(first + MAX_RAYS, n))
             count = part.stop - part.start
             hits = self._bullet.rayTestBatch(
-                [start] * count,
+                [start.tolist()] * count if start.ndim == 1 else start[part].tolist(),
                 ends[part].tolist(),
-                collisionFilterMask=EVERYTHING,
+                collisionFilterMask=mask,
                 physicsClientId=self._client,
             )
             bodies[part] = np.fromiter(map(itemgetter(0), hits), dtype=np.int64, count=count)
             fractions[part] = np.fromiter(map(itemgetter(2), hits), dtype=np.float64, count=count)
-        return fractions, bodies
+            if normals:
+                found[part] = [hit[4] for hit in hits]
+        return fractions, bodies, found
+
+    def _visual(self, vertices: FloatArray, triangles: IntArray, colour: Colour) -> int:
+        """What is drawn of a mesh, flat faces from both sides; -1, nothing, where nobody looks."""
+        if not self.visible:
+            return -1
+        # Every face has corners and a normal of its own, and once more turned round.
+        faces = np.concatenate((triangles, triangles[:, ::-1]))
+        a, b, c = (vertices[faces[:, i]] for i in range(3))
+        normals = np.cross(b - a, c - a)
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+        shape: int = self._bullet.createVisualShape(
+            self._bullet.GEOM_MESH,
+            vertices=vertices[faces.ravel()].tolist(),
+            indices=list(range(faces.size)),
+            normals=np.repeat(normals, 3, axis=0).tolist(),
+            rgbaColor=list(colour),
+            physicsClientId=self._client,
+        )
+        return shape
 
     def _mesh(self, vertices: FloatArray, triangles: IntArray) -> int:
         shape: int = self._bullet.createCollisionShape(
@@ -163,30 +342,61 @@ class PhysicsWorld:
         return shape
 
 
+def check_display() -> None:
+    """Make sure that there is a display: without one PyBullet ends the whole process when it opens its window.
+
+    Raises:
+        InvalidInputError: There is none, or it does not answer.
+    """
+    if sys.platform != "linux":
+        return
+    display = os.environ.get("DISPLAY", "")
+    library = ctypes.util.find_library("X11")
+    if display and library:
+        x11 = ctypes.CDLL(library)
+        x11.XOpenDisplay.restype = ctypes.c_void_p
+        handle = x11.XOpenDisplay(display.encode())
+        if handle:
+            x11.XCloseDisplay.argtypes = [ctypes.c_void_p]
+            x11.XCloseDisplay(handle)
+            return
+    shown = f"DISPLAY is {display!r}" if display else "DISPLAY is not set"
+    raise InvalidInputError(f"no display for PyBullet's window ({shown})", expected="an X server, or no --gui")
+
+
+def _volume(part: MovingPart) -> float:
+    """Of the upright prism that a part is [m^3]; its triangles are its sides alone."""
+    a, b, c = (part.vertices[part.triangles[:, i]] for i in range(3))
+    # The divergence of (x, y, 0) is 2, and top and bottom do not count.
+    flux = np.cross(b - a, c - a) * (a + b + c)
+    return float(abs(flux[:, :2].sum()) / 12.0)
+
+
 def _import_pybullet() -> Any:
     """Import PyBullet without the line that it writes to the terminal from C."""
-    with _quiet_stderr():
+    if "pybullet" in sys.modules:
+        return sys.modules["pybullet"]
+    with quiet():
         import pybullet
     return pybullet
 
 
 @contextlib.contextmanager
-def _quiet_stderr() -> Iterator[None]:
-    import sys
-
-    if "pybullet" in sys.modules:
-        yield
-        return
+def quiet() -> Iterator[None]:
+    """Keep what PyBullet writes from C off the terminal."""
     try:
-        kept = os.dup(2)
+        kept = [os.dup(number) for number in (1, 2)]
     except OSError:  # there is no terminal to keep quiet
         yield
         return
+    sys.stdout.flush()
     silent = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(silent, 2)
+        for number in (1, 2):
+            os.dup2(silent, number)
         yield
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
+        for number, descriptor in zip((1, 2), kept, strict=True):
+            os.dup2(descriptor, number)
+            os.close(descriptor)
         os.close(silent)

@@ -3,9 +3,12 @@
 import contextlib
 import math
 from collections.abc import Collection
+from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
+import numpy as np
+import shapely
 from shapely.geometry import Polygon
 
 from closedrooms.core.arrays import FloatArray
@@ -14,12 +17,19 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.observation import Observation
 from closedrooms.core.pose import Pose2
 from closedrooms.sim.building import Building, gap_from
-from closedrooms.sim.config import SimConfig
-from closedrooms.sim.contacts import SKIN
+from closedrooms.sim.bystanders import Floor, MovedBox, Person
+from closedrooms.sim.config import FaultConfig, NoiseConfig, SimConfig
+from closedrooms.sim.contacts import SKIN, distance
 from closedrooms.sim.differential_drive import RAMP_SECONDS, Drive
+from closedrooms.sim.faults import Faults
+from closedrooms.sim.glass import glazed
 from closedrooms.sim.lidar import Lidar
 from closedrooms.sim.odometry import Odometry
 from closedrooms.sim.physics_world import PhysicsWorld
+from closedrooms.sim.robot_model import TRACK_SHARE, RobotModel, make_model
+from closedrooms.sim.robot_urdf import read_robot
+from closedrooms.sim.wheeled_robot import WheeledRobot
+from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start_pose import start_pose
 
@@ -39,8 +49,11 @@ class Simulation:
             config: Lidar, robot, noise, doors.
             seed: Of every source of noise.
         """
-        self.plan = plan
+        self.plan = glazed(plan, config.glass, seed)
         self.config = config
+        self._model: RobotModel | None = None
+        if config.robot_urdf is not None:
+            self.config, self._model = read_robot(config)
         self._closed = frozenset(closed)
         self._stack = contextlib.ExitStack()
         self._seed = seed
@@ -55,14 +68,27 @@ class Simulation:
             InvalidInputError: A door to close that the plan does not have, or a start where the robot does not fit.
         """
         with contextlib.ExitStack() as stack:
-            physics = stack.enter_context(PhysicsWorld())
+            wheels = self.config.body == "wheels"
+            physics = stack.enter_context(PhysicsWorld(stepped=wheels, window=self.config.gui))
             self._building = Building(self.plan, self._closed, self.config, physics)
             start, robot = self.world_T_map, self.config.robot
-            self._drive = Drive(robot, self._building.obstacles, start.x, start.y, start.theta)
             self._check_start()
-            self._odometry = Odometry(self.config.noise, self._seed)
+            self._drive: Drive | WheeledRobot = (
+                WheeledRobot(
+                    physics, self._model or make_model(robot, self.config.lidar.height), robot, start.as_tuple()
+                )
+                if wheels
+                else Drive(robot, self._building.obstacles, start.x, start.y, start.theta)
+            )
+            self._odometry = Odometry(self._odometry_noise(), self._seed)
+            self._faults = (
+                None if self.config.faults == FaultConfig() else Faults(self.config.faults, self.plan, self._seed)
+            )
+            self.movers = self._let_in(physics)
             self._lidar = Lidar(self.config.lidar, self.config.noise, physics, self._seed)
             self._time = 0.0
+            self._rolls = self.config.lidar.sweep == "rolling"
+            self._way = np.array([[0.0, start.x, start.y, start.theta]])
             self.physics = physics
             self._stack = stack.pop_all()
         return self
@@ -88,11 +114,6 @@ class Simulation:
         return self._drive.collided
 
     @property
-    def velocity(self) -> tuple[float, float]:
-        """True speed [m/s] and turn rate [rad/s]."""
-        return (self._drive.v, self._drive.w)
-
-    @property
     def world_T_robot(self) -> Pose2:  # noqa: N802
         """The true pose in the building frame."""
         return Pose2(self._drive.x, self._drive.y, self._drive.theta)
@@ -108,7 +129,7 @@ class Simulation:
         Two calls at one time see the same world with fresh noise.
         """
         world_T_robot = self.world_T_robot
-        scan, bodies = self._lidar.sweep(world_T_robot, self._time)
+        scan, bodies = self._lidar.sweep(world_T_robot, self._time, self._beam_poses())
         hit = set(bodies.tolist())
         doors = self._building.door_of_body
         seen = [doors[body] for body in sorted(hit & doors.keys()) if doors[body].closed]
@@ -121,7 +142,51 @@ class Simulation:
             )
             for door in seen
         )
-        return Observation(scan, self._odometry.pose, sightings)
+        odometry, bumps, faults = self._odometry.pose, self._drive.bumps, self._faults
+        if faults is None:
+            return Observation(scan, odometry, sightings, bumps)
+        sightings = (*sightings, *faults.phantoms(scan, world_T_robot))
+        whole = faults.scan(scan)
+        return Observation(whole, faults.odometry(odometry, self._time), sightings if whole is scan else (), bumps)
+
+    def _odometry_noise(self) -> NoiseConfig:
+        """The noise with what unequal wheels add: a curve where the wheels turn alike."""
+        noise, unequal = self.config.noise, self.config.faults.unequal_wheels
+        track = TRACK_SHARE * self.config.robot.radius if self._model is None else self._model.track
+        return replace(noise, bias_turn_per_metre=noise.bias_turn_per_metre + unequal / track)
+
+    def _let_in(self, physics: PhysicsWorld) -> list[Person | MovedBox]:
+        """People and boxes, none at the robot's start."""
+        config, start, building = self.config, self.world_T_map, self._building
+        if not config.people + config.clutter:
+            return []
+        leaves = [leaf for name in building.doors for leaf in self.door_leaves(name)]
+        solids = areal(shapely.union_all([building.solids, *leaves]))
+        floor = Floor(self.plan, solids, (start.x, start.y))
+        movers: list[Person | MovedBox] = [
+            *(Person(number, floor, physics, building.obstacles, self._seed) for number in range(config.people)),
+            *(MovedBox(number, floor, physics, building.obstacles, self._seed) for number in range(config.clutter)),
+        ]
+        for mover in movers:
+            mover.keep_off(start.x, start.y, 2.0 * config.robot.radius + 1.0)
+        return movers
+
+    def _beam_poses(self) -> FloatArray | None:
+        """Where the robot was at each beam of a rolling sweep, shape (beams, 3), building frame."""
+        if not self._rolls:
+            return None
+        stamps, poses = self._way[:, 0], self._way[:, 1:]
+        when = self._lidar.beam_stamps(self._time)
+        return np.column_stack([np.interp(when, stamps, axis) for axis in poses.T])
+
+    def _note_way(self) -> None:
+        """Remember the last sweep's way, heading unwrapped."""
+        drive = self._drive
+        row = np.array([[self._time, drive.x, drive.y, drive.theta]])
+        way = np.concatenate((self._way, row))
+        # One row from before the sweep's first beam must stay.
+        first = int(np.searchsorted(way[:, 0], self._time - self.period, side="right")) - 1
+        self._way = way[max(first, 0) :]
 
     def true_ranges(self, world_T_robot: Pose2) -> FloatArray:
         """What the lidar would measure without noise from anywhere, shape (beams,) [m], infinity without a return."""
@@ -143,13 +208,17 @@ class Simulation:
         if math.isnan(v) or math.isnan(w) or not (math.isfinite(duration) and duration > 0.0):
             raise InvalidInputError(f"command v={v}, w={w} for {duration} s", expected="numbers, a duration above 0")
         drive, building = self._drive, self._building
-        drive.collided = False
+        drive.bumps = ()
         end = self._time + duration
-        while building.moving and end - self._time > 1e-9:
+        while (building.moving or self._rolls or self.movers) and end - self._time > 1e-9:
             part = min(RAMP_SECONDS, end - self._time)
             drive.advance(v, w, part, self._odometry.add)
             building.advance(part, drive.x, drive.y, drive.config.radius)
+            for mover in self.movers:
+                mover.advance(part, drive.x, drive.y, drive.config.radius)
             self._time += part
+            if self._rolls:
+                self._note_way()
         if end - self._time > 1e-9:
             drive.advance(v, w, end - self._time, self._odometry.add)
         self._time = end
@@ -169,11 +238,12 @@ class Simulation:
     def door_leaves(self, door_id: str) -> list[Polygon]:
         """Where the leaves of a door are now, building frame [m]."""
         door = self._building.doors[door_id]
-        return [Polygon(corners) for corners in door.corners(door.opening)]
+        return [Polygon(corners) for corners in door.corners()]
 
     def _check_start(self) -> None:
         start, radius = self.world_T_map, self.config.robot.radius
-        free = min(gap_from(self._building.solids, start.x, start.y), self._drive.clearance() + radius)
+        near = distance(start.x, start.y, self._building.obstacles.near(start.x, start.y))
+        free = min(gap_from(self._building.solids, start.x, start.y), near)
         if free < radius + SKIN:
             raise InvalidInputError(
                 f"the start ({start.x:g}, {start.y:g}) is {free:.3f} m from a wall, door or furniture",

@@ -9,6 +9,7 @@ from closedrooms.core.door import Point, Segment
 from closedrooms.core.remarks import Remark
 
 DoorKind = Literal["hinged", "double", "sliding"]
+Material = Literal["solid", "glass"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +34,7 @@ class Wall:
     id: str
     segment: Segment
     thickness: float
+    material: Material = "solid"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,7 @@ class PlanDoor:
         kind: How it moves.
         hinge: Which end of ``segment`` the leaf hangs on (0 or 1).
         opens_into: Id of the room into which it swings; ``None`` is outside.
+        material: Of the leaf.
     """
 
     id: str
@@ -54,6 +57,7 @@ class PlanDoor:
     kind: DoorKind = "hinged"
     hinge: Literal[0, 1] = 0
     opens_into: str | None = None
+    material: Material = "solid"
 
     @property
     def width(self) -> float:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import tyro
 
@@ -14,10 +14,18 @@ from closedrooms.navigation.config import NavigationConfig
 from closedrooms.predictor.methods import DEFAULT_METHOD, find_method
 from closedrooms.sim.config import SimConfig
 
-Factor = Literal["lidar", "dropouts", "odometry", "missed", "shift", "turn", "resolution", "furniture", "together"]
-FACTORS: tuple[Factor, ...] = (
-    "lidar", "dropouts", "odometry", "missed", "shift", "turn", "resolution", "furniture", "together",
+Factor = Literal[
+    "lidar", "dropouts", "odometry", "missed", "shift", "turn", "resolution", "furniture", "glass", "people", "clutter",
+    "lost", "freezes", "drops", "unequal", "phantoms", "together",
+]  # fmt: skip
+FACTORS: tuple[Factor, ...] = get_args(Factor)
+# What ``together`` leaves as it is: another map, another building, a broken robot.
+ALONE = (
+    "resolution", "glass", "people", "clutter", "lost", "freezes", "drops", "unequal", "phantoms",
 )  # fmt: skip
+COUNTS = ("people", "clutter", "phantoms")
+MOST = {"people": 200.0, "clutter": 200.0, "phantoms": 1000.0, "unequal": 0.4}
+SHARES = ("dropouts", "missed", "furniture", "glass", "lost")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +39,7 @@ class RobustnessConfig:
     """Folder to write; the same command again goes on where it stopped."""
 
     factors: tuple[Factor, ...] = FACTORS
-    """What to disturb, one at a time; ``together`` disturbs everything but the resolution at once."""
+    """What to disturb, one at a time; ``together`` disturbs lidar, odometry, doors and furniture at once."""
 
     repetitions: int = 3
     """Sets of closed doors drawn for each world."""
@@ -66,6 +74,30 @@ class RobustnessConfig:
     furniture: tuple[float, ...] = (0.0, 0.5, 1.0)
     """Shares of the pieces of furniture that fill the rooms [0..1]."""
 
+    glass: tuple[float, ...] = (0.0, 0.05, 0.1, 0.2)
+    """Shares of the walls that are of glass [0..1]."""
+
+    people: tuple[float, ...] = (0.0, 2.0, 4.0, 8.0)
+    """People who walk from room to room."""
+
+    clutter: tuple[float, ...] = (0.0, 5.0, 10.0)
+    """Boxes that are put elsewhere while the robot is away."""
+
+    lost: tuple[float, ...] = (0.0, 0.05, 0.2, 0.5)
+    """Shares of the sweeps that arrive without a measurement [0..1]."""
+
+    freezes: tuple[float, ...] = (0.0, 2.0, 6.0, 20.0)
+    """How often the odometry stands still for a second and then tells the whole way [1/min]."""
+
+    drops: tuple[float, ...] = (0.0, 1.0, 3.0, 10.0)
+    """How often the way between two sweeps is never counted [1/min]."""
+
+    unequal: tuple[float, ...] = (0.0, 0.005, 0.01, 0.02)
+    """How much larger one wheel is than the other, as a share, below 0.5."""
+
+    phantoms: tuple[float, ...] = (0.0, 2.0, 5.0, 10.0)
+    """Places on plain walls where a closed door is reported."""
+
     tours: bool = True
     """Plan coverage tours too."""
 
@@ -96,10 +128,14 @@ class RobustnessConfig:
         check_least(self, repetitions=1, closed=1, workers=1, resamples=1, seed=0)
         for factor in FACTORS[:-1]:
             levels: tuple[float, ...] = getattr(self, factor)
-            share = factor in {"dropouts", "missed", "furniture"}
-            fit = all(math.isfinite(v) and 0.0 <= v <= (1.0 if share else math.inf) for v in levels)
+            share = factor in SHARES
+            most = 1.0 if share else MOST.get(factor, math.inf)
+            fit = all(math.isfinite(v) and 0.0 <= v <= most for v in levels)
+            fit &= factor not in COUNTS or all(value == int(value) for value in levels if math.isfinite(value))
             if not levels or not fit or (factor == "resolution" and min(levels) <= 0.0):
                 expected = "shares from 0 to 1" if share else "finite numbers, none below 0"
+                if factor in MOST:
+                    expected = f"{'whole ' if factor in COUNTS else ''}numbers from 0 to {MOST[factor]:g}"
                 raise InvalidInputError(f"--{factor} {' '.join(map(str, levels))}", expected=expected)
             if len(set(levels)) != len(levels):
                 raise InvalidInputError(f"--{factor} {' '.join(map(str, levels))}", expected="each level once")

@@ -3,10 +3,17 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from closedrooms.core.door import ClosedDoor
+from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
+from closedrooms.sim.faults import phantom_places
 from closedrooms.worlds.plan import FloorPlan
+
+# A wall within so many cells of a phantom is the one that it is reported on.
+SHOWN = 3
 
 
 def disturbed_doors(
@@ -36,6 +43,29 @@ def disturbed_doors(
         # Turned about its middle, then shifted.
         moved = door.moved(Pose2(-x, -y)).moved(Pose2(0.0, 0.0, angle))
         found.append(moved.moved(Pose2(x + shift * math.cos(way), y + shift * math.sin(way))))
+    return found
+
+
+def phantom_doors(plan: FloorPlan, count: int, grid: OccupancyGrid, map_T_world: Pose2, seed: int) -> list[ClosedDoor]:
+    """Doors that are reported on plain walls of the map, map frame; those on walls that it does not show are not.
+
+    Args:
+        plan: The building.
+        count: Places, drawn by the seed.
+        grid: The map.
+        map_T_world: Building frame to map frame.
+        seed: Of the places.
+    """
+    import cv2
+
+    near = cv2.dilate(grid.occupied.astype(np.uint8), np.ones((2 * SHOWN + 1, 2 * SHOWN + 1), dtype=np.uint8)) > 0
+    found = []
+    for number, (a, b) in enumerate(phantom_places(plan, count, seed)):
+        middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
+        door = ClosedDoor(f"phantom{number:02d}", middle, (a, b), math.dist(a, b)).moved(map_T_world)
+        row, col = grid.frame.to_cells(np.array([door.midpoint]))[0]
+        if 0 <= row < near.shape[0] and 0 <= col < near.shape[1] and near[row, col]:
+            found.append(door)
     return found
 
 

@@ -22,8 +22,9 @@ from closedrooms.navigation.control_loop import LoopStatus
 from closedrooms.pipeline.progress import Silent
 from closedrooms.pipeline.run_log import RunLog
 from closedrooms.pipeline.survey import survey_building
-from closedrooms.sim.config import NOISE_LEVELS, NoiseConfig, SimConfig
+from closedrooms.sim.config import NOISE_LEVELS, FaultConfig, NoiseConfig, SimConfig
 from closedrooms.sim.differential_drive import Motion
+from closedrooms.sim.faults import Faults
 from closedrooms.sim.odometry import Odometry
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.plan import FloorPlan
@@ -74,7 +75,9 @@ def record_drive(
         return Drive(plan, ideal, log.recorded(), world.world_T_map, survey.exploration.status)
 
 
-def map_drive(drive: Drive, noise: NoiseConfig, mapper: MapperConfig, seed: int) -> OpenSurvey:
+def map_drive(
+    drive: Drive, noise: NoiseConfig, mapper: MapperConfig, seed: int, faults: FaultConfig | None = None
+) -> OpenSurvey:
     """Map a drive again as worse sensors would have seen it.
 
     Args:
@@ -82,11 +85,17 @@ def map_drive(drive: Drive, noise: NoiseConfig, mapper: MapperConfig, seed: int)
         noise: Put on scans and odometry.
         mapper: The mapper.
         seed: Of the noise.
+        faults: What fails beside it.
     """
     scans = _disturbed(drive.run.scans, noise, seed)
     truth = drive.run.reference
     assert truth is not None, "a drive keeps true poses"
     odometry = _drifted(truth, noise, seed)
+    if faults is not None and faults != FaultConfig():
+        spoilt = Faults(faults, drive.plan, seed)
+        told = [spoilt.odometry(Pose2(*pose), scan.stamp) for pose, scan in zip(odometry, scans, strict=True)]
+        odometry = np.array([pose.as_tuple() for pose in told])
+        scans = [spoilt.scan(scan) for scan in scans]
     slam = Mapper(mapper)
     for scan, pose in zip(scans, odometry, strict=True):
         slam.process(scan, Pose2(*pose))

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from closedrooms.experiments.robustness.config import FACTORS, Factor, RobustnessConfig
+from closedrooms.experiments.robustness.config import ALONE, FACTORS, Factor, RobustnessConfig
 
 UNITS: dict[Factor, str] = {
     "lidar": "standard deviation of a distance [m]",
@@ -13,6 +13,14 @@ UNITS: dict[Factor, str] = {
     "turn": "doors turned by [degrees]",
     "resolution": "cell of the map [m]",
     "furniture": "share of the furniture",
+    "glass": "share of the walls of glass",
+    "people": "people who walk",
+    "clutter": "boxes that are moved",
+    "lost": "share of sweeps lost",
+    "freezes": "freezes of the odometry [1/min]",
+    "drops": "pieces of the way never counted [1/min]",
+    "unequal": "difference of the wheels, as a share",
+    "phantoms": "phantom doors",
     "together": "all factors at their n-th level",
 }
 FIRST = "first"
@@ -30,6 +38,21 @@ class Setting:
     turn: float
     resolution: float
     furniture: float
+    glass: float = 0.0
+    people: float = 0.0
+    clutter: float = 0.0
+    lost: float = 0.0
+    freezes: float = 0.0
+    drops: float = 0.0
+    unequal: float = 0.0
+    phantoms: float = 0.0
+
+    @property
+    def place(self) -> "Setting":
+        """What of it decides how the drive goes, everything else at nothing."""
+        return Setting(
+            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self.furniture, self.glass, self.people, self.clutter
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +88,7 @@ def cases(config: RobustnessConfig) -> list[Case]:
     found: list[Case] = []
     for factor in config.factors:
         if factor == "together":
-            disturbed = [name for name in FACTORS[:-1] if name != "resolution"]
+            disturbed = [name for name in FACTORS[:-1] if name not in ALONE]
             for number in range(max(len(getattr(config, name)) for name in disturbed)):
                 values = {name: getattr(config, name)[: number + 1][-1] for name in disturbed}
                 found.append(Case(factor, number, float(number), replace(first, **values)))

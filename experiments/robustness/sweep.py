@@ -18,7 +18,7 @@ from closedrooms.core.names import file_name
 from closedrooms.core.report import Report
 from closedrooms.experiments.evaluation.claimed_folder import claim
 from closedrooms.experiments.evaluation.tours import code_digest
-from closedrooms.experiments.robustness.config import RobustnessConfig
+from closedrooms.experiments.robustness.config import FACTORS, RobustnessConfig
 from closedrooms.experiments.robustness.levels import Case, Setting, cases
 from closedrooms.experiments.robustness.onset import Onset
 from closedrooms.experiments.workers import one_thread
@@ -228,7 +228,7 @@ def _fingerprint(world: str, config: RobustnessConfig) -> str:
 
 
 # Levels stand in the setting of each case.
-_LEVELS = ("lidar", "dropouts", "odometry", "missed", "shift", "turn", "resolution", "furniture")
+_LEVELS = FACTORS[:-1]
 
 
 @lru_cache(maxsize=1)

@@ -22,7 +22,7 @@ from closedrooms.experiments.evaluation.scores import iou, room_masks
 from closedrooms.experiments.evaluation.tours import cropped, kept_tour, plan_tour
 from closedrooms.experiments.robustness.clean_walls import sampled, with_clean_walls
 from closedrooms.experiments.robustness.config import RobustnessConfig
-from closedrooms.experiments.robustness.door_noise import disturbed_doors, true_doors
+from closedrooms.experiments.robustness.door_noise import disturbed_doors, phantom_doors, true_doors
 from closedrooms.experiments.robustness.drives import Drive, furnished, map_drive, odometry_noise, record_drive
 from closedrooms.experiments.robustness.levels import Setting, first_setting
 from closedrooms.mapping.trajectory import ate
@@ -30,6 +30,8 @@ from closedrooms.pipeline.scores import room_iou, rooms_seen
 from closedrooms.pipeline.survey import Truth, true_building
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction
+from closedrooms.sim.config import FaultConfig
+from closedrooms.sim.robot_model import TRACK_SHARE
 from closedrooms.worlds.closing import closable_rooms, draw_closed
 from closedrooms.worlds.geometry import door_leaf
 from closedrooms.worlds.library import load_world
@@ -75,10 +77,10 @@ class Building:
             draw_closed(self._plan, count, stream(config.seed, "closed doors", self.name, str(repetition)))
             for repetition in range(config.repetitions)
         ]
-        self._drives: dict[float, Drive] = {}
+        self._drives: dict[Setting, Drive] = {}
         self._surveys: dict[Setting, OpenSurvey] = {}
         self._erasers: dict[tuple[Setting, bool], Eraser] = {}
-        self._closings: dict[tuple[int, float], Closing] = {}
+        self._closings: dict[tuple[int, Setting], Closing] = {}
 
     def rows(self, setting: Setting, keep: Path | None = None) -> list[Row]:
         """A row of measures for each set of closed doors.
@@ -94,22 +96,27 @@ class Building:
 
     def _row(self, setting: Setting, repetition: int, keep: Path | None) -> Row:
         config = self._config
-        drive, survey = self._drive(setting.furniture), self._survey(setting)
-        closing = self._closing(repetition, setting.furniture)
+        drive, survey = self._drive(setting), self._survey(setting)
+        closing = self._closing(repetition, setting)
         map_T_world = drive.world_T_map.inverse()
         mapped = self._eraser(setting, true_poses=False).erase(closing.closed)
         doors = self._seen_doors(mapped.doors, setting, repetition)
+        phantoms = phantom_doors(self._plan, int(setting.phantoms), mapped.grid, map_T_world, config.seed)
+        known = {door.id for door in doors}
+        doors += phantoms
         prediction = self._predict(mapped.grid, doors)
         position, heading = ate(survey.estimate, survey.truth)
         figures = room_iou(prediction.rooms, closing.truth.rooms)
         seen = [door.id for door in doors]
         right = {door.id: np.array(door.midpoint) for door in true_doors(self._plan, closing.closed, map_T_world)}
-        offsets = [float(np.linalg.norm(np.array(door.midpoint) - right[door.id])) for door in doors]
+        offsets = [
+            float(np.linalg.norm(np.array(door.midpoint) - right[door.id])) for door in doors if door.id in known
+        ]
         row: Row = {
             "world": self.name,
             "repetition": repetition,
             "closed_doors": len(closing.closed),
-            "doors_seen": len(doors),
+            "doors_seen": len(known),
             "ate_m": _rounded(position),
             "ate_rad": _rounded(heading),
             "walls_m": _rounded(self._walls(mapped.grid, closing)),
@@ -137,7 +144,7 @@ class Building:
         """
         placed = self._eraser(setting, true_poses=True).erase(closing.closed)
         doors = self._seen_doors(placed.doors, setting, repetition)
-        right = true_doors(self._plan, closing.seen, self._drive(setting.furniture).world_T_map.inverse())
+        right = true_doors(self._plan, closing.seen, self._drive(setting).world_T_map.inverse())
         steps = {
             "iou_true_poses": (placed.grid, doors),
             "iou_true_doors": (placed.grid, right),
@@ -157,7 +164,7 @@ class Building:
             lengths = [plan_tour(grid, doors).length, plan_tour(prediction.grid).length]
         except InvalidInputError:
             return {"error_closed": None, "error_baseline": None, "error_predicted": None}
-        world_T_map = self._drive(0.0).world_T_map
+        world_T_map = self._drive(first_setting(self._config)).world_T_map
         seen = rooms_seen(self._plan, grid, world_T_map.inverse())
         errors = compare_lengths(lengths[0], lengths[1], truth, n_rooms=seen, n_doors=len(doors))
         return {
@@ -178,24 +185,29 @@ class Building:
             name=f"{self.name} {repetition}",
         )  # fmt: skip
 
-    def _drive(self, share: float) -> Drive:
-        if share not in self._drives:
+    def _drive(self, setting: Setting) -> Drive:
+        place = setting.place
+        if place not in self._drives:
             config = self._config
-            plan = furnished(self._plan, share, config.seed)
-            self._drives[share] = record_drive(plan, config.sim, config.mapper, config.navigation, config.seed)
-        return self._drives[share]
+            plan = furnished(self._plan, place.furniture, config.seed)
+            sim = replace(config.sim, glass=place.glass, people=int(place.people), clutter=int(place.clutter))
+            self._drives[place] = record_drive(plan, sim, config.mapper, config.navigation, config.seed)
+        return self._drives[place]
 
     def _survey(self, setting: Setting) -> OpenSurvey:
         """The map's survey; doors are disturbed later."""
-        key = replace(setting, missed=0.0, shift=0.0, turn=0.0)
+        key = replace(setting, missed=0.0, shift=0.0, turn=0.0, phantoms=0.0)
         if key not in self._surveys:
             noise = replace(odometry_noise(key.odometry), range_sd=key.lidar, dropouts=key.dropouts)
+            track = TRACK_SHARE * self._config.sim.robot.radius
+            noise = replace(noise, bias_turn_per_metre=key.unequal / track)
+            faults = FaultConfig(lost_scans=key.lost, odometry_freezes=key.freezes, odometry_drops=key.drops)
             mapper = replace(self._config.mapper, resolution=key.resolution)
-            self._surveys[key] = map_drive(self._drive(key.furniture), noise, mapper, self._config.seed)
+            self._surveys[key] = map_drive(self._drive(key), noise, mapper, self._config.seed, faults)
         return self._surveys[key]
 
     def _eraser(self, setting: Setting, *, true_poses: bool) -> Eraser:
-        key = (replace(setting, missed=0.0, shift=0.0, turn=0.0), true_poses)
+        key = (replace(setting, missed=0.0, shift=0.0, turn=0.0, phantoms=0.0), true_poses)
         if key not in self._erasers:
             survey = self._survey(setting)
             self._erasers[key] = Eraser(replace(survey, poses=survey.true_poses) if true_poses else survey)
@@ -203,20 +215,20 @@ class Building:
 
     def forget(self, setting: Setting) -> None:
         """Give back the memory of a setting's survey; that of the first setting stays."""
-        first = replace(first_setting(self._config), missed=0.0, shift=0.0, turn=0.0)
-        key = replace(setting, missed=0.0, shift=0.0, turn=0.0)
+        first = replace(first_setting(self._config), missed=0.0, shift=0.0, turn=0.0, phantoms=0.0)
+        key = replace(setting, missed=0.0, shift=0.0, turn=0.0, phantoms=0.0)
         if key != first:
             self._surveys.pop(key, None)
             for true_poses in (False, True):
                 self._erasers.pop((key, true_poses), None)
 
-    def _closing(self, repetition: int, share: float) -> Closing:
-        key = (repetition, share)
+    def _closing(self, repetition: int, setting: Setting) -> Closing:
+        key = (repetition, setting.place)
         if key not in self._closings:
             closed = self._sets[repetition]
             first = first_setting(self._config)
             undisturbed = self._eraser(first, true_poses=True).erase(closed)
-            drive = self._drive(share)
+            drive = self._drive(setting)
             map_T_world = drive.world_T_map.inverse()
             truth = true_building(self._plan, closed, undisturbed.grid.frame, map_T_world)
             frame, start = truth.grid.frame, drive.world_T_map

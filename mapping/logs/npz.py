@@ -45,6 +45,8 @@ def write_scans(path: Path, run: RecordedRun, *, estimate: FloatArray | None = N
         "range_max": np.float64(first.range_max),
         "robot_T_sensor": np.array(first.robot_T_sensor),
     }
+    if first.sweep:
+        arrays["sweep"] = np.float64(first.sweep)
     if estimate is not None:
         arrays["estimate"] = estimate
     if run.reference is not None:
@@ -84,6 +86,7 @@ def _ours(arrays: dict[str, Any], path: Path) -> RecordedRun:
         (float(arrays["angle_min"]), float(arrays["angle_increment"]), float(arrays["range_max"])),
         (float(mount[0]), float(mount[1]), float(mount[2])),
         path,
+        sweep=float(arrays.get("sweep", 0.0)),
     )
 
 
@@ -109,6 +112,8 @@ def _run(
     geometry: tuple[float, float, float],
     mount: tuple[float, float, float],
     path: Path,
+    *,
+    sweep: float = 0.0,
 ) -> RecordedRun:
     n = len(stamps)
     if stamps.ndim != 1 or ranges.ndim != 2 or ranges.shape[0] != n or odometry.shape != (n, 3):
@@ -119,7 +124,7 @@ def _run(
         )
     if reference is not None and np.shape(reference) != (n, 3):
         raise InvalidInputError(f"truth of shape {np.shape(reference)}", expected="shape (n, 3)", where=path)
-    if not all(math.isfinite(v) for v in (*geometry, *mount)) or geometry[1] == 0.0:
+    if not all(math.isfinite(v) for v in (*geometry, *mount, sweep)) or geometry[1] == 0.0:
         raise InvalidInputError("a scan geometry that is not finite", expected=EXPECTED, where=path)
     usable = np.isfinite(stamps) & np.isfinite(odometry).all(axis=1)
     if not usable.all():
@@ -127,7 +132,7 @@ def _run(
         reference = None if reference is None else np.asarray(reference)[usable]
     stamps, backwards = forward(stamps)
     scans = tuple(
-        LaserScan(row, geometry[0], geometry[1], geometry[2], stamp=float(stamp), robot_T_sensor=mount)
+        LaserScan(row, geometry[0], geometry[1], geometry[2], stamp=float(stamp), robot_T_sensor=mount, sweep=sweep)
         for row, stamp in zip(ranges, stamps, strict=True)
     )
     remarks = (*_unusable(~usable), *backwards)

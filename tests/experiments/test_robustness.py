@@ -15,15 +15,16 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.experiments.robustness.clean_walls import sampled, with_clean_walls
 from closedrooms.experiments.robustness.config import RobustnessConfig
-from closedrooms.experiments.robustness.door_noise import disturbed_doors
+from closedrooms.experiments.robustness.door_noise import disturbed_doors, phantom_doors
 from closedrooms.experiments.robustness.drives import Drive, furnished, map_drive, odometry_noise
 from closedrooms.experiments.robustness.levels import cases, first_setting
 from closedrooms.experiments.robustness.onset import LevelResult, level_results, onsets
 from closedrooms.experiments.robustness.sweep import sweep_world
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.logs.recorded_run import RecordedRun
-from closedrooms.sim.config import NOISE_LEVELS, SimConfig
+from closedrooms.sim.config import NOISE_LEVELS, FaultConfig, SimConfig
 from closedrooms.worlds.library import load_world
+from closedrooms.worlds.truth import rasterise, truth_bounds
 
 CONFIG = RobustnessConfig(worlds=("office-01",), out=Path("out"))
 
@@ -43,6 +44,36 @@ def test_one_factor_at_a_time_is_disturbed_and_together_all_but_the_resolution()
             assert case.setting == replace(first, **{case.factor: case.level})
     hardest = next(case for case in reversed(cases(CONFIG)) if case.factor == "together")
     assert hardest.setting.furniture == CONFIG.furniture[-1]
+    assert hardest.setting.people == first.people
+
+
+def test_what_changes_the_building_changes_the_drive_and_nothing_else_does() -> None:
+    first = first_setting(CONFIG)
+    for case in cases(CONFIG):
+        if case.number and case.factor != "together":
+            drives = case.factor in {"furniture", "glass", "people", "clutter"}
+            assert (case.setting.place != first.place) is drives, case.name
+
+
+def test_faults_spoil_a_drive_by_the_seed() -> None:
+    drive, mapper = room_drive(), MapperConfig()
+    faults = FaultConfig(lost_scans=0.3, odometry_drops=120.0)
+    spoilt, again = (map_drive(drive, NOISE_LEVELS["none"], mapper, 0, faults) for _ in range(2))
+    plain = map_drive(drive, NOISE_LEVELS["none"], mapper, 0, FaultConfig())
+    assert np.array_equal(spoilt.estimate, again.estimate)
+    assert not np.array_equal(spoilt.keyframes.odometry[:4], plain.keyframes.odometry[:4])
+    assert np.isfinite(spoilt.estimate).all()
+
+
+def test_phantoms_stand_on_walls_that_the_map_shows() -> None:
+    plan = load_world("office-01")
+    bounds = truth_bounds(plan, Pose2())
+    grid = rasterise(plan, GridFrame(0.05, bounds[0], bounds[1], 1, 1).covering(*bounds), Pose2())
+    found = phantom_doors(plan, 8, grid, Pose2(), 0)
+    assert len(found) == len({door.id for door in found}) == 8
+    assert found[:3] == phantom_doors(plan, 3, grid, Pose2(), 0)
+    unseen = OccupancyGrid(grid.frame, np.full(grid.frame.shape, UNKNOWN, dtype=np.int8))
+    assert phantom_doors(plan, 8, unseen, Pose2(), 0) == []
 
 
 @pytest.mark.parametrize(
@@ -53,6 +84,10 @@ def test_one_factor_at_a_time_is_disturbed_and_together_all_but_the_resolution()
         ["--lidar", "0", "0"],
         ["--repetitions", "0"],
         ["--shift", "-1"],
+        ["--people", "0", "1.5"],
+        ["--glass", "0", "1.5"],
+        ["--unequal", "0", "0.7"],
+        ["--phantoms", "0", "2000"],
     ],
 )
 def test_impossible_options_are_one_line(words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -73,3 +73,25 @@ def test_an_obstacle_close_to_the_end_of_the_path_counts_as_arrival() -> None:
         if driver.state == "arrived":
             return
     raise AssertionError(driver.state)
+
+
+def test_a_robot_that_is_pressed_against_from_ahead_gives_up_sooner_and_backs_off_until_it_bumps_behind() -> None:
+    def seconds_until_stuck(*bumps: float) -> float:
+        driver = Driver(CONFIG)
+        driver.follow(np.array([[0.0, 0.0], [5.0, 0.0]]), 0.0)
+        for tick in range(100):
+            driver.command(Pose2(), scan_at(0.1 * tick), 0.1 * tick, bumps)
+            if driver.state == "stuck":
+                return 0.1 * tick
+        return math.inf
+
+    assert seconds_until_stuck(0.3) < 0.5 * seconds_until_stuck()
+    assert seconds_until_stuck(math.pi) == seconds_until_stuck()
+    driver = Driver(CONFIG)
+    driver.follow(np.array([[0.0, 0.0], [5.0, 0.0]]), 0.0)
+    tick = 0
+    while driver.state != "stuck":
+        driver.command(Pose2(), scan_at(0.1 * tick), 0.1 * tick, (0.0,))
+        tick += 1
+    assert driver.command(Pose2(), scan_at(0.1 * tick), 0.1 * tick)[0] < 0.0
+    assert driver.command(Pose2(), scan_at(0.1 * tick), 0.1 * tick, (3.0,))[0] == 0.0

@@ -4,6 +4,7 @@ import dataclasses
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import shapely
 
 from closedrooms.core.grid import GridFrame
 from closedrooms.core.pose import Pose2
-from closedrooms.sim.config import LidarConfig, SimConfig, noise_level
+from closedrooms.sim.config import Body, LidarConfig, SimConfig, noise_level
 from closedrooms.sim.lidar import Lidar
 from closedrooms.sim.physics_world import PhysicsWorld
 from closedrooms.sim.simulation import Simulation
@@ -120,7 +121,7 @@ def test_a_sensor_off_the_centre_measures_from_where_it_sits(plan: FloorPlan) ->
 
 def test_a_physics_world_without_bodies_returns_misses() -> None:
     with PhysicsWorld() as physics:
-        fractions, bodies = physics.cast((0.0, 0.0, 0.3), np.array([[5.0, 0.0, 0.3], [0.0, 5.0, 0.3]]))
+        fractions, bodies = physics.cast(np.array([0.0, 0.0, 0.3]), np.array([[5.0, 0.0, 0.3], [0.0, 5.0, 0.3]]))
     assert (fractions == 1.0).all()
     assert (bodies == -1).all()
 
@@ -143,3 +144,28 @@ def test_rays_and_the_rasterised_truth_mean_the_same_walls(exact_config: SimConf
         assert len(cells) > 300
         # A grazing ray may end a cell beside the wall: one cell of slack, few of them.
         assert np.mean(truth.occupied[cells[:, 0], cells[:, 1]] == occupied) > 0.95
+
+
+@pytest.mark.parametrize("turns", ["left", "right"])
+@pytest.mark.parametrize("body", ["wheels", "kinematic"])
+def test_a_rolling_sweep_measures_every_beam_from_where_the_robot_was(plan: FloorPlan, turns: Any, body: Body) -> None:
+    lidar = LidarConfig(sweep="rolling", turns=turns, range_min=0.01, mount=(0.1, 0.0, 0.2))
+    with Simulation(plan, [], SimConfig(lidar=lidar, noise=noise_level("none"), body=body), 0) as sim:
+        for _ in range(10):
+            sim.step(0.5, 1.0, 0.1)
+        poses = []
+        for _ in range(10):
+            poses.append(sim.world_T_robot)
+            sim.step(0.5, 1.0, 0.01)
+        poses.append(sim.world_T_robot)
+        scan = sim.observe().scan
+        assert abs(scan.sweep) == pytest.approx(0.1 * 719 / 720)
+        for beam in range(0, 720, 24):
+            share = beam / 719 if turns == "left" else 1.0 - beam / 719
+            at = (1.0 - 719 / 720 + share * 719 / 720) * 10
+            i = min(int(at), 9)
+            a, b = poses[i], poses[i + 1]
+            t = at - i
+            pose = Pose2(a.x + t * (b.x - a.x), a.y + t * (b.y - a.y), a.theta + t * (b.theta - a.theta))
+            assert scan.ranges[beam] == pytest.approx(sim.true_ranges(pose)[beam], abs=0.02)
+    assert LidarConfig().beam_times == (0.0, 0.0)

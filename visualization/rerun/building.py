@@ -9,9 +9,10 @@ from shapely.geometry import MultiPolygon, Polygon
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.pose import Pose2
-from closedrooms.sim.building import DOOR_HEIGHT, FURNITURE_HEIGHT
+from closedrooms.sim.building import FURNITURE_HEIGHT
 from closedrooms.sim.config import SimConfig
 from closedrooms.sim.door_leaves import Leaf, door_leaves
+from closedrooms.sim.doors import DOOR_HEIGHT
 from closedrooms.visualization import colours
 from closedrooms.visualization.rerun import drawables
 from closedrooms.visualization.rerun.stream import RecordingStream

@@ -15,7 +15,7 @@ from closedrooms.core.names import is_name, is_path
 from closedrooms.core.numbers import is_number, repr_of
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.formats.settlement import Source, settle
-from closedrooms.worlds.plan import FloorPlan, Furniture, Opening, PlanDoor, PlanRoom, Wall
+from closedrooms.worlds.plan import FloorPlan, Furniture, Material, Opening, PlanDoor, PlanRoom, Wall
 
 # Numbers beyond this are mistakes; an integer may be too large for a float.
 LARGEST = 1e12
@@ -50,7 +50,10 @@ def plan_text(plan: FloorPlan) -> str:
     }
     tables: dict[str, list[dict[str, Any]]] = {
         "rooms": [{"id": r.id, "label": r.label, **_polygon_fields(r.polygon)} for r in plan.rooms],
-        "walls": [{"id": w.id, "segment": _segment(w.segment), "thickness": _rounded(w.thickness)} for w in plan.walls],
+        "walls": [
+            {"id": w.id, "segment": _segment(w.segment), "thickness": _rounded(w.thickness), **_material(w.material)}
+            for w in plan.walls
+        ],
         "doors": [
             {
                 "id": d.id,
@@ -59,6 +62,7 @@ def plan_text(plan: FloorPlan) -> str:
                 "kind": d.kind,
                 "hinge": d.hinge,
                 "opens_into": d.opens_into,
+                **_material(d.material),
             }
             for d in plan.doors
         ],
@@ -70,6 +74,11 @@ def plan_text(plan: FloorPlan) -> str:
         body = ",\n".join("  " + json.dumps(row, allow_nan=False) for row in rows)
         lines.append(f" {json.dumps(key)}: [\n{body}\n ]" if rows else f" {json.dumps(key)}: []")
     return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _material(material: Material) -> dict[str, str]:
+    """The field of what is not solid: plain plans stay as they are."""
+    return {} if material == "solid" else {"material": material}
 
 
 def _rounded(value: float) -> float:
@@ -117,7 +126,8 @@ def plan_from(data: Any, path: Path) -> FloorPlan:
             PlanRoom(reader.name(r), str(r.get("label", "room")), reader.polygon(r)) for r in reader.rows(data, "rooms")
         ),
         walls=tuple(
-            Wall(reader.name(w), reader.segment(w), reader.number(w, "thickness")) for w in reader.rows(data, "walls")
+            Wall(reader.name(w), reader.segment(w), reader.number(w, "thickness"), reader.material(w))
+            for w in reader.rows(data, "walls")
         ),
         doors=tuple(reader.each(data, "doors", reader.door, remarks)),
         openings=tuple(reader.each(data, "openings", reader.opening, remarks)),
@@ -197,7 +207,13 @@ class _Reader:
             raise self._error(f"hinge {repr_of(hinge)}", "0 or 1, an end of the segment")
         if into is not None and not isinstance(into, str):
             raise self._error(f"opens_into {repr_of(into)}", "a room id or null")
-        return PlanDoor(name, self.segment(row), self.sides(row), kind, hinge, into)
+        return PlanDoor(name, self.segment(row), self.sides(row), kind, hinge, into, self.material(row))
+
+    def material(self, row: dict[str, Any]) -> Material:
+        value = row.get("material", "solid")
+        if value not in ("solid", "glass"):
+            raise self._error(f"material {repr_of(value)}", "solid or glass")
+        return "glass" if value == "glass" else "solid"
 
     def sides(self, row: dict[str, Any]) -> tuple[str | None, str | None]:
         value = row.get("rooms")
