@@ -29,6 +29,8 @@ MOVING, LEAVES, GLASS, FLOOR, ROBOT, WHEELS = 1, 4, 16, 32, 64, 128
 EVERYTHING = -1
 # What rays meet: neither the robot that casts them nor the floor, and glass not as a rule.
 SEEN = ~(GLASS | FLOOR | ROBOT | WHEELS)
+# Bodies meet where the masks of both allow it; PyBullet's default is that one of them does, and wheels meet walls.
+BOTH_AGREE = 0
 # Iterations of the contact solver; more change no figure of the drives tried.
 ITERATIONS = 20
 # Door leaves: density of a light inner door, 20 kg at 0.9 x 2.1 x 0.05 m [kg/m^3].
@@ -113,6 +115,7 @@ class PhysicsWorld:
             enableConeFriction=0,
             deterministicOverlappingPairs=1,
             enableFileCaching=0,
+            collisionFilterMode=BOTH_AGREE,
             physicsClientId=client,
         )
         bullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)

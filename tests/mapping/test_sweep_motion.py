@@ -80,3 +80,8 @@ def test_the_mapper_straightens_sweeps_that_took_time_and_leaves_others_alone() 
 
     assert estimate(rolling=True, undistort=True) < 0.01
     assert estimate(rolling=True, undistort=False) > 0.02
+
+
+def test_the_first_beam_is_the_oldest_and_of_a_clockwise_sensor_the_last() -> None:
+    for sweep, ages in ((0.08, [0.08, 0.04, 0.0]), (-0.08, [0.0, 0.04, 0.08]), (0.0, [0.0, 0.0, 0.0])):
+        np.testing.assert_allclose(beam_ages(LaserScan(np.ones(3), 0.0, 0.1, 5.0, sweep=sweep)), ages, atol=1e-12)
