@@ -24,8 +24,8 @@ from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.geojson import read_doors
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.rosmap import read_map
+from closedrooms.core.shapes import Shape
 from closedrooms.predictor.methods import predict
-from closedrooms.predictor.prediction import Shape
 from closedrooms.predictor.structure.known_window import known_window
 
 METHODS = ("paper", "rose", "best")

@@ -10,11 +10,12 @@ from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
+from closedrooms.core.shapes import Shape
 from closedrooms.predictor.config import FacesConfig
-from closedrooms.predictor.inpainting import inpaint, passage
+from closedrooms.predictor.inpainting import complete_map
 from closedrooms.predictor.paper.arrangement import joined
 from closedrooms.predictor.paper.initial_layouts import Start, Started, start_rooms
-from closedrooms.predictor.prediction import Prediction, Shape
+from closedrooms.predictor.prediction import Prediction
 
 # Rays a baseline casts around a door: half a degree, 0.17 m apart at 20 m.
 RAYS = 720
@@ -71,32 +72,22 @@ def _each(
     failures = dict(reasons)
     if start is None:
         return Prediction(grid, (), failures)
-    rooms, passages = [], []
+    rooms = []
     for number, entrance in enumerate(start.entrances):
         shape = shape_of(start, number)
         if shape.is_empty:
             failures[entrance.door.id] = "nothing unknown is in sight of the door within the bounds of the map"
-            continue
-        rooms.append(Room(shape, (entrance.door.id,)))
-        cleared = passage(
-            start.grid,
-            shape,
-            np.array(entrance.door.midpoint),
-            start.along(number),
-            start.inward(number),
-            width=config.door_width,
-            reach=config.door_reach,
-        )
-        if not cleared.is_empty:
-            passages.append(cleared)
-    return Prediction(inpaint(grid, [room.polygon for room in rooms], passages), tuple(rooms), failures)
+        else:
+            rooms.append(Room(shape, (entrance.door.id,)))
+    completed = complete_map(grid, start.grid, rooms, [entrance.facing for entrance in start.entrances], config)
+    return Prediction(completed, tuple(rooms), failures)
 
 
 def _seen(start: Start, room: int) -> Shape:
     """The star of rays from just behind the door, each ended by a known cell or the bounding box of the map."""
     grid = start.grid
     resolution = grid.frame.resolution
-    inward, along = start.inward(room), start.along(room)
+    inward, along = start.entrances[room].facing.inward, start.entrances[room].facing.along
     eye = _behind_wall(start, room)
     angles = (np.arange(RAYS) + 0.5) / RAYS * np.pi
     rays = np.cos(angles)[:, None] * along + np.sin(angles)[:, None] * inward
@@ -136,7 +127,7 @@ def _reach(grid: OccupancyGrid, open_: BoolArray, eye: FloatArray, rays: FloatAr
 def _behind_wall(start: Start, room: int) -> FloatArray:
     """The first unknown place behind a door [m], shape (2,): walls and leaf are passed, at most a metre."""
     grid = start.grid
-    door, inward = np.array(start.entrances[room].door.midpoint), start.inward(room)
+    door, inward = start.entrances[room].facing.middle, start.entrances[room].facing.inward
     steps = np.arange(grid.frame.resolution, 1.0, grid.frame.resolution / 2)
     cells = grid.frame.to_cells(door + steps[:, None] * inward)
     inside = grid.frame.contains(cells)
@@ -151,7 +142,7 @@ def _faces_in_sight(start: Start, room: int) -> Shape:
     arrangement, entrance = start.arrangement, start.entrances[room]
     inner: BoolArray = start.unknown & ~arrangement.border
     inner[entrance.face] = True
-    eye = np.array(entrance.door.midpoint) + 1e-3 * start.inward(room)
+    eye = entrance.facing.middle + 1e-3 * entrance.facing.inward
     crossed = shapely.STRtree([arrangement.faces[face] for face in np.flatnonzero(inner)])
     asked, seen, queue = {entrance.face}, [entrance.face], [entrance.face]
     while queue:

@@ -73,8 +73,8 @@ class DirectionsConfig:
     min_length: float = 2.0
     """A direction needs this much wall in longer segments [m]; less is noise of the raster."""
 
-    min_share: float = 0.03
-    """A direction needs this share of the wall of the strongest direction."""
+    min_share: float = 0.15
+    """A direction needs this share of the strongest one's wall: oblique walls in few places shatter all faces."""
 
     min_concentration: float = 0.40
     """A direction needs this share of its longer segments within 3 degrees; noise spreads evenly, to about 0.25."""
@@ -211,8 +211,28 @@ class RoseConfig(PaperConfig):
 class BestConfig(MethodConfig):
     """Rectangles between wall faces, chosen jointly by their evidence."""
 
+    smallest_side: float = 0.8
+    """Narrowest and shallowest room [m]."""
+
+    largest_side: float = 24.0
+    """Widest and deepest room [m]."""
+
+    shortlist: int = 60
+    """Rectangles a door keeps for the joint choice; more changed nothing on the maps tuned on."""
+
+    symmetry: bool = True
+    """Look for buildings of two equal halves, of which one may show what is hidden in the other."""
+
     keep_trace: bool = False
     """Keep each door's best rectangle by itself beside the rooms chosen together."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_numbers(self, ("smallest_side", "largest_side", "shortlist"))
+        if self.largest_side < self.smallest_side:
+            raise InvalidInputError(
+                f"largest_side {self.largest_side}", expected=f"at least smallest_side {self.smallest_side}"
+            )
 
 
 def _check_numbers(config: object, positive: tuple[str, ...]) -> None:

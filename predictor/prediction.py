@@ -3,13 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry import Polygon
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
-
-Shape = Polygon | MultiPolygon
+from closedrooms.core.shapes import Shape
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,8 +18,10 @@ from closedrooms.core.arrays import BoolArray, IntArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.predictor.inpainting import fill_shape, inpaint
-from closedrooms.predictor.prediction import Prediction, Shape
+from closedrooms.core.shapes import Shape, cells_inside, fill_shape
+from closedrooms.predictor.disjoint_rooms import part_rooms
+from closedrooms.predictor.inpainting import inpaint
+from closedrooms.predictor.prediction import Prediction
 
 # A room counts as looked into when so much of its free space is observed [m2].
 LOOKED_INTO = 0.5
@@ -74,32 +76,35 @@ def update(
         Observed rooms with the shape that was observed, the others revised, and the map completed with them. The same
         prediction as before where nothing was observed. A room that turns out not to exist stands in ``failures``.
     """
-    scene = _scene(prediction, grid, doors)
-    observed = _observed(scene)
+    scene = _prepare(prediction, grid, doors)
+    observed = _find_observed(scene)
     rooms: dict[int, Room] = {}
     failures = dict(prediction.failures)
     shape: Shape | None
     for index, room in enumerate(scene.rooms):
         if observed[index].any():
-            shape = _shape(_observed_room(scene, observed[index], index), scene.frame)
+            shape = _trace_largest(_find_room(scene, observed[index], index), scene.frame)
         else:
-            shape = _cut(scene, observed, index, room)
+            shape = _cut_known(scene, observed, index, room)
         if shape is not None and shape.area >= SMALLEST_ROOM:
             rooms[index] = replace(room, polygon=shape)
         elif index < len(prediction.rooms):
             failures |= dict.fromkeys(room.doors, "there is no room where one was predicted")
     looked_into = {index for index in rooms if observed[index].any()}
     if predictor is not None and looked_into:
-        rooms |= _again(scene, rooms, looked_into, doors, predictor)
-    kept = tuple(rooms[index] for index in sorted(rooms))
+        rooms |= _predict_again(scene, rooms, looked_into, doors, predictor)
+    places = {door.id: door.midpoint for door in doors}
+    sure = {number for number, index in enumerate(sorted(rooms)) if index in looked_into}
+    kept, without = part_rooms([rooms[index] for index in sorted(rooms)], places, sure=sure)
+    failures |= without
     found = {door for room in kept for door in room.doors}
     failures = {door: why for door, why in failures.items() if door not in found}
     completed = inpaint(scene.now, [room.polygon for room in kept], [])
-    return Prediction(_with_doorways(completed, scene, observed), kept, failures, prediction.trace)
+    return Prediction(_open_doorways(completed, scene, observed), tuple(kept), failures, prediction.trace)
 
 
 def overlay(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedDoor] = ()) -> OccupancyGrid:
-    """The map as known now, completed by the prediction where it is unknown; doorways of ``doors`` stay passable.
+    """Complete the map as known now by the prediction where it is unknown; doorways of ``doors`` stay passable.
 
     Args:
         prediction: On the same lattice.
@@ -112,12 +117,12 @@ def overlay(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedD
     frame = prediction.grid.frame.covering(*grid.frame.bounds)
     now, before = grid.on(frame), prediction.grid.on(frame)
     cells = np.where(now.unknown, before.cells, now.cells)
-    cells[_doorways(doors, frame) & before.free & now.occupied] = FREE
+    cells[_mark_doorways(doors, frame) & before.free & now.occupied] = FREE
     return OccupancyGrid(frame, cells)
 
 
 def seen_share(prediction: Prediction, grid: OccupancyGrid) -> dict[str, float]:
-    """How much of each predicted room is known by now, 0..1, by the id of its first door.
+    """Measure how much of each predicted room is known by now, 0..1, by the id of its first door.
 
     Args:
         prediction: On the same lattice.
@@ -127,13 +132,13 @@ def seen_share(prediction: Prediction, grid: OccupancyGrid) -> dict[str, float]:
     known = grid.on(frame).known
     shares = {}
     for room in prediction.rooms:
-        mask = np.zeros(frame.shape, dtype=np.bool_)
-        fill_shape(room.polygon, frame, mask)
+        mask = cells_inside(room.polygon, frame)
         shares[room.doors[0]] = float((mask & known).sum() / max(int(mask.sum()), 1))
     return shares
 
 
-def _scene(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedDoor]) -> _Scene:
+def _prepare(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedDoor]) -> _Scene:
+    """Bring the prediction, what is known now and the doors onto one frame."""
     frame = prediction.grid.frame.covering(*grid.frame.bounds)
     # A door whose room could not be predicted may turn out to have one.
     predicted = {door for room in prediction.rooms for door in room.doors}
@@ -141,19 +146,17 @@ def _scene(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedDo
     rooms = [*prediction.rooms, *nothing]
     masks, thresholds, doorways = [], [], []
     for room in rooms:
-        mask = np.zeros(frame.shape, dtype=np.bool_)
-        fill_shape(room.polygon, frame, mask)
-        masks.append(mask)
+        masks.append(cells_inside(room.polygon, frame))
         own = [door for door in doors if door.id in room.doors]
-        thresholds.append(_doorways(own, frame, beyond=THRESHOLD))
-        doorways.append(_doorways(own, frame))
-    all_doorways = _doorways(doors, frame)
+        thresholds.append(_mark_doorways(own, frame, beyond=THRESHOLD))
+        doorways.append(_mark_doorways(own, frame))
+    all_doorways = _mark_doorways(doors, frame)
     before, now = prediction.grid.on(frame), grid.on(frame)
     return _Scene(frame, before, now, rooms, masks, thresholds, doorways, all_doorways)
 
 
-def _doorways(doors: Sequence[ClosedDoor], frame: GridFrame, *, beyond: float = 0.0) -> BoolArray:
-    """The cells of the doors' leaves and a little before and behind them, and ``beyond`` that [m]."""
+def _mark_doorways(doors: Sequence[ClosedDoor], frame: GridFrame, *, beyond: float = 0.0) -> BoolArray:
+    """Mark the cells of the doors' leaves and a little before and behind them, and ``beyond`` that [m]."""
     mask = np.zeros(frame.shape, dtype=np.bool_)
     for door in doors:
         if door.segment is not None:
@@ -162,8 +165,8 @@ def _doorways(doors: Sequence[ClosedDoor], frame: GridFrame, *, beyond: float = 
     return mask
 
 
-def _with_doorways(completed: OccupancyGrid, scene: _Scene, observed: list[BoolArray]) -> OccupancyGrid:
-    """Doorways that the prediction had opened, or behind which a room was seen, are open; the map may hold the leaf."""
+def _open_doorways(completed: OccupancyGrid, scene: _Scene, observed: list[BoolArray]) -> OccupancyGrid:
+    """Open doorways that the prediction had opened, or behind which a room was seen; the map may hold the leaf."""
     frame = completed.frame
     mask = scene.doorways & scene.before.free
     for region, doorway in zip(observed, scene.own_doorways, strict=True):
@@ -175,34 +178,52 @@ def _with_doorways(completed: OccupancyGrid, scene: _Scene, observed: list[BoolA
     return OccupancyGrid(frame, cells)
 
 
-def _observed(scene: _Scene) -> list[BoolArray]:
-    """Free space observed since the prediction, by the room that it belongs to."""
-    frame = scene.frame
-    anywhere = np.zeros(frame.shape, dtype=np.bool_)
-    for mask in scene.masks:
-        anywhere |= mask
-    fresh = scene.now.free & ~(scene.before.free & ~anywhere) & ~scene.doorways
-    fresh_image: Any = cv2.morphologyEx(fresh.astype(np.uint8), cv2.MORPH_OPEN, SQUARE)
-    _, parts = cv2.connectedComponents(fresh_image, connectivity=4, ltype=cv2.CV_32S)
-    parts = np.asarray(parts)
-    # Space that opens behind one door only belongs to it; space behind several, or none, to the nearest prediction.
-    behind = [set(np.unique(parts[mask & (parts > 0)]).tolist()) for mask in scene.thresholds]
-    nearest, distance = _nearest_room(scene)
-    close = distance <= BELONGS / frame.resolution
+def _find_observed(scene: _Scene) -> list[BoolArray]:
+    """Find the free space observed since the prediction, by the room that it belongs to."""
+    parts = _find_new_parts(scene)
+    owner = _assign_parts(scene, parts)
     found = []
-    for index, mask in enumerate(scene.masks):
-        others = set().union(*(own for other, own in enumerate(behind) if other != index))
-        mine = np.isin(parts, sorted(behind[index] - others))
-        shared = (behind[index] & others) | (set(np.unique(parts[mask & (parts > 0)]).tolist()) - others)
-        shared |= set(np.unique(parts[close & (parts > 0)]).tolist()) - set().union(*behind)
-        region = mine | (np.isin(parts, sorted(shared - {0})) & (nearest == index) & (parts > 0))
-        enough = region.sum() * frame.resolution**2 >= LOOKED_INTO
-        found.append(region if enough else np.zeros(frame.shape, dtype=np.bool_))
+    for index in range(len(scene.rooms)):
+        region = owner == index
+        enough = region.sum() * scene.frame.resolution**2 >= LOOKED_INTO
+        found.append(region if enough else np.zeros(scene.frame.shape, dtype=np.bool_))
     return found
 
 
-def _nearest_room(scene: _Scene) -> tuple[IntArray, Any]:
-    """Index of the predicted room nearest to each cell, and how far it is [cells]."""
+def _find_new_parts(scene: _Scene) -> IntArray:
+    """Number the connected parts of ``now free - (before free - predicted) - doorways``, from 1; 0 elsewhere."""
+    predicted = np.zeros(scene.frame.shape, dtype=np.bool_)
+    for mask in scene.masks:
+        predicted |= mask
+    fresh = scene.now.free & ~(scene.before.free & ~predicted) & ~scene.doorways
+    opened: Any = cv2.morphologyEx(fresh.astype(np.uint8), cv2.MORPH_OPEN, SQUARE)
+    return np.asarray(cv2.connectedComponents(opened, connectivity=4, ltype=cv2.CV_32S)[1])
+
+
+def _assign_parts(scene: _Scene, parts: IntArray) -> IntArray:
+    """Assign each cell of the parts to a room, -1 where to none.
+
+    A part behind the doors of one room belongs to it whole. A part behind those of several is divided among them, each
+    cell to the nearest prediction. A part behind no door is divided likewise among all, if it comes near to any.
+    """
+    behind = np.zeros((len(scene.rooms), int(parts.max(initial=0)) + 1), dtype=np.bool_)
+    for index, threshold in enumerate(scene.thresholds):
+        behind[index, parts[threshold]] = True
+    nearest, distance = _find_nearest(scene)
+    near = np.zeros(behind.shape[1], dtype=np.bool_)
+    near[parts[distance <= BELONGS / scene.frame.resolution]] = True
+    rooms = behind.sum(axis=0)
+    owner = np.full(parts.shape, -1, dtype=np.int64)
+    for index in range(len(scene.rooms)):
+        whole = (rooms == 1) & behind[index]
+        divided = ((rooms > 1) & behind[index]) | ((rooms == 0) & near)
+        owner[whole[parts] | (divided[parts] & (nearest == index))] = index
+    owner[parts == 0] = -1
+    return owner
+
+
+def _find_nearest(scene: _Scene) -> tuple[IntArray, Any]:
+    """Find the index of the predicted room nearest to each cell, and how far it is [cells]."""
     nearest = np.full(scene.frame.shape, -1, dtype=np.int64)
     best = np.full(scene.frame.shape, np.inf, dtype=np.float32)
     for index, mask in enumerate(scene.masks):
@@ -215,10 +236,10 @@ def _nearest_room(scene: _Scene) -> tuple[IntArray, Any]:
     return nearest, best
 
 
-def _observed_room(scene: _Scene, region: BoolArray, index: int) -> BoolArray:
-    """What is observed of a room, and the part of its prediction that goes on from there into the unknown."""
+def _find_room(scene: _Scene, region: BoolArray, index: int) -> BoolArray:
+    """Find what is observed of a room, and the part of its prediction that goes on from there into the unknown."""
     # A wall seen from afar is a row of single hits: nothing goes on through the gaps between them.
-    walls: Any = cv2.morphologyEx(scene.now.occupied.astype(np.uint8), cv2.MORPH_CLOSE, _square(GAP, scene.frame))
+    walls: Any = cv2.morphologyEx(scene.now.occupied.astype(np.uint8), cv2.MORPH_CLOSE, _make_square(GAP, scene.frame))
     left = scene.masks[index] & (walls == 0)
     left_image: Any = cv2.morphologyEx(left.astype(np.uint8), cv2.MORPH_OPEN, SQUARE)
     inside = region & (walls == 0)  # a beam that slipped through a wall opens no way either
@@ -228,15 +249,15 @@ def _observed_room(scene: _Scene, region: BoolArray, index: int) -> BoolArray:
     return joined | region
 
 
-def _square(side: float, frame: GridFrame) -> Any:
-    """A structuring element that closes gaps of a side [m]; odd, or what it closes would move by a cell."""
+def _make_square(side: float, frame: GridFrame) -> Any:
+    """Make a structuring element that closes gaps of a side [m]; odd, or what it closes would move by a cell."""
     cells = math.floor(side / frame.resolution + 1e-9)
     odd = cells + 1 - cells % 2
     return np.ones((odd, odd), dtype=np.uint8)
 
 
-def _cut(scene: _Scene, observed: list[BoolArray], index: int, room: Room) -> Shape | None:
-    """A prediction that nobody has looked into, less what is now known to be something else."""
+def _cut_known(scene: _Scene, observed: list[BoolArray], index: int, room: Room) -> Shape | None:
+    """Cut a prediction that nobody has looked into by what is now known to be something else."""
     mask = scene.masks[index]
     taken = scene.now.occupied & ~scene.before.occupied
     for other, region in enumerate(observed):
@@ -245,17 +266,17 @@ def _cut(scene: _Scene, observed: list[BoolArray], index: int, room: Room) -> Sh
     if (mask & taken).sum() < CONFLICT_SHARE * mask.sum():
         return room.polygon
     left = mask & ~(cv2.dilate(taken.astype(np.uint8), SQUARE) > 0)
-    return _shape(left, scene.frame)
+    return _trace_largest(left, scene.frame)
 
 
-def _again(
+def _predict_again(
     scene: _Scene,
     rooms: dict[int, Room],
     looked_into: set[int],
     doors: Sequence[ClosedDoor],
     predictor: Predict,
 ) -> dict[int, Room]:
-    """The rooms that nobody has looked into, predicted on the map that is known now."""
+    """Predict the rooms that nobody has looked into on the map that is known now."""
     open_ids = {door for index in looked_into for door in scene.rooms[index].doors}
     remaining = [door for door in doors if door.id not in open_ids]
     if not remaining:
@@ -271,8 +292,8 @@ def _again(
     return revised
 
 
-def _shape(mask: BoolArray, frame: GridFrame) -> Polygon | None:
-    """The largest part of a mask as a polygon [m]; holes (furniture) are filled."""
+def _trace_largest(mask: BoolArray, frame: GridFrame) -> Polygon | None:
+    """Trace the largest part of a mask as a polygon [m]; holes (furniture) are filled."""
     image: Any = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), dtype=np.uint8))
     contours, _ = cv2.findContours(image, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     if not contours:

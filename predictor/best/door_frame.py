@@ -8,9 +8,13 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.grid import OccupancyGrid
+from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.structure.wall_faces import find_face_edges, lay_out
 
 # A face of a wall is free space with an occupied cell at most this far behind it [cells]: scan matching smears walls.
-FACE_DEPTH = 3
+FACE_DEPTH = in_cells(0.15)
+# Rows and columns with fewer known cells than this are noise [cells].
+FEW = in_cells(0.25)
 # Rows of cells looked at at once.
 STRIP = 512
 
@@ -81,8 +85,8 @@ class Table:
         return self.count(low, at, high, at + 1).astype(np.float64)
 
 
-def integral(mask: BoolArray, row: int = 0, col: int = 0) -> Table:
-    """The table of a mask whose first cell is ``(row, col)`` of the raster."""
+def sum_up(mask: BoolArray, row: int = 0, col: int = 0) -> Table:
+    """Sum up a mask whose first cell is ``(row, col)`` of the raster."""
     return Table(np.asarray(cv2.integral(mask.astype(np.uint8))), row, col)
 
 
@@ -102,7 +106,7 @@ class DoorFrame:
         thickness: Usual thickness of walls [cells].
         row_ends: First known cell and the one after the last of every row, shape (2, rows); (0, 0) where none is.
         col_ends: The same of every column, shape (2, cols).
-        extent: Window of rows and columns with five known cells and more: those of single cells are noise.
+        extent: Window of rows and columns with more than a few known cells: the others are noise.
     """
 
     angle: float
@@ -116,8 +120,8 @@ class DoorFrame:
     extent: Window
 
     def faces(self, side: str, window: Window) -> BoolArray:
-        """Edges of a window where a wall face was seen, see :func:`faces_of`."""
-        return faces_of(self.free, self.known, side, window)
+        """Edges of a window where a wall face was seen, see :func:`find_faces_in`."""
+        return find_faces_in(self.free, self.known, side, window)
 
     def taken(self, window: Window) -> BoolArray:
         """Cells of a window that a wall of the usual thickness around known space fills."""
@@ -158,6 +162,20 @@ class TurnedMap:
     free: BoolArray
     known: BoolArray
 
+    @property
+    def rotation(self) -> FloatArray:
+        """Takes points of the map frame, as rows from the right, to the turned one, shape (2, 2)."""
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        return np.array([[c, -s], [s, c]])
+
+    def to_cells(self, points: FloatArray) -> FloatArray:
+        """Convert map points [m], shape (..., 2), to continuous cells ``(column, row)``."""
+        return np.asarray((points @ self.rotation - self.origin) / self.resolution)
+
+    def to_map(self, cells: FloatArray) -> FloatArray:
+        """Convert continuous cells ``(column, row)``, shape (..., 2), to map points [m]."""
+        return np.asarray((cells * self.resolution + self.origin) @ self.rotation.T)
+
 
 def turn_map(grid: OccupancyGrid, angle: float, *, margin: float) -> TurnedMap:
     """Resample a map (nearest cell) along ``angle`` with ``margin`` [m] of unknown cells around it."""
@@ -182,18 +200,18 @@ def turn_map(grid: OccupancyGrid, angle: float, *, margin: float) -> TurnedMap:
 
 
 def door_frame(turned: TurnedMap, quarter: int, thickness: int) -> DoorFrame:
-    """The frame whose +v points 90 degrees x ``quarter`` left of the turned map's +y.
+    """Make the frame whose +v points 90 degrees x ``quarter`` left of the turned map's +y.
 
     Args:
         turned: Map along one of the wall directions.
         quarter: 0 to 3.
         thickness: Usual thickness of walls [cells].
     """
-    free, known = (_quarter(mask, quarter) for mask in (turned.free, turned.known))
+    free, known = (_turn(mask, quarter) for mask in (turned.free, turned.known))
     low = turned.origin
     high = low + np.array(turned.free.shape[::-1]) * turned.resolution
     origin = np.array([(low[0], low[1]), (low[1], -high[0]), (-high[0], -high[1]), (-high[1], low[0])][quarter])
-    often = [np.flatnonzero(np.count_nonzero(known, axis=axis) >= 5) for axis in (0, 1)]
+    often = [np.flatnonzero(np.count_nonzero(known, axis=axis) >= FEW) for axis in (0, 1)]
     (u0, u1), (v0, v1) = ((int(at[0]), int(at[-1]) + 1) if at.size else (0, 0) for at in often)
     return DoorFrame(
         angle=turned.angle + quarter * math.pi / 2,
@@ -202,37 +220,29 @@ def door_frame(turned: TurnedMap, quarter: int, thickness: int) -> DoorFrame:
         free=free,
         known=known,
         thickness=thickness,
-        row_ends=_ends(known),
-        col_ends=_ends(known.T),
+        row_ends=_find_ends(known),
+        col_ends=_find_ends(known.T),
         extent=Window(v0, u0, v1, u1),
     )
 
 
-def _ends(known: BoolArray) -> IntArray:
-    """First known cell and the one after the last of every row, shape (2, rows); (0, 0) where none is."""
+def _find_ends(known: BoolArray) -> IntArray:
+    """Find the first known cell and the one after the last of every row, shape (2, rows); (0, 0) where none is."""
     ends = np.zeros((2, len(known)), dtype=np.int64)
     for first in range(0, len(known), STRIP):
-        strip = laid_out(known[first : first + STRIP])
+        strip = lay_out(known[first : first + STRIP])
         some = strip.any(axis=1)
         ends[0, first : first + STRIP] = strip.argmax(axis=1)
         ends[1, first : first + STRIP] = (strip.shape[1] - strip[:, ::-1].argmax(axis=1)) * some
     return ends
 
 
-def _quarter(mask: BoolArray, quarter: int) -> BoolArray:
+def _turn(mask: BoolArray, quarter: int) -> BoolArray:
     return (mask, mask.T[::-1], mask[::-1, ::-1], mask.T[:, ::-1])[quarter]
 
 
-def laid_out(mask: BoolArray) -> BoolArray:
-    """The same mask row after row in memory."""
-    if mask.flags.c_contiguous or abs(mask.strides[1]) == 1 or not mask.size:
-        return np.ascontiguousarray(mask)
-    # Three times as quick as numpy.
-    return np.asarray(cv2.transpose(np.ascontiguousarray(mask.T).view(np.uint8))).view(np.bool_)
-
-
-def faces_of(free: BoolArray, known: BoolArray, side: str, window: Window) -> BoolArray:
-    """Edges of a window of a raster where a wall face was seen.
+def find_faces_in(free: BoolArray, known: BoolArray, side: str, window: Window) -> BoolArray:
+    """Find the edges of a window of a raster where a wall face was seen.
 
     Args:
         free: Free cells of the whole raster.
@@ -252,29 +262,8 @@ def faces_of(free: BoolArray, known: BoolArray, side: str, window: Window) -> Bo
     start, end = max(first - FACE_DEPTH - 1, 0), min(last + FACE_DEPTH + 1, free.shape[1])
     free, known = free[low:high, start:end], known[low:high, start:end]
     if side in {"left", "bottom"}:
-        found = wall_faces(free[:, ::-1], known[:, ::-1])[:, ::-1]
+        found = find_face_edges(free[:, ::-1], known[:, ::-1], depth=FACE_DEPTH)[:, ::-1]
     else:
-        found = wall_faces(free, known)
+        found = find_face_edges(free, known, depth=FACE_DEPTH)
     found = found[:, first - start : last - start + 1]
     return found if upright else found.T
-
-
-def wall_faces(free: BoolArray, known: BoolArray) -> BoolArray:
-    """Edges with a free cell on their left and an occupied one at most FACE_DEPTH cells right.
-
-    Args:
-        free: Free cells.
-        known: Cells free or occupied.
-
-    Returns:
-        Shape (rows, cols + 1).
-    """
-    free = laid_out(free)
-    occupied = laid_out(known) > free
-    edges = np.zeros((free.shape[0], free.shape[1] + 1), dtype=np.bool_)
-    if not free.size:
-        return edges
-    wall = cv2.dilate(occupied.view(np.uint8), np.ones((1, FACE_DEPTH), np.uint8), anchor=(0, 0))
-    np.greater(free[:, :-1], free[:, 1:], out=edges[:, 1:-1])
-    edges[:, 1:-1] &= wall[:, 1:].view(np.bool_)
-    return edges

@@ -2,108 +2,127 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
-from closedrooms.predictor.best.candidates import Entry
 from closedrooms.predictor.best.door_frame import DoorFrame, TurnedMap, Window
+from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.structure.doorways import FacingDoor
 
-# Doors whose walls are closer than this belong to one wall [cells], 1.5 m.
-SAME_WALL = 30
-# The wall face around a door is looked for this far along it and before it [cells].
-FACE_ALONG, FACE_BEFORE = 50, 12
-# Where the room of another door begins [cells]: 0.8 m behind it, beyond any wall.
-BEHIND = 16
-# Free space before a door is looked for between these distances from its wall [cells], 0.25 to 0.9 m, and goes on
-# over gaps up to GAP_ALONG.
-CORRIDOR, GAP_ALONG = (5, 18), 10
+# Doors whose walls are closer than this belong to one wall [cells].
+SAME_WALL = in_cells(1.5)
+# Which way a door looks: unknown cells are counted from the first to the second of these ahead, free ones behind, over
+# so much to either side [cells]; less unknown, or free, than these shares is nothing.
+AHEAD, BACK, ASIDE = (in_cells(0.4), in_cells(1.4)), (-in_cells(0.8), -in_cells(0.2)), in_cells(0.25)
+LEAST_UNKNOWN, LEAST_FREE = 0.25, 0.05
+# The wall face around a door is looked for this far along it and before it, and is so long at least [cells].
+FACE_ALONG, FACE_BEFORE, LEAST_FACE = in_cells(2.5), in_cells(0.6), in_cells(0.4)
+# Where the room of another door begins [cells]: beyond any wall.
+BEHIND = in_cells(0.8)
+# Free space before a door is looked for between these distances from its wall, and goes on over gaps up to GAP_ALONG
+# [cells].
+CORRIDOR, GAP_ALONG = (in_cells(0.25), in_cells(0.9)), in_cells(0.5)
 
 
-@dataclass(frozen=True, slots=True)
-class Facing:
-    """Which way a door looks.
+@dataclass(frozen=True, slots=True, eq=False)
+class DoorPose:
+    """A door and the frame that its room is looked for in.
 
     Attributes:
-        door: In the map frame.
+        facing: The door and the way into its room.
         angle: Direction of its wall, modulo a right angle [rad].
         quarter: The room lies 90 degrees x ``quarter`` left of the turned map's +y.
     """
 
-    door: ClosedDoor
+    facing: FacingDoor
     angle: float
     quarter: int
 
-    @property
-    def inward(self) -> FloatArray:
-        """Unit vector into the room, map frame, shape (2,)."""
-        angle = self.angle + self.quarter * math.pi / 2
-        return np.array([-math.sin(angle), math.cos(angle)])
-
-    @property
-    def along(self) -> FloatArray:
-        """Unit vector along the wall, map frame, shape (2,)."""
-        return np.array([self.inward[1], -self.inward[0]])
+    def looks(self, angle: float, quarter: int) -> bool:
+        """Whether its frame is that one."""
+        return self.angle == angle and self.quarter == quarter
 
 
-def face_door(door: ClosedDoor, turned: TurnedMap, *, reach: float) -> Facing | str:
-    """The side of a door where the unknown is, or why there is none.
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A door in its frame: where the room behind it begins.
+
+    Attributes:
+        u: Door along the wall [cells].
+        v: Door across the wall [cells].
+        v0: Near face of the room [cells].
+        left: Next door of the same wall to the left: its position along the wall [cells], ``None`` where none is.
+        right: The same to the right.
+        others: Points that belong to rooms of other doors, ``(u, v)`` [cells], shape (k, 2).
+        row: Doors of the same wall, this one included.
+        front: First and last edge of the free space before the door, along the wall [cells].
+    """
+
+    u: float
+    v: float
+    v0: int
+    left: float | None
+    right: float | None
+    others: FloatArray
+    row: int
+    front: tuple[int, int]
+
+
+def face_door(door: ClosedDoor, turned: TurnedMap, *, reach: float) -> DoorPose | str:
+    """Find the side of a door where the unknown is, or why there is none.
 
     Args:
         door: In the map frame.
         turned: The map along the direction of the door's wall.
         reach: A wall or free space must be nearer than this [m].
     """
-    c, s = math.cos(turned.angle), math.sin(turned.angle)
-    at = (np.array(door.midpoint) @ np.array([[c, -s], [s, c]]) - turned.origin) / turned.resolution
+    at = turned.to_cells(np.array(door.midpoint))
     cells = round(reach / turned.resolution)
     col, row = (math.floor(v) for v in at)
     rows, cols = turned.known.shape
-    around = turned.known[max(row - cells, 0) : max(row + cells + 1, 0), max(col - cells, 0) : max(col + cells + 1, 0)]
-    free = turned.free[max(row - cells, 0) : max(row + cells + 1, 0), max(col - cells, 0) : max(col + cells + 1, 0)]
+    near = slice(max(row - cells, 0), max(row + cells + 1, 0)), slice(max(col - cells, 0), max(col + cells + 1, 0))
+    around, free = turned.known[near], turned.free[near]
     if not (0 <= row < rows and 0 <= col < cols) or not around.any():
         return "it lies outside the known map"
     if not (around & ~free).any():
         return f"no wall within {reach:g} m"
     scores, ahead = [], []
     for quarter in range(4):
-        unknown = float((~_sampled(turned.known, at, quarter, 8, 28)).mean())
+        unknown = float((~_sample(turned.known, at, quarter, *AHEAD)).mean())
         ahead.append(unknown)
-        scores.append(unknown + float(_sampled(turned.free, at, quarter, -16, -4).mean()))
+        scores.append(unknown + float(_sample(turned.free, at, quarter, *BACK).mean()))
     best = int(np.argmax(np.round(scores, 6)))
-    if ahead[best] < 0.25:
+    if ahead[best] < LEAST_UNKNOWN:
         return "no unknown space behind it"
-    if scores[best] - ahead[best] < 0.05:
+    if scores[best] - ahead[best] < LEAST_FREE:
         return "no free space in front of it"
-    return Facing(door, turned.angle, best)
+    angle = turned.angle + best * math.pi / 2
+    return DoorPose(FacingDoor(door, np.array([-math.sin(angle), math.cos(angle)])), turned.angle, best)
 
 
-def _sampled(mask: BoolArray, at: FloatArray, quarter: int, low: int, high: int) -> BoolArray:
-    """The cells between ``low`` and ``high`` cells ahead of a point, 0.3 m to either side."""
+def _sample(mask: BoolArray, at: FloatArray, quarter: int, low: int, high: int) -> BoolArray:
+    """Take the cells between ``low`` and ``high`` cells ahead of a point, :data:`ASIDE` to either side."""
     inward = np.array([(0, 1), (-1, 0), (0, -1), (1, 0)][quarter], dtype=np.float64)
     along = np.array([inward[1], -inward[0]])
-    steps, sides = np.arange(low, high), np.arange(-5, 6)
+    steps, sides = np.arange(low, high), np.arange(-ASIDE, ASIDE + 1)
     points = at + steps[:, None, None] * inward + sides[None, :, None] * along
     cells = np.floor(points).astype(int)
     col, row = np.clip(cells[..., 0], 0, mask.shape[1] - 1), np.clip(cells[..., 1], 0, mask.shape[0] - 1)
     return np.asarray(mask[row, col], dtype=np.bool_)
 
 
-def enter(frame: DoorFrame, facing: Facing, facings: Sequence[Facing], thickness: int) -> tuple[Entry, float]:
-    """Where the room behind a door begins and what its neighbours leave it.
+def enter(frame: DoorFrame, pose: DoorPose, poses: Sequence[DoorPose]) -> Entry:
+    """Find where the room behind a door begins and what its neighbours leave it.
 
     Args:
         frame: The door's frame.
-        facing: The door.
-        facings: All doors, this one included.
-        thickness: Usual thickness of walls [cells].
-
-    Returns:
-        The entry, and the door's position across the wall [cells].
+        pose: The door.
+        poses: All doors, this one included.
     """
-    u, v = (float(x) for x in frame.to_frame(np.array(facing.door.midpoint)))
+    u, v = (float(x) for x in frame.to_frame(pose.facing.middle))
     near = Window(
         max(int(v) - FACE_BEFORE, 0),
         max(int(u) - FACE_ALONG, 0),
@@ -111,26 +130,35 @@ def enter(frame: DoorFrame, facing: Facing, facings: Sequence[Facing], thickness
         min(int(u) + FACE_ALONG, frame.free.shape[1]),
     )
     low, seen = near.v0, frame.faces("top", near).sum(axis=1)
-    face = low + int(seen.argmax()) - v if seen.size and seen.max() >= 8 else 0.0
-    v0 = round(v + max(min(face + thickness, thickness / 2), 0.5))
+    face = low + int(seen.argmax()) - v if seen.size and seen.max() >= LEAST_FACE else 0.0
+    v0 = round(v + max(min(face + frame.thickness, frame.thickness / 2), 0.5))
     left = right = None
     others = []
     row = 1
-    for other in facings:
-        if other is facing:
+    for other in poses:
+        if other is pose:
             continue
-        ou, ov = (float(x) for x in frame.to_frame(np.array(other.door.midpoint)))
-        if other.angle == facing.angle and other.quarter == facing.quarter and abs(ov - v) < SAME_WALL:
+        ou, ov = (float(x) for x in frame.to_frame(other.facing.middle))
+        if other.looks(pose.angle, pose.quarter) and abs(ov - v) < SAME_WALL:
             row += 1
             left = ou if ou < u and (left is None or ou > left) else left
             right = ou if ou > u and (right is None or ou < right) else right
-        behind = np.array(other.door.midpoint) + BEHIND * frame.resolution * other.inward
+        behind = other.facing.middle + BEHIND * frame.resolution * other.facing.inward
         others.append(frame.to_frame(behind))
-    return Entry(u, v0, left, right, np.array(others).reshape(-1, 2), row, _front(frame.free, u, v)), v
+    return Entry(u, v, v0, left, right, np.array(others).reshape(-1, 2), row, _find_front(frame.free, u, v))
 
 
-def _front(free: BoolArray, u: float, v: float) -> tuple[int, int]:
-    """Ends of the free space before a door, along its wall; gaps up to half a metre do not end it [cells]."""
+def enter_between(first: Entry, second: Entry) -> Entry:
+    """Make the entry of a room behind two doors of one wall, ``first`` left of ``second``, between the outer ones."""
+    # The point behind the second door lies straight ahead of it.
+    ahead = (np.abs(first.others[:, 0] - second.u) < 0.5) & (np.abs(first.others[:, 1] - second.v0) < 2 * BEHIND)
+    return replace(
+        first, u=(first.u + second.u) / 2, v0=max(first.v0, second.v0), right=second.right, others=first.others[~ahead]
+    )
+
+
+def _find_front(free: BoolArray, u: float, v: float) -> tuple[int, int]:
+    """Find the ends of the free space before a door, along its wall [cells]."""
     low, high = max(int(v) - CORRIDOR[1], 0), max(int(v) - CORRIDOR[0], 0)
     seen = np.flatnonzero(free[low:high].any(axis=0)) if high > low else np.zeros(0, dtype=np.int64)
     if not seen.size:

@@ -5,120 +5,145 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from closedrooms.core.arrays import FloatArray, IntArray
-from closedrooms.predictor.best.candidates import (
-    FEATURES,
-    Candidates,
-    Entry,
-    gather,
-    in_line,
-    propose,
-    sizes_seen,
-    window_around,
-)
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.predictor.best.candidates import propose, window_around
 from closedrooms.predictor.best.door_frame import DoorFrame, TurnedMap, Window, door_frame
-from closedrooms.predictor.best.door_pose import Facing, enter
-from closedrooms.predictor.best.selection import SHORTLIST, Suspect
-from closedrooms.predictor.best.shared_rooms import between, spans
-from closedrooms.predictor.best.symmetry import mirrored
-from closedrooms.predictor.best.weights import SIDE_WEIGHTS, weights_of
+from closedrooms.predictor.best.door_pose import Entry, enter, enter_between
+from closedrooms.predictor.best.evidence import gather, rate_sizes, widen_in_line
+from closedrooms.predictor.best.features import score_rectangles
+from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.scene import Scene
+from closedrooms.predictor.best.symmetry import mirror
+from closedrooms.predictor.config import BestConfig
 
-# Narrowest and widest, shallowest and deepest room [cells]: 0.8 m to 24 m.
-LIMITS = (16, 480, 16, 480)
+# A shared room reaches this far past both doors [cells].
+PAST = in_cells(0.3)
 # Rooms share tables up to so many cells in line with their sides: 25 to 50 bytes each. For one door alone they are 2.5
 # million at most.
 MAX_WINDOW = 5_000_000
 
+# The doors of a room: one, or two of one wall, the left one first, by their indices.
+Doors = tuple[int, ...]
 
-@dataclass(frozen=True, slots=True)
-class Suspects:
-    """The rectangles of every door, in the order of the facings, and of neighbouring doors that may share a room.
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hypotheses:
+    """The rectangles that one room may fill, best first.
 
     Attributes:
-        alone: One a door.
+        boxes: In the turned map ``x0, y0, x1, y1`` [cells], shape (n, 4).
+        corners: Of the rectangles in the map frame [m], shape (n, 4, 2).
+        scores: Of each by itself, shape (n,).
+        angle: Of the turned map [rad].
+        quarter: Where the room lies.
+        u: Door along its wall [cells of its frame].
+        v: Door across its wall [cells of its frame].
+    """
+
+    boxes: IntArray
+    corners: FloatArray
+    scores: FloatArray
+    angle: float
+    quarter: int
+    u: float
+    v: float
+
+
+@dataclass(frozen=True, slots=True)
+class Proposals:
+    """The rectangles of every door, and of neighbouring doors that may share a room.
+
+    Attributes:
+        alone: One a door, in the order of the doors.
         shared: By the indices of both doors, the left one first.
     """
 
-    alone: list[Suspect]
-    shared: dict[tuple[int, int], Suspect]
+    alone: list[Hypotheses]
+    shared: dict[tuple[int, int], Hypotheses]
 
 
-def suspect(turned: dict[float, TurnedMap], facings: list[Facing], thickness: int) -> Suspects:
-    """Rectangles of every door, frame by frame.
-
-    Args:
-        turned: Maps by the angle that they are turned along.
-        facings: The doors.
-        thickness: Usual thickness of walls [cells].
-    """
-    alone: dict[int, Suspect] = {}
-    shared: dict[tuple[int, int], Suspect] = {}
-    twins = {angle: mirrored(turned[angle]) for angle in {facing.angle for facing in facings}}
-    for angle, quarter in sorted({(facing.angle, facing.quarter) for facing in facings}):
-        frame = door_frame(turned[angle], quarter, thickness)
-        here = [i for i, facing in enumerate(facings) if (facing.angle, facing.quarter) == (angle, quarter)]
-        entries = {i: enter(frame, facings[i], facings, thickness) for i in here}
-        rooms: dict[tuple[int, ...], Entry] = {(i,): entries[i][0] for i in here}
-        for i, j in itertools.permutations(here, 2):
-            left, right = entries[i][0], entries[j][0]
+def propose_rectangles(scene: Scene) -> Proposals:
+    """Propose and score the rectangles of every door, and of every two neighbours in a wall, frame by frame."""
+    poses, thickness = scene.poses, scene.walls.usual
+    found: dict[Doors, Hypotheses] = {}
+    angles = {pose.angle for pose in poses} if scene.config.symmetry else set()
+    twins = {angle: mirror(scene.turned[angle]) for angle in angles}
+    for angle, quarter in sorted({(pose.angle, pose.quarter) for pose in poses}):
+        turned, twin = scene.turned[angle], twins.get(angle)
+        frame = door_frame(turned, quarter, thickness)
+        mirrored = None if twin is None else door_frame(twin, quarter, thickness)
+        entries = {i: enter(frame, pose, poses) for i, pose in enumerate(poses) if pose.looks(angle, quarter)}
+        rooms: dict[Doors, Entry] = {(i,): entry for i, entry in entries.items()}
+        for i, j in itertools.permutations(entries, 2):
+            left, right = entries[i], entries[j]
             if left.right == right.u and right.left == left.u:
-                rooms[i, j] = between(left, right)
-        whole = twins[angle]
-        twin = None if whole is None else door_frame(whole, quarter, thickness)
-        for doors, found in _propose_all(frame, twin, rooms, thickness).items():
-            across = entries[doors[0]][1]
-            if len(doors) == 1:
-                alone[doors[0]] = _suspect(found, rooms[doors], across, frame, turned[angle], quarter)
-                continue
-            i, j = doors
-            both = spans(found.boxes, entries[i][0], entries[j][0])
-            if both.any():
-                kept = Candidates(found.boxes[both], found.features[both])
-                shared[i, j] = _suspect(kept, rooms[doors], across, frame, turned[angle], quarter)
-    return Suspects([alone[i] for i in range(len(facings))], shared)
+                rooms[i, j] = enter_between(left, right)
+        for doors, (boxes, scores) in _propose_all(frame, mirrored, rooms, scene.config).items():
+            behind = np.ones(len(boxes), dtype=np.bool_)
+            if len(doors) == 2:
+                behind = _spans(boxes, entries[doors[0]], entries[doors[1]])
+            if behind.any():
+                most = scene.config.shortlist
+                found[doors] = _shortlist(boxes[behind], scores[behind], rooms[doors], frame, turned, quarter, most)
+    shared = {(doors[0], doors[1]): own for doors, own in found.items() if len(doors) == 2}
+    return Proposals([found[i,] for i in range(len(poses))], shared)
+
+
+def _spans(boxes: IntArray, first: Entry, second: Entry) -> BoolArray:
+    """Tell which rectangles lie behind both doors, shape (n,)."""
+    return np.asarray((boxes[:, 0] <= first.u - PAST) & (boxes[:, 2] >= second.u + PAST))
 
 
 def _propose_all(
-    frame: DoorFrame, twin: DoorFrame | None, rooms: dict[tuple[int, ...], Entry], thickness: int
-) -> dict[tuple[int, ...], Candidates]:
-    """Rectangles of every room in a frame, window by window: one window's tables are in memory at a time."""
-    seen = sizes_seen(frame)
-    found: dict[tuple[int, ...], Candidates] = {}
-    for window, doors in _windows(frame, rooms):
-        evidence = gather(frame, thickness, window, seen, twin)
-        found |= {key: propose(frame, evidence, rooms[key], thickness, LIMITS) for key in doors}
+    frame: DoorFrame, twin: DoorFrame | None, rooms: dict[Doors, Entry], config: BestConfig
+) -> dict[Doors, tuple[IntArray, FloatArray]]:
+    """Propose the rectangles of every room in a frame with their scores: one window's tables at a time in memory."""
+    smallest, largest = in_cells(config.smallest_side), in_cells(config.largest_side)
+    seen = rate_sizes(frame)
+    found: dict[Doors, tuple[IntArray, FloatArray]] = {}
+    for window, together in _share_windows(frame, rooms, largest):
+        evidence = gather(frame, window, seen, twin)
+        for doors in together:
+            boxes = propose(frame, evidence, rooms[doors], smallest, largest)
+            found[doors] = boxes, score_rectangles(frame, evidence, rooms[doors], boxes)
         del evidence
-    return {key: found[key] for key in rooms}
+    return {doors: found[doors] for doors in rooms}
 
 
-def _windows(frame: DoorFrame, rooms: dict[tuple[int, ...], Entry]) -> list[tuple[Window, list[tuple[int, ...]]]]:
-    """Windows that hold the rectangles of each room; near rooms share one."""
-    groups: list[tuple[Window, list[tuple[int, ...]]]] = []
-    for key in sorted(rooms, key=lambda key: (rooms[key].v0, rooms[key].u)):
-        own = window_around(frame, rooms[key], LIMITS)
-        for number, (window, doors) in enumerate(groups):
+def _share_windows(frame: DoorFrame, rooms: dict[Doors, Entry], largest: int) -> list[tuple[Window, list[Doors]]]:
+    """Find windows that hold the rectangles of each room; near rooms share one."""
+    groups: list[tuple[Window, list[Doors]]] = []
+    for doors in sorted(rooms, key=lambda doors: (rooms[doors].v0, rooms[doors].u)):
+        own = window_around(frame, rooms[doors], largest)
+        for number, (window, together) in enumerate(groups):
             both = own.joined(window)
-            if sum(in_line(frame, both, side).cells for side in ("right", "top")) <= MAX_WINDOW:
-                groups[number] = both, [*doors, key]
+            if sum(widen_in_line(frame, both, side).cells for side in ("right", "top")) <= MAX_WINDOW:
+                groups[number] = both, [*together, doors]
                 break
         else:
-            groups.append((own, [key]))
+            groups.append((own, [doors]))
     return groups
 
 
-def _suspect(
-    found: Candidates, entry: Entry, across: float, frame: DoorFrame, turned: TurnedMap, quarter: int
-) -> Suspect:
-    """The best of the rectangles found, best first; ties go by position."""
-    scores = np.round(found.features @ weights_of(SIDE_WEIGHTS, FEATURES), 9)
-    order = np.lexsort((*found.boxes.T, -scores))[:SHORTLIST]
-    boxes = found.boxes[order]
-    corners = _corners(frame, boxes)
-    return Suspect(in_turned(boxes, turned, quarter), corners, scores[order], turned.angle, quarter, entry.u, across)
+def _shortlist(
+    boxes: IntArray,
+    scores: FloatArray,
+    entry: Entry,
+    frame: DoorFrame,
+    turned: TurnedMap,
+    quarter: int,
+    most: int,
+) -> Hypotheses:
+    """Keep the best of the rectangles found, best first; ties go by position."""
+    order = np.lexsort((*boxes.T, -scores))[:most]
+    boxes = boxes[order]
+    corners = frame.to_map(boxes[:, [[0, 1], [2, 1], [2, 3], [0, 3]]].astype(np.float64))
+    in_map = _turn_back(boxes, turned, quarter)
+    return Hypotheses(in_map, corners, scores[order], turned.angle, quarter, entry.u, entry.v)
 
 
-def in_turned(boxes: IntArray, turned: TurnedMap, quarter: int) -> IntArray:
-    """Rectangles of a door's frame in the turned map, ``x0, y0, x1, y1`` [cells]."""
+def _turn_back(boxes: IntArray, turned: TurnedMap, quarter: int) -> IntArray:
+    """Turn rectangles of a door's frame back into the turned map, ``x0, y0, x1, y1`` [cells]."""
     rows, cols = turned.free.shape
     u0, v0, u1, v1 = boxes.T
     columns = (
@@ -128,8 +153,3 @@ def in_turned(boxes: IntArray, turned: TurnedMap, quarter: int) -> IntArray:
         (v0, rows - u1, v1, rows - u0),
     )[quarter]
     return np.stack(columns, axis=-1)
-
-
-def _corners(frame: DoorFrame, boxes: IntArray) -> FloatArray:
-    """Corners in the map frame [m], shape (n, 4, 2)."""
-    return frame.to_map(boxes[:, [[0, 1], [2, 1], [2, 3], [0, 3]]].astype(np.float64))

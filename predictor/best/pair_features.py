@@ -1,50 +1,165 @@
 """What two rooms say about each other: they do not overlap, share a wall, and end in one line (method ``best``)."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
+import shapely
 
 from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.predictor.best.door_pose import SAME_WALL
+from closedrooms.predictor.best.hypotheses import Hypotheses
+from closedrooms.predictor.best.lattice import in_cells
 
-PAIR_FEATURES = ("overlap", "same depth", "shared wall", "strip between", "gap between", "same width")
-# Slack of the thickness of the wall between two rooms [cells].
-SLACK = 6
-# A strip narrower than this between two rooms is no room of its own [cells], 1.8 m.
-STRIP = 36
-# Unknown space up to this wide between two rooms would need a door of its own [cells], 5 m.
-GAP = 100
+# Two sides that overlap by this still touch; slack of the thickness of the wall between two rooms [cells].
+TOUCHING, SLACK = in_cells(0.1), in_cells(0.3)
+# A strip narrower than this between two rooms is no room of its own [cells].
+STRIP = in_cells(1.8)
+# Unknown space up to this wide between two rooms would need a door of its own [cells].
+GAP = in_cells(5.0)
+# Half a wall is at most this thick where rooms are held apart [cells].
+MOST_HALF = in_cells(0.1)
+# Depths, and widths, so far apart agree by 1/e [cells].
+OFF_DEPTH, OFF_WIDTH = in_cells(0.2), in_cells(0.4)
+# Doors further apart than this share depth and width by a factor 1/e less [cells].
+DEPTH_REACH = in_cells(10.0)
+# Rooms that overlap by more than this share of the smaller one count this much more.
+OVERLAPS, MORE = 0.03, 0.2
 
 
-def pair_features(a: IntArray, b: IntArray, back: tuple[int, int] | None, thickness: int) -> FloatArray:
-    """Evidence for every pair of rectangles of two doors.
+class Pairs:
+    """Every pair of rectangles of two doors; every array of shape (n, m).
 
     Args:
         a: Rectangles ``x0, y0, x1, y1`` of one door in the turned map [cells], shape (n, 4).
         b: Rectangles of the other door, shape (m, 4).
-        back: Column of the back side in ``a`` and in ``b`` where both doors are in one wall, else ``None``.
+        back: Column of the back side in both where both doors are in one wall, else ``None``.
+        thickness: Usual thickness of walls [cells].
+        agree: How much two doors of one wall are expected to agree in depth and width, 0 to 1.
+    """
+
+    def __init__(self, a: IntArray, b: IntArray, back: int | None, thickness: int, *, agree: float = 1.0) -> None:
+        self.a, self.b = a[:, None, :].astype(np.float64), b[None, :, :].astype(np.float64)
+        self.back, self.thickness, self.agree = back, thickness, agree
+        low, high = np.maximum(self.a[..., :2], self.b[..., :2]), np.minimum(self.a[..., 2:], self.b[..., 2:])
+        self.common = high - low  # negative: the gap between the two along that axis
+        self.sizes = [box[..., 2:] - box[..., :2] for box in (self.a, self.b)]
+
+    @cached_property
+    def overlap(self) -> FloatArray:
+        """Area in common, each grown by half a wall, over the smaller area."""
+        grown = np.maximum(self.common + min(self.thickness, 2 * MOST_HALF) / 2, 0.0)
+        areas = [size.prod(axis=-1) for size in self.sizes]
+        return _emphasise(grown.prod(axis=-1) / np.minimum(areas[0], areas[1]))
+
+    @cached_property
+    def gaps(self) -> list[tuple[FloatArray, FloatArray]]:
+        """Along either axis: how far the two are apart [cells], and the share of both sides that face each other."""
+        found = []
+        for axis in (0, 1):
+            along = np.maximum(self.common[..., 1 - axis], 0.0)
+            share = along / self.sizes[0][..., 1 - axis] + along / self.sizes[1][..., 1 - axis]
+            found.append((-self.common[..., axis], share))
+        return found
+
+    def facing(self, nearest: float, furthest: float) -> FloatArray:
+        """Share of both rooms' sides that face each other at a distance between two [cells]."""
+        apart = [np.where((gap > nearest) & (gap <= furthest), share, 0.0) for gap, share in self.gaps]
+        return np.asarray(apart[0] + apart[1])
+
+
+def _emphasise(overlap: FloatArray) -> FloatArray:
+    """Raise overlaps that are more than a touch."""
+    return np.asarray(overlap + MORE * (overlap > OVERLAPS))
+
+
+def overlap(p: Pairs) -> FloatArray:
+    """Area in common over the smaller area."""
+    return p.overlap
+
+
+def same_depth(p: Pairs) -> FloatArray:
+    """How well the backs of two rooms of one wall agree."""
+    if p.back is None:
+        return np.zeros(p.overlap.shape)
+    return np.asarray(np.exp(-np.abs(p.a[..., p.back] - p.b[..., p.back]) / OFF_DEPTH) * p.agree)
+
+
+def shared_wall(p: Pairs) -> FloatArray:
+    """Share of the sides with a wall between the two."""
+    return p.facing(-TOUCHING - 1, p.thickness + SLACK)
+
+
+def strip_between(p: Pairs) -> FloatArray:
+    """Share of the sides with a strip between the two that is too narrow for a room."""
+    return p.facing(p.thickness + SLACK, p.thickness + STRIP)
+
+
+def gap_between(p: Pairs) -> FloatArray:
+    """Share of the sides with space between the two that would need a door of its own."""
+    return p.facing(p.thickness + STRIP, p.thickness + GAP)
+
+
+def same_width(p: Pairs) -> FloatArray:
+    """How well the widths of two rooms of one wall agree."""
+    if p.back is None:
+        return np.zeros(p.overlap.shape)
+    axis = 1 - p.back % 2
+    return np.asarray(np.exp(-np.abs(p.sizes[0][..., axis] - p.sizes[1][..., axis]) / OFF_WIDTH) * p.agree)
+
+
+@dataclass(frozen=True, slots=True)
+class PairFeature:
+    """One kind of evidence that two rooms give together.
+
+    Attributes:
+        name: For people.
+        measure: Of every pair of rectangles, shape (n, m).
+        weight: What it counts; where from, ``best.features`` says.
+    """
+
+    name: str
+    measure: Callable[[Pairs], FloatArray]
+    weight: float
+
+
+OVERLAP_WEIGHT = -20.0
+PAIR_FEATURES = (
+    PairFeature("overlap", overlap, weight=OVERLAP_WEIGHT),
+    PairFeature("same depth", same_depth, weight=2.65),
+    PairFeature("shared wall", shared_wall, weight=0.69),
+    PairFeature("strip between", strip_between, weight=-0.89),
+    PairFeature("gap between", gap_between, weight=-0.44),
+    PairFeature("same width", same_width, weight=3.75),
+)
+WEIGHTS = np.array([feature.weight for feature in PAIR_FEATURES])
+
+
+def score_pairs(a: Hypotheses, b: Hypotheses, thickness: int) -> tuple[FloatArray, FloatArray]:
+    """Score every pair of rectangles of two doors.
+
+    Args:
+        a: Of one door.
+        b: Of another door.
         thickness: Usual thickness of walls [cells].
 
     Returns:
-        Shape (n, m, len(PAIR_FEATURES)).
+        What each pair counts, and how much it overlaps, both of shape (n, m).
     """
-    a_, b_ = a[:, None, :].astype(np.float64), b[None, :, :].astype(np.float64)
-    low, high = np.maximum(a_[..., :2], b_[..., :2]), np.minimum(a_[..., 2:], b_[..., 2:])
-    shared = high - low  # negative: the gap between the two along that axis
-    half = min(thickness, 4) / 2
-    grown = np.maximum(shared + half, 0.0)
-    sizes = [(box[..., 2:] - box[..., :2]) for box in (a_, b_)]
-    areas = [size.prod(axis=-1) for size in sizes]
-    overlap = grown.prod(axis=-1) / np.minimum(areas[0], areas[1])
-    wall = np.zeros(overlap.shape)
-    strip = np.zeros(overlap.shape)
-    wide = np.zeros(overlap.shape)
-    for axis in (0, 1):
-        gap, along = -shared[..., axis], np.maximum(shared[..., 1 - axis], 0.0)
-        share = along / sizes[0][..., 1 - axis] + along / sizes[1][..., 1 - axis]
-        wall += np.where((gap >= -2) & (gap <= thickness + SLACK), share, 0.0)
-        strip += np.where((gap > thickness + SLACK) & (gap <= thickness + STRIP), share, 0.0)
-        wide += np.where((gap > thickness + STRIP) & (gap <= thickness + GAP), share, 0.0)
-    depth, width = np.zeros(overlap.shape), np.zeros(overlap.shape)
-    if back is not None:
-        depth = np.exp(-np.abs(a_[..., back[0]] - b_[..., back[1]]) / 4.0)
-        axis = 1 - back[0] % 2
-        width = np.exp(-np.abs(sizes[0][..., axis] - sizes[1][..., axis]) / 8.0)
-    return np.stack((overlap + 0.2 * (overlap > 0.03), depth, wall, strip, wide, width), axis=-1)
+    if a.angle != b.angle:
+        slanted = _overlap_slanted(a.corners, b.corners)
+        return OVERLAP_WEIGHT * slanted, slanted
+    in_one_wall = a.quarter == b.quarter and abs(a.v - b.v) < SAME_WALL
+    back = (3, 0, 1, 2)[a.quarter] if in_one_wall else None
+    pairs = Pairs(a.boxes, b.boxes, back, thickness, agree=float(np.exp(-abs(a.u - b.u) / DEPTH_REACH)))
+    features = np.stack([feature.measure(pairs) for feature in PAIR_FEATURES], axis=-1)
+    return np.asarray(features @ WEIGHTS), pairs.overlap
+
+
+def _overlap_slanted(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Measure the shared area over the smaller area, for rectangles of two wall directions."""
+    p, q = np.asarray(shapely.polygons(a)), np.asarray(shapely.polygons(b))
+    shared = shapely.area(shapely.intersection(p[:, None], q[None, :]))
+    smaller = np.minimum(np.asarray(shapely.area(p))[:, None], np.asarray(shapely.area(q))[None, :])
+    return _emphasise(shared / smaller)

@@ -1,6 +1,5 @@
-"""What known space leaves of a rectangle (method ``best``)."""
+"""From the chosen rectangles to rooms: what known space leaves of each, up to the leaves of its doors (``best``)."""
 
-import math
 from collections.abc import Sequence
 
 import cv2
@@ -9,28 +8,90 @@ import shapely
 from shapely.geometry import Polygon
 
 from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.room import Room, RoomKind
 from closedrooms.predictor.best.door_frame import TurnedMap
-from closedrooms.predictor.best.door_pose import Facing
-from closedrooms.predictor.structure.doorways import Doorway
+from closedrooms.predictor.best.lattice import RESOLUTION, in_cells
+from closedrooms.predictor.best.scene import Scene
+from closedrooms.predictor.best.selection import Choice
+from closedrooms.predictor.disjoint_rooms import NO_ROOM, part_rooms
+from closedrooms.predictor.structure.doorways import Doorway, FacingDoor, find_doorways
 
 # A rectangle that known space takes less of than this stays a rectangle.
 CLEAN = 0.01
-# Outlines are simplified by this much [cells], 0.1 m.
-SIMPLIFY = 2.0
-# Walls of known space as thick as the room's own are taken off; strips narrower than this are no room [cells].
-NARROW = 7
+# Outlines are simplified by this much [cells].
+SIMPLIFY = in_cells(0.1)
+# Walls of known space as thick as the room's own are taken off and strips narrower than this are no room [cells]; in an
+# alcove narrower than the walls around it, both are thin.
+NARROW, ALCOVE_WALL, ALCOVE_NARROW = in_cells(0.35), in_cells(0.05), in_cells(0.15)
+# Of several pieces of a room, one so far from the door counts half [cells].
+HALF_WORTH = in_cells(1.0)
+# A room that leaves what is known by this lies beyond it; rooms with a wall and this between them are neighbours where
+# they face each other over so much area [m, m, m2].
+BEYOND, BESIDE, FACING = 0.5, 0.3, 0.05
 
 
-def room_shape(
+def trace_rooms(scene: Scene, choices: Sequence[Choice]) -> tuple[list[Room], dict[str, str]]:
+    """Subtract known space and its walls from the chosen rectangles and extend them to the leaves of their doors.
+
+    Args:
+        scene: The map and its doors.
+        choices: A rectangle each.
+
+    Returns:
+        Disjoint rooms in the order of the choices, and why doors have none, by their id.
+    """
+    facing = [pose.facing for pose in scene.poses]
+    openings = find_doorways(scene.grid, facing, width=scene.config.door_width)
+    rooms: list[Room] = []
+    failures: dict[str, str] = {}
+    for choice in choices:
+        names = tuple(facing[i].door.id for i in choice.doors)
+        shape = _trace_room(scene, choice, [opening for i in choice.doors if (opening := openings[i]) is not None])
+        if shape is None:
+            failures |= dict.fromkeys(names, NO_ROOM)
+            continue
+        others = [other.corners for other in choices if other is not choice]
+        kind = _name_kind(choice.corners, others, scene.grid, scene.walls.usual)
+        rooms.append(Room(shape, names, kind, round(choice.score, 9), choice.cut))
+    apart, without = part_rooms(rooms, {door.door.id: door.door.midpoint for door in facing})
+    return apart, failures | without
+
+
+def _trace_room(scene: Scene, choice: Choice, doorways: Sequence[Doorway]) -> Polygon | None:
+    """Trace one room up to the leaves of its doors; ``None`` where nothing is left of its rectangle."""
+    pose = scene.poses[choice.doors[0]]
+    turned = scene.turned[pose.angle]
+    for thickness, narrow in ((scene.walls.least, NARROW), (ALCOVE_WALL, ALCOVE_NARROW)):
+        shape = subtract_known(turned, choice.corners, thickness, pose.facing, doorways, narrow=narrow)
+        if shape is not None:
+            for doorway in doorways:
+                shape = doorway.joined(shape, turned.resolution)
+            return shape
+    return None
+
+
+def _name_kind(corners: FloatArray, others: Sequence[FloatArray], grid: OccupancyGrid, thickness: int) -> RoomKind:
+    """Border beyond what is known, dependent beside another room, else independent (paper, sections 3.3 and 3.6)."""
+    x0, y0, x1, y1 = grid.frame.bounds
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    if low[0] < x0 - BEYOND or low[1] < y0 - BEYOND or high[0] > x1 + BEYOND or high[1] > y1 + BEYOND:
+        return "border"
+    grown = shapely.Polygon(corners).buffer(thickness * RESOLUTION + BESIDE, join_style="mitre")
+    beside = any(grown.intersection(shapely.Polygon(other)).area > FACING for other in others)
+    return "dependent" if beside else "independent"
+
+
+def subtract_known(
     turned: TurnedMap,
     corners: FloatArray,
     thickness: int,
-    facing: Facing,
+    facing: FacingDoor,
     doorways: Sequence[Doorway],
     *,
-    narrow: int = NARROW,
+    narrow: int,
 ) -> Polygon | None:
-    """The free interior of a room up to the leaves of its doors, or ``None`` where nothing is left.
+    """Subtract known space and its walls from a rectangle.
 
     Args:
         turned: The map along the room's walls.
@@ -39,20 +100,11 @@ def room_shape(
         facing: Its door: of several pieces the one at the door stays.
         doorways: Openings of its doors.
         narrow: Strips narrower than this are no room [cells].
+
+    Returns:
+        One polygon, ``None`` where nothing is left.
     """
-    shape = _interior(turned, corners, thickness, facing, doorways, narrow)
-    for doorway in doorways:
-        shape = None if shape is None else doorway.joined(shape, turned.resolution)
-    return shape
-
-
-def _interior(
-    turned: TurnedMap, corners: FloatArray, thickness: int, facing: Facing, doorways: Sequence[Doorway], narrow: int
-) -> Polygon | None:
-    """What known space and its walls leave of a rectangle, as one polygon."""
-    c, s = math.cos(turned.angle), math.sin(turned.angle)
-    to_turned = np.array([[c, -s], [s, c]])
-    cells = (corners @ to_turned - turned.origin) / turned.resolution
+    cells = turned.to_cells(corners)
     x0, y0 = np.round(cells.min(axis=0)).astype(int)
     x1, y1 = np.round(cells.max(axis=0)).astype(int)
     pad = thickness + 1
@@ -64,7 +116,7 @@ def _interior(
     for doorway in doorways:
         # Free space in an opening ends at a leaf, not at a wall.
         recess = shapely.get_coordinates(doorway.stretch(doorway.face, doorway.leaf + turned.resolution))
-        ends = (recess @ to_turned - turned.origin) / turned.resolution - (x0 - pad, y0 - pad)
+        ends = turned.to_cells(recess) - (x0 - pad, y0 - pad)
         (left, low), (right, high) = np.floor(ends.min(axis=0)).astype(int), np.ceil(ends.max(axis=0)).astype(int)
         window[max(low, 0) : max(high, 0), max(left, 0) : max(right, 0)] = 0
     taken = cv2.dilate(window, np.ones((2 * thickness + 1,) * 2, np.uint8)) > 0
@@ -77,9 +129,8 @@ def _interior(
     number, labels = cv2.connectedComponents(smooth, connectivity=4)
     if number < 2:
         return None
-    door = np.array(facing.door.midpoint) @ to_turned
-    door = (door - turned.origin) / turned.resolution - (x0, y0)
-    best = max(range(1, number), key=lambda k: _worth(labels == k, door))
+    door = turned.to_cells(facing.middle) - (x0, y0)
+    best = max(range(1, number), key=lambda k: _rate_piece(labels == k, door))
     piece = (labels == best).astype(np.uint8)
     # Twice the size, so that outlines run along cell edges after the half-cell shift.
     double = cv2.resize(piece, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
@@ -88,15 +139,13 @@ def _interior(
     simple = cv2.approxPolyDP(outline, 2 * SIMPLIFY, True).reshape(-1, 2).astype(np.float64)
     if len(simple) < 3:
         return None
-    edges = (simple + 0.5) / 2 + (x0, y0)
-    points = (edges * turned.resolution + turned.origin) @ to_turned.T
-    shape = Polygon(points).buffer(0)
+    shape = Polygon(turned.to_map((simple + 0.5) / 2 + (x0, y0))).buffer(0)
     parts = [p for p in getattr(shape, "geoms", [shape]) if isinstance(p, Polygon) and p.area > 0]
     return max(parts, key=lambda p: p.area) if parts else None
 
 
-def _worth(mask: BoolArray, door: FloatArray) -> float:
-    """Area of a piece against its distance from the door: the room is the large piece near the door."""
+def _rate_piece(mask: BoolArray, door: FloatArray) -> float:
+    """Rate the area of a piece against its distance from the door: the room is the large piece near the door."""
     rows, cols = np.nonzero(mask)
     distance = float(np.hypot(cols - door[0], rows - door[1]).min())
-    return float(len(rows)) / (1.0 + (distance / 20.0) ** 2)
+    return float(len(rows)) / (1.0 + (distance / HALF_WORTH) ** 2)

@@ -7,14 +7,15 @@ import numpy as np
 import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray
-from closedrooms.predictor.best.door_frame import STRIP, TurnedMap, Window, faces_of
+from closedrooms.predictor.best.door_frame import STRIP, TurnedMap, Window, find_faces_in
+from closedrooms.predictor.best.lattice import in_cells
 
-# Faces are counted in blocks of so many cells [cells], 0.1 m, and mirrored onto each other within one block.
-BLOCK = 2
+# Faces are counted in blocks of so many cells, and mirrored onto each other within one block.
+BLOCK = in_cells(0.1)
 # A map is symmetric about an axis when at least so much of its wall lies where the other half is known, when of that
 # wall at least so much has its counterpart, and when no other axis, at least 1 m away, comes nearer than so much.
 KNOWN, ALIKE, AHEAD = 0.5, 0.5, 0.2
-APART = 20
+APART = in_cells(1.0)
 
 ComplexArray = npt.NDArray[np.complexfloating]
 
@@ -32,8 +33,8 @@ class Axis:
     alike: float
 
 
-def mirrored(turned: TurnedMap) -> TurnedMap | None:
-    """What the halves of a symmetric building show of each other, or ``None`` where it is not symmetric.
+def mirror(turned: TurnedMap) -> TurnedMap | None:
+    """Lay the halves of a symmetric building over each other, or return ``None`` where it is not symmetric.
 
     Args:
         turned: The map along its walls.
@@ -63,7 +64,7 @@ def _flip(source: BoolArray, target: BoolArray, total: int) -> None:
 
 
 def find_axis(free: BoolArray, known: BoolArray) -> Axis | None:
-    """The axis across the columns about which the faces of walls are symmetric.
+    """Find the axis across the columns about which the faces of walls are symmetric.
 
     Faces along the axis and faces across it are counted apart, and the fewer counterparts decide: the walls of a
     corridor alone are symmetric about any axis across it, its side walls about its own middle.
@@ -77,20 +78,21 @@ def find_axis(free: BoolArray, known: BoolArray) -> Axis | None:
     """
     size = cv2.getOptimalDFTSize(2 * (free.shape[1] // BLOCK + 1))
 
-    def spectrum(mask: BoolArray) -> ComplexArray:
+    def transform(mask: BoolArray) -> ComplexArray:
         return np.asarray(np.fft.rfft(mask.astype(np.float32), size, axis=1))
 
     # Faces across the axis have their counterpart facing the other way, those along it facing the same way.
     alike, seen, walls = np.zeros((2, size)), np.zeros((2, size)), np.zeros(2)
     for first in range(0, len(free), STRIP):
         strip = Window(first, 0, min(first + STRIP, len(free)), free.shape[1])
-        place = spectrum(_blocks(np.pad(known[strip.of], ((0, 0), (0, 1)))))
+        place = transform(_reduce(np.pad(known[strip.of], ((0, 0), (0, 1)))))
         # Of edges between rows those below each cell.
         edges = [
-            faces_of(free, known, side, strip)[: strip.v1 - strip.v0] for side in ("right", "left", "top", "bottom")
+            find_faces_in(free, known, side, strip)[: strip.v1 - strip.v0]
+            for side in ("right", "left", "top", "bottom")
         ]
-        faces = [_blocks(found) for found in edges]
-        own, others = [spectrum(found) for found in faces], [spectrum(_wide(found)) for found in faces]
+        faces = [_reduce(found) for found in edges]
+        own, others = [transform(found) for found in faces], [transform(_widen(found)) for found in faces]
         for family, pairs in enumerate((((0, 1), (1, 0)), ((2, 2), (3, 3)))):
             for one, other in pairs:
                 walls[family] += np.count_nonzero(faces[one])
@@ -103,15 +105,15 @@ def find_axis(free: BoolArray, known: BoolArray) -> Axis | None:
     away = np.abs(np.arange(size) - best) * BLOCK >= APART
     if share[best] < ALIKE or share[best] - share[away].max(initial=0.0) < AHEAD:
         return None
-    return Axis(_refined(free, known, best * BLOCK), float(share[best]))
+    return Axis(_refine(free, known, best * BLOCK), float(share[best]))
 
 
-def _refined(free: BoolArray, known: BoolArray, total: int) -> int:
-    """The place of an axis to the cell."""
+def _refine(free: BoolArray, known: BoolArray, total: int) -> int:
+    """Find the place of an axis to the cell."""
     counts = dict.fromkeys(range(total - BLOCK, total + 2 * BLOCK + 1), 0)
     for first in range(0, len(free), STRIP):
         strip = Window(first, 0, min(first + STRIP, len(free)), free.shape[1])
-        right, left = (faces_of(free, known, side, strip) for side in ("right", "left"))
+        right, left = (find_faces_in(free, known, side, strip) for side in ("right", "left"))
         for at in counts:
             counterpart = np.zeros_like(left)
             # Edges, of which there is one more than cells.
@@ -120,12 +122,13 @@ def _refined(free: BoolArray, known: BoolArray, total: int) -> int:
     return max(counts, key=lambda at: (counts[at], -abs(at - total)))
 
 
-def _blocks(mask: BoolArray) -> BoolArray:
-    """Whether any cell of each block of two by two is set, shape (rows, cols) in blocks."""
+def _reduce(mask: BoolArray) -> BoolArray:
+    """Reduce a mask to whether any cell of each block of two by two is set, shape (rows, cols) in blocks."""
     even = np.pad(mask, ((0, mask.shape[0] % BLOCK), (0, mask.shape[1] % BLOCK)))
     rows = even[::BLOCK] | even[1::BLOCK]
     return rows[:, ::BLOCK] | rows[:, 1::BLOCK]
 
 
-def _wide(mask: BoolArray) -> BoolArray:
+def _widen(mask: BoolArray) -> BoolArray:
+    """Widen a mask by one cell to every side."""
     return np.asarray(cv2.dilate(mask.view(np.uint8), np.ones((3, 3), np.uint8))).view(np.bool_)

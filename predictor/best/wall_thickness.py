@@ -5,16 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, IntArray
-from closedrooms.predictor.best.door_frame import STRIP, TurnedMap, laid_out, wall_faces
+from closedrooms.predictor.best.door_frame import FACE_DEPTH, STRIP, TurnedMap
+from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.structure.wall_faces import find_face_edges, lay_out
 
-# Walls thicker than this are no walls but shafts [cells], 0.95 m.
-THICKEST = 19
-# Both sides of a wall show this much free space across [cells], 0.4 m: less is a speck inside a smeared wall.
-CLEAR = 8
-# Thickness where too few walls were seen from both sides [cells], 0.2 m: usual for inner walls.
-DEFAULT, FEWEST = 4, 20
+# Walls thicker than this are no walls but shafts [cells].
+THICKEST = in_cells(0.95)
+# Both sides of a wall show this much free space across [cells]: less is a speck inside a smeared wall.
+CLEAR = in_cells(0.4)
+# Thickness where less wall than FEWEST was seen from both sides [cells]: usual for inner walls.
+DEFAULT, FEWEST = in_cells(0.2), in_cells(1.0)
 # No wall is thinner [cells].
-THINNEST = 2
+THINNEST = in_cells(0.1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,22 +32,26 @@ class WallThickness:
     least: int
 
 
-def wall_thickness(turned: TurnedMap) -> WallThickness:
-    """Of the walls seen from both sides, by their length."""
+NOT_MEASURED = WallThickness(DEFAULT, DEFAULT)
+
+
+def measure_walls(turned: TurnedMap) -> WallThickness:
+    """Measure the walls seen from both sides, by their length."""
     counts = np.zeros(THICKEST + 1, dtype=np.int64)
     for free, known in ((turned.free, turned.known), (turned.free.T, turned.known.T)):
         for row in range(0, len(free), STRIP):
             strip = slice(row, row + STRIP)
-            counts += _thicknesses(laid_out(free[strip]), laid_out(known[strip]))
+            counts += _count(lay_out(free[strip]), lay_out(known[strip]))
     if counts.sum() < FEWEST:
-        return WallThickness(DEFAULT, DEFAULT)
+        return NOT_MEASURED
     least, usual = np.searchsorted(np.cumsum(counts), counts.sum() * np.array([0.25, 0.5]))
     return WallThickness(max(int(usual), THINNEST), max(int(least), THINNEST))
 
 
-def _thicknesses(free: BoolArray, known: BoolArray) -> IntArray:
-    """Cells of wall by thickness, across the columns."""
-    right, left = wall_faces(free, known), wall_faces(free[:, ::-1], known[:, ::-1])[:, ::-1]
+def _count(free: BoolArray, known: BoolArray) -> IntArray:
+    """Count cells of wall by thickness, across the columns."""
+    right = find_face_edges(free, known, depth=FACE_DEPTH)
+    left = find_face_edges(free[:, ::-1], known[:, ::-1], depth=FACE_DEPTH)[:, ::-1]
     # Runs of free cells from edge to edge; a wall lies between one and the next of its row.
     padded = np.pad(free, ((0, 0), (1, 1)))
     starts, ends = np.flatnonzero(padded[:, 1:] != padded[:, :-1]).reshape(-1, 2).T

@@ -60,8 +60,7 @@ def _square(growth: Growth, room: int) -> BorderRoom:
     entrance = growth.entrances[room]
     face, edge = entrance.face, entrance.edge
     start, end = arrangement.edges[edge]
-    along = growth.along(room)
-    outward = np.array([-along[1], along[0]])
+    along, outward = entrance.facing.along, entrance.facing.inward
     if (end - start) @ along < 0:
         start, end = end, start
     size = float(np.hypot(*(end - start)))

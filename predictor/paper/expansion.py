@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, IntArray
 from closedrooms.predictor.config import PaperConfig
 from closedrooms.predictor.paper.arrangement import Arrangement
-from closedrooms.predictor.paper.initial_faces import Entrance, along_edge
+from closedrooms.predictor.paper.initial_faces import Entrance
 from closedrooms.predictor.paper.layout_score import FaceSet, evaluate, face_set
 from closedrooms.predictor.paper.subsets import best_subset
 
@@ -66,10 +66,6 @@ class Growth:
         beside = {int(self.owner[g]) for f in self.layout(room) for g in self.arrangement.neighbours[f]}
         return beside - {-1, room}
 
-    def along(self, room: int) -> FloatArray:
-        """Unit vector of a room's door edge with the room on its left, shape (2,)."""
-        return along_edge(self.arrangement, self.entrances[room])
-
     def position(self, room: int) -> tuple[float, ...]:
         """To break ties between rooms: how far its door is from the middle of all doors, then where it is [m]."""
         doors = np.array([entrance.door.midpoint for entrance in self.entrances])
@@ -78,7 +74,7 @@ class Growth:
 
     def face_set(self, room: int, faces: IntArray, returnable: BoolArray) -> FaceSet:
         """The faces that a layout of a room may be made of."""
-        return face_set(self.arrangement, faces, returnable, self.free, self.along(room))
+        return face_set(self.arrangement, faces, returnable, self.free, self.entrances[room].facing.along)
 
 
 def expand(growth: Growth, config: PaperConfig, report: Callable[[int], None] = lambda _level: None) -> None:

@@ -1,69 +1,63 @@
-"""From grown layouts to rooms: polygons and passages (paper, sections 3.6 and 3.7)."""
+"""From grown layouts to rooms: free, disjoint interiors (paper, sections 3.6 and 3.7)."""
 
-import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
 from closedrooms.core.room import Room, RoomKind
 from closedrooms.predictor.config import PaperConfig
-from closedrooms.predictor.inpainting import passage
+from closedrooms.predictor.disjoint_rooms import NO_ROOM, part_rooms
 from closedrooms.predictor.paper.arrangement import joined
-from closedrooms.predictor.paper.border import border_rooms
+from closedrooms.predictor.paper.border import BorderRoom, border_rooms
 from closedrooms.predictor.paper.expansion import Growth
 from closedrooms.predictor.paper.initial_layouts import Start
-from closedrooms.predictor.prediction import Shape
-from closedrooms.predictor.structure.doorways import DoorInWall, find_doorways
+from closedrooms.predictor.structure.doorways import find_doorways
 from closedrooms.predictor.structure.wall_thickness import free_interior, measure_thickness
 
 
-def finish_rooms(start: Start, growth: Growth, config: PaperConfig) -> tuple[tuple[Room, ...], list[Shape]]:
-    """Polygons of the grown layouts and of the border rooms, and the passages at their doors.
+def finish_rooms(start: Start, growth: Growth, config: PaperConfig) -> tuple[list[Room], dict[str, str]]:
+    """Make rooms of the grown layouts and of the border rooms: without their walls, up to the leaves of their doors.
 
     Args:
         start: The map and its faces.
         growth: The grown layouts.
-        config: Wall thickness, depth of border rooms, width of passages.
+        config: Wall thickness, depth of border rooms, width of doors.
 
     Returns:
-        Rooms in the order of the doors, and what to clear at each door [m].
+        Disjoint rooms in the order of the doors, and why doors have none, by their id.
     """
-    outside = border_rooms(growth, config)
-    shapes: dict[int, Polygon] = {
-        room: union(growth, room) for room in range(len(start.entrances)) if room not in outside
-    }
-    for room in sorted(outside, key=lambda r: (outside[r].depth, start.entrances[r].door.midpoint)):
-        free = outside[room].polygon().difference(shapely.union_all(list(shapes.values())))
-        shapes[room] = max(shapely.get_parts(free).tolist(), key=lambda part: part.area)
+    border = border_rooms(growth, config)
+    shapes = _gather_shapes(start, growth, border)
     thickness = config.wall_thickness
     if thickness is None:
         thickness = measure_thickness(start.grid, start.structure.angles)
-    shapes = {room: free_interior(shape, start.grid, thickness) for room, shape in shapes.items()}
-    inward = [DoorInWall(e.door, start.along(room), start.inward(room)) for room, e in enumerate(start.entrances)]
-    for room, doorway in enumerate(find_doorways(start.grid, inward, width=config.door_width)):
+    doorways = find_doorways(start.grid, [e.facing for e in start.entrances], width=config.door_width)
+    rooms: list[Room] = []
+    failures: dict[str, str] = {}
+    for room, (entrance, doorway) in enumerate(zip(start.entrances, doorways, strict=True)):
+        if shapes[room].is_empty:
+            failures[entrance.door.id] = NO_ROOM
+            continue
+        shape = free_interior(shapes[room], start.grid, thickness)
         if doorway is not None:
-            shapes[room] = doorway.joined(shapes[room], start.grid.frame.resolution)
-    rooms, passages = [], []
-    for room, entrance in enumerate(start.entrances):
-        kind: RoomKind = "border" if room in outside else "dependent" if growth.touches(room) else "independent"
-        score = None if room in outside else round(growth.scores[room], 9)
-        rooms.append(Room(shapes[room], (entrance.door.id,), kind, score, growth.bounded[room]))
-        door = np.array(entrance.door.midpoint)
-        passages.append(
-            passage(
-                start.grid,
-                shapes[room],
-                door,
-                start.along(room),
-                start.inward(room),
-                width=config.door_width,
-                reach=config.door_reach,
-            )
-        )
-    return tuple(rooms), [cleared for cleared in passages if not cleared.is_empty]
+            shape = doorway.joined(shape, start.grid.frame.resolution)
+        kind: RoomKind = "border" if room in border else "dependent" if growth.touches(room) else "independent"
+        score = None if room in border else round(growth.scores[room], 9)
+        rooms.append(Room(shape, (entrance.door.id,), kind, score, growth.bounded[room]))
+    apart, without = part_rooms(rooms, {e.door.id: e.door.midpoint for e in start.entrances})
+    return apart, failures | without
 
 
-def union(growth: Growth, room: int) -> Polygon:
-    """The layout of a room as one polygon [m]."""
+def _gather_shapes(start: Start, growth: Growth, border: dict[int, BorderRoom]) -> dict[int, Polygon]:
+    """Unite the faces of each layout; border rooms take what is left beside them, the shallowest first (3.6)."""
+    shapes = {room: unite(growth, room) for room in range(len(start.entrances)) if room not in border}
+    for room in sorted(border, key=lambda r: (border[r].depth, start.entrances[r].door.midpoint)):
+        free = border[room].polygon().difference(shapely.union_all(list(shapes.values())))
+        shapes[room] = max(shapely.get_parts(free).tolist(), key=lambda part: part.area, default=Polygon())
+    return shapes
+
+
+def unite(growth: Growth, room: int) -> Polygon:
+    """Unite the faces of a room's layout [m]."""
     whole = joined([growth.arrangement.faces[face] for face in growth.layout(room)])
     assert isinstance(whole, Polygon), "a layout is connected by edges"
     return whole

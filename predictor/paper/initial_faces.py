@@ -10,30 +10,37 @@ from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.predictor.paper.arrangement import Arrangement
 from closedrooms.predictor.paper.lines import Line
+from closedrooms.predictor.structure.doorways import FacingDoor
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Entrance:
     """Where a door leads.
 
     Attributes:
-        door: The door.
+        facing: The door, and the way from its edge into the initial face.
         edge: Its edge ``e_d``, an index into the arrangement.
         face: The initial face behind it, an index into the arrangement.
     """
 
-    door: ClosedDoor
+    facing: FacingDoor
     edge: int
     face: int
 
+    @property
+    def door(self) -> ClosedDoor:
+        """The door itself."""
+        return self.facing.door
 
-def along_edge(arrangement: Arrangement, entrance: Entrance) -> FloatArray:
-    """Unit vector of the door's edge with the initial face on its left, shape (2,)."""
-    start, end = arrangement.edges[entrance.edge]
+
+def enter_face(arrangement: Arrangement, door: ClosedDoor, edge: int, face: int) -> Entrance:
+    """Make the entrance through an edge into one of its two faces."""
+    start, end = arrangement.edges[edge]
     along = (end - start) / np.hypot(*(end - start))
-    inside = np.array(arrangement.faces[entrance.face].centroid.coords[0]) - start
-    left: FloatArray = along if along[0] * inside[1] - along[1] * inside[0] > 0 else -along
-    return left
+    inside = np.array(arrangement.faces[face].centroid.coords[0]) - start
+    # With the face on its left.
+    along = along if along[0] * inside[1] - along[1] * inside[0] > 0 else -along
+    return Entrance(FacingDoor(door, np.array([-along[1], along[0]])), edge, face)
 
 
 def distances_to_edges(arrangement: Arrangement, point: FloatArray) -> FloatArray:
@@ -73,7 +80,7 @@ def find_entrance(
     for wanted in (sides[:, 0] != sides[:, 1], sides[:, 0] & sides[:, 1]):
         if wanted.any():
             edge = _closest(arrangement, near[wanted], distances)
-            return Entrance(door, edge, _behind(arrangement, unknown, edge, np.array(door.midpoint)))
+            return enter_face(arrangement, door, edge, _behind(arrangement, unknown, edge, np.array(door.midpoint)))
     return "everything around the door is observed: nothing is hidden behind it"
 
 

@@ -4,15 +4,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.arrays import BoolArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.config import FacesConfig
 from closedrooms.predictor.paper.arrangement import Arrangement, arrange
-from closedrooms.predictor.paper.initial_faces import Entrance, along_edge, find_entrance, splits_between
+from closedrooms.predictor.paper.initial_faces import Entrance, find_entrance, splits_between
 from closedrooms.predictor.paper.unknown_faces import unknown_faces
 from closedrooms.predictor.paper.wall_lines import WallLines, find_structure
 from closedrooms.predictor.structure.clutter import free_islands
@@ -40,15 +38,6 @@ class Start:
     arrangement: Arrangement
     unknown: BoolArray
     entrances: tuple[Entrance, ...]
-
-    def along(self, room: int) -> FloatArray:
-        """Unit vector of a room's door edge with the room on its left, shape (2,)."""
-        return along_edge(self.arrangement, self.entrances[room])
-
-    def inward(self, room: int) -> FloatArray:
-        """Unit vector from a room's door edge into its initial face, shape (2,)."""
-        along = self.along(room)
-        return np.array([-along[1], along[0]])
 
 
 # A start, ``None`` where the map shows no structure at all, and why doors have no room, by door id.

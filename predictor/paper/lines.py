@@ -46,8 +46,8 @@ class Line:
 def find_lines(segments: FloatArray, directions: Directions, config: LinesConfig) -> tuple[tuple[Line, ...], IntArray]:
     """Cluster collinear segments of each direction and represent each cluster by a line.
 
-    Segments closer than ``collinear_distance`` chain into one wall, whose line lies at the median offset; walls
-    whose lines are closer than ``merge_distance`` share one line. Lines with hardly any wall are dropped.
+    Segments closer than ``collinear_distance`` are one wall by density (DBSCAN), whose line lies at the median offset;
+    walls whose lines are closer than ``merge_distance`` share one line. Lines with hardly any wall are dropped.
 
     Args:
         segments: Ends ``x0, y0, x1, y1`` in the map frame [m], shape (n, 4).
@@ -73,20 +73,29 @@ def find_lines(segments: FloatArray, directions: Directions, config: LinesConfig
 
 
 def _chain(ends: FloatArray, reach: float) -> IntArray:
-    """Connected components of segments closer than ``reach``, shape (k,); ends are (along, across), shape (k, 2, 2)."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    """Cluster segments that are closer than ``reach`` to the next by DBSCAN, shape (k,).
 
+    Args:
+        ends: Along and across, shape (k, 2, 2).
+        reach: Largest distance to the next [m].
+    """
+    from scipy.sparse import coo_array
+    from sklearn.cluster import DBSCAN
+
+    if not len(ends):
+        return np.zeros(0, dtype=np.int64)
     low, high = ends[..., 0].min(axis=1), ends[..., 0].max(axis=1)
     across = ends[..., 1].mean(axis=1)
-    # What a tree finds, a little further than need be, is measured: a table of all pairs fills the memory.
+    # Only what a tree finds is measured: a table of all pairs fills the memory.
     tree = shapely.STRtree(shapely.box(low, across, high, across))
     further = reach + 1e-6
     i, j = tree.query(shapely.box(low - further, across - further, high + further, across + further))
     gap = np.maximum(np.maximum(low[i] - high[j], low[j] - high[i]), 0.0)
-    near = np.hypot(gap, across[i] - across[j]) <= reach
-    graph = coo_array((np.ones(np.count_nonzero(near), dtype=np.bool_), (i[near], j[near])), shape=(len(ends),) * 2)
-    return np.asarray(connected_components(graph.tocsr(), directed=False)[1], dtype=np.int64)
+    distance = np.hypot(gap, across[i] - across[j])
+    near = distance <= reach
+    pairs = coo_array((distance[near], (i[near], j[near])), shape=(len(ends),) * 2).tocsr()
+    # Every segment is dense by itself, so that clusters are what hangs together.
+    return np.asarray(DBSCAN(eps=reach, min_samples=1, metric="precomputed").fit(pairs).labels_, dtype=np.int64)
 
 
 def _covered(ends: FloatArray) -> float:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.config import PaperConfig
-from closedrooms.predictor.inpainting import inpaint
+from closedrooms.predictor.inpainting import complete_map
 from closedrooms.predictor.paper.expansion import Growth, expand
 from closedrooms.predictor.paper.face_swaps import swap_faces
 from closedrooms.predictor.paper.finished_rooms import finish_rooms
@@ -55,7 +55,8 @@ def predict_paper(
     if config.joint_layout:
         swap_faces(growth, config)
         report(config.max_level + 1)
-    # 3.6, 3.7: rooms on the border, passages, and all of it drawn into the map.
-    rooms, passages = finish_rooms(start, growth, config)
-    completed = inpaint(grid, [room.polygon for room in rooms], passages)
-    return Prediction(completed, rooms, failures, trace_of(start, levels) if config.keep_trace else None)
+    # 3.6, 3.7: rooms on the border, free interiors, and all of it drawn into the map.
+    rooms, without = finish_rooms(start, growth, config)
+    completed = complete_map(grid, start.grid, rooms, [entrance.facing for entrance in start.entrances], config)
+    trace = trace_of(start, levels) if config.keep_trace else None
+    return Prediction(completed, tuple(rooms), failures | without, trace)

@@ -4,7 +4,7 @@ import numpy as np
 import shapely
 
 from closedrooms.predictor.paper.expansion import Growth
-from closedrooms.predictor.paper.finished_rooms import union
+from closedrooms.predictor.paper.finished_rooms import unite
 from closedrooms.predictor.paper.initial_layouts import Start
 from closedrooms.predictor.prediction import Level, PredictionTrace
 
@@ -12,7 +12,7 @@ from closedrooms.predictor.prediction import Level, PredictionTrace
 def level_of(k: int, growth: Growth) -> Level:
     """The layouts as they are after step ``k``."""
     names = [entrance.door.id for entrance in growth.entrances]
-    shapes = {name: union(growth, room) for room, name in enumerate(names)}
+    shapes = {name: unite(growth, room) for room, name in enumerate(names)}
     return Level(k, shapes, dict(zip(names, growth.scores, strict=True)))
 
 

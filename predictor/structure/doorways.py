@@ -33,34 +33,54 @@ SAME = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class FacingDoor:
+    """A door and the way into its room.
+
+    Attributes:
+        door: In the map frame.
+        inward: Unit vector from the door into the room, across its wall, shape (2,).
+    """
+
+    door: ClosedDoor
+    inward: FloatArray
+
+    @property
+    def along(self) -> FloatArray:
+        """Unit vector of its wall, the room on its left, shape (2,)."""
+        return np.array([self.inward[1], -self.inward[0]])
+
+    @property
+    def middle(self) -> FloatArray:
+        """Mid-point of the door [m], shape (2,)."""
+        return np.array(self.door.midpoint)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Doorway:
     """An opening in a wall, seen from before it. Distances are from the mid-point of its door.
 
     Attributes:
-        middle: Mid-point of the door, map frame [m], shape (2,).
-        along: Unit vector of the wall, shape (2,).
-        inward: Unit vector into the room, shape (2,).
+        door: And the way into the room.
         left: One jamb, along the wall [m].
         right: The other jamb [m], more than ``left``.
         leaf: Where known space ends at the leaf, inward [m].
         face: Where known space ends beside the opening, inward [m]; ``leaf`` where the leaf is flush with its wall.
     """
 
-    middle: FloatArray
-    along: FloatArray
-    inward: FloatArray
+    door: FacingDoor
     left: float
     right: float
     leaf: float
     face: float
 
     def stretch(self, low: float, high: float) -> Polygon:
-        """The opening from ``low`` to ``high``, inward [m]: a rectangle in the map frame."""
-        a, b = self.middle + self.left * self.along, self.middle + self.right * self.along
-        return Polygon((a + low * self.inward, b + low * self.inward, b + high * self.inward, a + high * self.inward))
+        """Cut the opening from ``low`` to ``high``, inward [m]: a rectangle in the map frame."""
+        middle, along, inward = self.door.middle, self.door.along, self.door.inward
+        a, b = middle + self.left * along, middle + self.right * along
+        return Polygon((a + low * inward, b + low * inward, b + high * inward, a + high * inward))
 
     def joined(self, room: Polygon, step: float) -> Polygon:
-        """A room together with the opening between it and the leaf.
+        """Join a room with the opening between it and the leaf.
 
         Args:
             room: Its free interior, map frame [m].
@@ -71,7 +91,8 @@ class Doorway:
         """
         sides = np.linspace(self.left, self.right, 2 * max(round((self.right - self.left) / step), 1) + 1)[1::2]
         depths = np.arange(self.leaf, self.leaf + FURTHEST, step / 2)
-        points = self.middle + sides[:, None, None] * self.along + depths[None, :, None] * self.inward
+        points = self.door.middle + sides[:, None, None] * self.door.along
+        points = points + depths[None, :, None] * self.door.inward
         inside = shapely.contains_xy(room, points[..., 0], points[..., 1])
         begins = depths[inside.argmax(axis=1)][inside.any(axis=1)]
         if 2 * begins.size <= sides.size:
@@ -83,30 +104,15 @@ class Doorway:
         return max(parts, key=lambda part: part.area)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DoorInWall:
-    """A door and which way its wall runs.
-
-    Attributes:
-        door: In the map frame.
-        along: Unit vector of its wall, shape (2,).
-        inward: Unit vector from the door into the room, shape (2,).
-    """
-
-    door: ClosedDoor
-    along: FloatArray
-    inward: FloatArray
-
-
-def find_doorways(grid: OccupancyGrid, doors: Sequence[DoorInWall], *, width: float) -> list[Doorway | None]:
-    """The openings that doors fill, by how far known space reaches into the wall there and beside it.
+def find_doorways(grid: OccupancyGrid, doors: Sequence[FacingDoor], *, width: float) -> list[Doorway | None]:
+    """Find the openings that doors fill, by how far known space reaches into the wall there and beside it.
 
     Where the leaf is flush with its wall, the opening is as wide as the door says, else as the openings of the other
     doors (their median).
 
     Args:
         grid: The map.
-        doors: Doors in their walls.
+        doors: And the ways into their rooms.
         width: Of an opening where no door tells any [m].
 
     Returns:
@@ -123,9 +129,9 @@ def find_doorways(grid: OccupancyGrid, doors: Sequence[DoorInWall], *, width: fl
     ]
 
 
-def _find(grid: OccupancyGrid, door: DoorInWall) -> Doorway | None:
-    """One opening; without width where its jambs do not show."""
-    middle, along, inward, step = np.array(door.door.midpoint), door.along, door.inward, STEP * grid.frame.resolution
+def _find(grid: OccupancyGrid, door: FacingDoor) -> Doorway | None:
+    """Find one opening; without width where its jambs do not show."""
+    middle, along, inward, step = door.middle, door.along, door.inward, STEP * grid.frame.resolution
     sides = _steps(-WIDEST - BESIDE, WIDEST + BESIDE, step)
     depths = _steps(-BEFORE, BEHIND, step)
     cells = grid.frame.to_cells(middle + sides[:, None, None] * along + depths[None, :, None] * inward)
@@ -142,9 +148,9 @@ def _find(grid: OccupancyGrid, door: DoorInWall) -> Doorway | None:
     left = float(wall[wall < 0.0].max(initial=-np.inf)) + step / 2
     right = float(wall[wall > 0.0].min(initial=np.inf)) - step / 2
     if left < -WIDEST or right > WIDEST or right - left < NARROWEST:
-        return Doorway(middle, along, inward, 0.0, 0.0, leaf, leaf)
+        return Doorway(door, 0.0, 0.0, leaf, leaf)
     beside = ends[((sides < left) & (sides > left - BESIDE)) | ((sides > right) & (sides < right + BESIDE))]
-    return Doorway(middle, along, inward, left, right, leaf, min(float(np.median(beside)), leaf))
+    return Doorway(door, left, right, leaf, min(float(np.median(beside)), leaf))
 
 
 def _long(mask: BoolArray, least: int) -> BoolArray:

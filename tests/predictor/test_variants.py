@@ -5,13 +5,15 @@ import pytest
 import shapely
 from shapely.geometry import box
 
+from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.predictor.baselines import geometric, line_of_sight
 from closedrooms.predictor.config import FacesConfig
-from closedrooms.predictor.inpainting import inpaint, passage
+from closedrooms.predictor.inpainting import find_passage, inpaint
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.structure.clutter import filter_clutter, free_islands
+from closedrooms.predictor.structure.doorways import FacingDoor
 from closedrooms.predictor.structure.rose import find_rose
 from closedrooms.predictor.structure.wall_thickness import free_interior, measure_thickness
 
@@ -177,15 +179,8 @@ def test_a_passage_leads_from_free_space_into_the_room():
     cells = np.full(frame.shape, UNKNOWN, dtype=np.int8)
     cells[:30] = FREE
     cells[30:32] = OCCUPIED
-    way = passage(
-        OccupancyGrid(frame, cells),
-        box(0, 1.8, 4, 4),
-        np.array([2.0, 1.6]),
-        np.array([1.0, 0.0]),
-        np.array([0.0, 1.0]),
-        width=0.8,
-        reach=1.0,
-    )
+    door = FacingDoor(ClosedDoor("d", (2.0, 1.6)), np.array([0.0, 1.0]))
+    way = find_passage(OccupancyGrid(frame, cells), box(0, 1.8, 4, 4), door, width=0.8, reach=1.0)
     x0, y0, x1, y1 = way.bounds
     assert (x0, x1) == pytest.approx((1.6, 2.4))
     assert y0 < 1.5

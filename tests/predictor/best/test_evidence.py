@@ -12,14 +12,16 @@ from hypothesis.extra import numpy as hnp
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.predictor.best import hypotheses as suspects
-from closedrooms.predictor.best.door_frame import door_frame, integral, turn_map, wall_faces
+from closedrooms.predictor.best import hypotheses
+from closedrooms.predictor.best.door_frame import door_frame, sum_up, turn_map
+from closedrooms.predictor.best.hypotheses import Hypotheses
 from closedrooms.predictor.best.method import predict_best
-from closedrooms.predictor.best.pair_features import PAIR_FEATURES, pair_features
-from closedrooms.predictor.best.selection import Suspect, choose
-from closedrooms.predictor.best.wall_thickness import DEFAULT, WallThickness, wall_thickness
+from closedrooms.predictor.best.pair_features import PAIR_FEATURES, Pairs
+from closedrooms.predictor.best.selection import choose
+from closedrooms.predictor.best.wall_thickness import NOT_MEASURED, WallThickness, measure_walls
 from closedrooms.predictor.config import BestConfig
 from closedrooms.predictor.structure.wall_directions import find_wall_directions
+from closedrooms.predictor.structure.wall_faces import find_face_edges, find_faces
 
 MASKS = hnp.arrays(np.bool_, st.tuples(st.integers(3, 12), st.integers(3, 12)))
 EDGES = st.integers(-3, 15)
@@ -30,7 +32,7 @@ def test_count_agrees_with_slicing(mask: np.ndarray, v0: int, u0: int, v1: int, 
     rows, cols = mask.shape
     a, b = (min(max(v, 0), rows) for v in (v0, v1))
     c, d = (min(max(u, 0), cols) for u in (u0, u1))
-    got = integral(mask).count(*(np.array([x]) for x in (v0, u0, v1, u1)))
+    got = sum_up(mask).count(*(np.array([x]) for x in (v0, u0, v1, u1)))
     assert got[0] == mask[a : max(a, b), c : max(c, d)].sum()
 
 
@@ -39,14 +41,28 @@ def test_stretch_agrees_with_slicing(mask: np.ndarray, position: int, low: int, 
     rows, cols = mask.shape
     position = min(position, cols - 1)
     a, b = (min(max(v, 0), rows) for v in (low, high))
-    got = integral(mask).stretch(np.array([position]), np.array([low]), np.array([high]))
+    got = sum_up(mask).stretch(np.array([position]), np.array([low]), np.array([high]))
     assert got[0] == mask[a : max(a, b), position].sum()
 
 
 def test_a_face_is_free_space_before_a_wall() -> None:
     free = np.array([[True, True, False, False, False, True]])
     known = free | np.array([[False, False, False, True, False, False]])
-    assert wall_faces(free, known).tolist() == [[False, False, True, False, False, False, False]]
+    assert find_face_edges(free, known, depth=3).tolist() == [[False, False, True, False, False, False, False]]
+
+
+@given(hnp.arrays(np.int8, st.tuples(st.integers(3, 8), st.integers(3, 8)), elements=st.sampled_from([-1, 0, 100])))
+def test_the_faces_of_a_grid_are_the_sides_of_occupied_cells_that_look_at_free_ones(cells: np.ndarray) -> None:
+    grid = OccupancyGrid(GridFrame(1.0, 0.0, 0.0, *cells.shape), cells)
+    faces = find_faces(grid)
+    found = sorted((*point, *way) for point, way in zip(faces.points.tolist(), faces.outward.tolist(), strict=True))
+    expected = []
+    for row, col in np.argwhere(grid.occupied).tolist():
+        for d_row, d_col in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+            inside = 0 <= row + d_row < cells.shape[0] and 0 <= col + d_col < cells.shape[1]
+            if inside and grid.free[row + d_row, col + d_col]:
+                expected.append((col + 0.5 + d_col / 2, row + 0.5 + d_row / 2, float(d_col), float(d_row)))
+    assert found == sorted(expected)
 
 
 @given(st.sampled_from([0.0, 0.3, -0.7]), st.integers(0, 3))
@@ -91,55 +107,56 @@ def _walled(thickness: int) -> OccupancyGrid:
 
 @pytest.mark.parametrize("thickness", [2, 4, 9])
 def test_measures_the_thickness_of_a_wall_seen_from_both_sides(thickness: int) -> None:
-    assert wall_thickness(turn_map(_walled(thickness), 0.0, margin=1.0)).usual == thickness
+    assert measure_walls(turn_map(_walled(thickness), 0.0, margin=1.0)).usual == thickness
 
 
 def test_a_map_without_walls_seen_twice_has_the_usual_thickness() -> None:
     cells = np.full((40, 40), FREE, dtype=np.int8)
     turned = turn_map(OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 40, 40), cells), 0.0, margin=1.0)
-    assert wall_thickness(turned) == WallThickness(DEFAULT, DEFAULT)
+    assert measure_walls(turned) == NOT_MEASURED
 
 
 def test_the_least_thickness_is_that_of_thin_walls_and_the_usual_one_that_of_most() -> None:
     cells = np.concatenate((_walled(9).cells[10:70], _walled(4).cells[10:40]))
     grid = OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 90, 100), cells)
-    assert wall_thickness(turn_map(grid, 0.0, margin=1.0)) == WallThickness(usual=9, least=4)
+    assert measure_walls(turn_map(grid, 0.0, margin=1.0)) == WallThickness(usual=9, least=4)
 
 
 def test_pair_features_are_the_same_seen_from_either_door() -> None:
     rng = np.random.default_rng(0)
     low = rng.integers(0, 100, (2, 5, 2))
     a, b = np.concatenate((low, low + rng.integers(20, 80, (2, 5, 2))), axis=-1)
-    forward = pair_features(a, b, (3, 3), 4)
-    assert forward.shape == (5, 5, len(PAIR_FEATURES))
-    assert np.allclose(forward, pair_features(b, a, (3, 3), 4).transpose(1, 0, 2))
+    forward, backward = Pairs(a, b, 3, 4), Pairs(b, a, 3, 4)
+    for feature in PAIR_FEATURES:
+        assert feature.measure(forward).shape == (5, 5)
+        assert np.allclose(feature.measure(forward), feature.measure(backward).T), feature.name
 
 
-def _suspect(rng: np.random.Generator, u: float) -> Suspect:
+def _draw(rng: np.random.Generator, u: float) -> Hypotheses:
     low = np.column_stack((rng.integers(0, 60, 4) + int(u), np.zeros(4, dtype=np.int64)))
     boxes = np.concatenate((low, low + rng.integers(30, 90, (4, 2))), axis=1)
     corners = boxes[:, [[0, 1], [2, 1], [2, 3], [0, 3]]] * 0.05
-    return Suspect(boxes, corners, -np.sort(-rng.normal(size=4)), 0.0, 0, u, 0.0)
+    return Hypotheses(boxes, corners, -np.sort(-rng.normal(size=4)), 0.0, 0, u, 0.0)
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_two_doors_are_chosen_as_well_as_by_trying_every_pair(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    suspects = [_suspect(rng, 0.0), _suspect(rng, 70.0)]
-    chosen, scores, cut = choose(suspects, 4, 30.0)
+    doors = [_draw(rng, 0.0), _draw(rng, 70.0)]
+    chosen, scores, cut = choose(doors, 4)
     assert not cut
 
     def total(i: int, j: int) -> float:
         one = [
-            Suspect(s.boxes[[k]], s.corners[[k]], s.scores[[k]], s.angle, s.quarter, s.u, s.v)
-            for s, k in zip(suspects, (i, j), strict=True)
+            Hypotheses(s.boxes[[k]], s.corners[[k]], s.scores[[k]], s.angle, s.quarter, s.u, s.v)
+            for s, k in zip(doors, (i, j), strict=True)
         ]
-        _, both, _ = choose(one, 4, 30.0)
-        return both[0] + float(suspects[1].scores[j])
+        _, both, _ = choose(one, 4)
+        return both[0] + float(doors[1].scores[j])
 
     best = max(total(i, j) for i, j in itertools.product(range(4), repeat=2))
     assert total(*chosen) == pytest.approx(best)
-    assert scores[0] + float(suspects[1].scores[chosen[1]]) == pytest.approx(best)
+    assert scores[0] + float(doors[1].scores[chosen[1]]) == pytest.approx(best)
 
 
 def test_doors_far_apart_say_the_same_from_tables_of_their_own(mapped, monkeypatch) -> None:
@@ -155,7 +172,7 @@ def test_doors_far_apart_say_the_same_from_tables_of_their_own(mapped, monkeypat
     ]
     found = []
     for cells_at_once in (1, 10 * cells.size):
-        monkeypatch.setattr(suspects, "MAX_WINDOW", cells_at_once)
+        monkeypatch.setattr(hypotheses, "MAX_WINDOW", cells_at_once)
         found.append(predict_best(OccupancyGrid(frame, cells), doors, BestConfig()).rooms)
     assert [room.doors for room in found[0]] == [(door.id,) for door in doors]
     assert [room.polygon.wkb for room in found[0]] == [room.polygon.wkb for room in found[1]]

@@ -8,7 +8,7 @@ import pytest
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.predictor.best.door_frame import turn_map
-from closedrooms.predictor.best.symmetry import find_axis, mirrored
+from closedrooms.predictor.best.symmetry import find_axis, mirror
 from closedrooms.predictor.methods import predict
 
 # Rooms of the left half above and below a corridor: first and last column, last row above it, first row below it.
@@ -77,7 +77,7 @@ def test_the_mirrored_map_shows_free_space_where_a_room_is_hidden(turn) -> None:
     grid, _ = _building(hidden=(2,))
     cells = np.ascontiguousarray(grid.cells.T) if turn else grid.cells
     whole = turn_map(OccupancyGrid(GridFrame(0.05, 0.0, 0.0, *cells.shape), cells), 0.0, margin=1.0)
-    twin = mirrored(whole)
+    twin = mirror(whole)
     assert twin is not None
     free, before = (mask.T if turn else mask for mask in (twin.free, whole.free))
     left, right, top = UPPER[2]

@@ -12,7 +12,7 @@ from closedrooms.predictor.paper.arrangement import arrange
 from closedrooms.predictor.paper.border import border_rooms
 from closedrooms.predictor.paper.expansion import Growth, expand
 from closedrooms.predictor.paper.face_swaps import swap_faces
-from closedrooms.predictor.paper.initial_faces import Entrance
+from closedrooms.predictor.paper.initial_faces import enter_face
 from closedrooms.predictor.paper.lines import Line
 
 CONFIG = PaperConfig()
@@ -31,7 +31,7 @@ def _entrance(arrangement, name, behind, before):
     """A door between the faces at two points."""
     face, other = _at(arrangement, *behind), _at(arrangement, *before)
     edge = arrangement.neighbours[face][other]
-    return Entrance(ClosedDoor(name, tuple(arrangement.edges[edge].mean(axis=0))), edge, face)
+    return enter_face(arrangement, ClosedDoor(name, tuple(arrangement.edges[edge].mean(axis=0))), edge, face)
 
 
 def _random_growth(seed, count):
@@ -46,7 +46,7 @@ def _random_growth(seed, count):
         other, edge = next(iter(arrangement.neighbours[int(face)].items()))
         if other not in {e.face for e in entrances}:
             middle = tuple(arrangement.edges[edge].mean(axis=0))
-            entrances.append(Entrance(ClosedDoor(f"d{face}", middle), edge, int(face)))
+            entrances.append(enter_face(arrangement, ClosedDoor(f"d{face}", middle), edge, int(face)))
     return Growth(arrangement, unknown, entrances)
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.predictor.config import DirectionsConfig, LinesConfig, PaperConfig
-from closedrooms.predictor.paper.directions import angle_between, find_directions
+from closedrooms.predictor.paper.directions import _find_modes, angle_between, find_directions
 from closedrooms.predictor.paper.lines import boundary_lines, find_lines
 from closedrooms.predictor.paper.segments import angles_of, find_segments, lengths_of
 from closedrooms.predictor.structure.known_window import at_resolution, known_window
@@ -85,6 +85,28 @@ def test_a_slanted_wing_has_directions_of_its_own(slant):
     assert found.angles.size == 4
     for wanted in (main, wing, main + math.pi / 2, wing + math.pi / 2):
         assert np.abs(angle_between(found.angles, wanted)).min() < 0.02
+
+
+@pytest.mark.parametrize(("share", "counts"), [(0.05, False), (0.12, False), (0.2, True)])
+def test_oblique_walls_count_only_with_a_fair_share_of_the_strongest_direction(share, counts):
+    segments = [_segment(a, 2.0 * i, 0.0, 5.0) for a in (0.0, math.pi / 2) for i in range(12)]
+    segments += [_segment(0.6, 2.0 * i, 30.0, 30.0 + 15.0 * share) for i in range(4)]
+    found = _directions(np.array(segments))
+    assert found.angles.size == (3 if counts else 2)
+    assert (np.abs(angle_between(found.angles, 0.6)).min() < 0.01) == counts
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_each_mode_is_the_mean_of_what_lies_around_it(seed):
+    rng = np.random.default_rng(seed)
+    spread = [rng.normal(mean, 0.02, 30) for mean in (0.1, 0.9, 1.7, 2.6)]
+    angles, weights = np.concatenate(spread) % math.pi, rng.uniform(0.2, 4.0, 120)
+    modes = _find_modes(angles, weights, CONFIG.angle_bandwidth)
+    assert modes.size == 4
+    for mode in modes:
+        offset = angle_between(angles, mode)
+        near = np.abs(offset) <= CONFIG.angle_bandwidth
+        assert abs(float(np.average(offset[near], weights=weights[near]))) < math.radians(0.3)
 
 
 def test_segments_evenly_in_all_directions_make_none():

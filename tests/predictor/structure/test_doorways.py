@@ -9,7 +9,7 @@ from shapely.geometry import LineString, box
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.predictor.structure.doorways import DoorInWall, Doorway, find_doorways
+from closedrooms.predictor.structure.doorways import Doorway, FacingDoor, find_doorways
 
 # A wall of 0.3 m above free space, its near face at y = 2; leaves stand 0.2 m further in.
 FACE, LEAF = 2.0, 2.2
@@ -35,7 +35,7 @@ def _map(openings, angle=0.0):
 def _at(x, y, angle=0.0, **stated):
     c, s = math.cos(angle), math.sin(angle)
     door = ClosedDoor(f"d{x}", (x * c - y * s, x * s + y * c), **stated)
-    return DoorInWall(door, np.array([c, s]), np.array([-s, c]))
+    return FacingDoor(door, np.array([-s, c]))
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.4, math.pi / 2, -2.0])
@@ -75,8 +75,7 @@ def test_a_lone_speck_before_the_wall_does_not_end_an_opening() -> None:
 
 @pytest.mark.parametrize("degrees", [0.0, 30.0])
 def test_a_room_and_its_opening_are_one_polygon_up_to_the_leaf(degrees) -> None:
-    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    doorway = Doorway(np.zeros(2), np.array([c, s]), np.array([-s, c]), -0.4, 0.5, 0.05, -0.1)
+    doorway = Doorway(_at(0.0, 0.0, math.radians(degrees)), -0.4, 0.5, 0.05, -0.1)
     room = affinity.rotate(box(-2.0, 0.3, 2.0, 4.0), degrees, origin=(0, 0))
     whole = doorway.joined(room, 0.05)
     assert whole.is_valid
@@ -86,13 +85,13 @@ def test_a_room_and_its_opening_are_one_polygon_up_to_the_leaf(degrees) -> None:
 
 
 def test_a_room_far_behind_its_door_or_beside_it_stays_as_it_is() -> None:
-    doorway = Doorway(np.zeros(2), np.array([1.0, 0.0]), np.array([0.0, 1.0]), -0.4, 0.4, 0.0, -0.1)
+    doorway = Doorway(_at(0.0, 0.0), -0.4, 0.4, 0.0, -0.1)
     for room in (box(-2.0, 1.5, 2.0, 4.0), box(0.2, 0.1, 3.0, 4.0)):
         assert doorway.joined(room, 0.05) is room
 
 
 def test_a_pillar_in_a_room_stays_a_hole_in_it() -> None:
-    doorway = Doorway(np.zeros(2), np.array([1.0, 0.0]), np.array([0.0, 1.0]), -0.4, 0.4, 0.0, -0.1)
+    doorway = Doorway(_at(0.0, 0.0), -0.4, 0.4, 0.0, -0.1)
     room = box(-2.0, 0.2, 2.0, 4.0).difference(box(0.5, 2.0, 1.0, 2.5))
     whole = doorway.joined(room, 0.05)
     assert len(whole.interiors) == 1

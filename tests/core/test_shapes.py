@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from closedrooms.core.grid import GridFrame
-from closedrooms.predictor.inpainting import fill_shape
+from closedrooms.core.shapes import cells_inside, fill_shape, trace_outline
 
 # Quarters of a cell, so that sides and corners often lie on centres of cells.
 PLACES = st.integers(-20, 60).map(lambda quarter: quarter / 4)
@@ -21,9 +21,7 @@ def boxes(draw):
 
 def _filled(shape, resolution):
     frame = GridFrame(resolution, -2.0, 1.0, 9, 12)
-    mask = np.zeros(frame.shape, dtype=np.bool_)
-    fill_shape(shape, frame, mask)
-    return mask, shapely.points(frame.to_points(np.stack(np.indices(frame.shape), axis=-1)))
+    return cells_inside(shape, frame), shapely.points(frame.to_points(np.stack(np.indices(frame.shape), axis=-1)))
 
 
 @given(boxes(), st.sampled_from([1.0, 0.5]))
@@ -45,3 +43,17 @@ def test_what_is_marked_stays_marked():
     mask = np.ones((4, 4), dtype=np.bool_)
     fill_shape(shapely.box(0.5, 0.5, 2.5, 2.5), GridFrame(1.0, 0.0, 0.0, 4, 4), mask)
     assert mask.all()
+
+
+@given(HULLS)
+@settings(max_examples=50, deadline=None)
+def test_an_outline_passes_only_cells_that_it_touches_and_all_that_it_crosses_well(shape):
+    frame = GridFrame(1.0, -2.0, 1.0, 9, 12)
+    mask = np.zeros(frame.shape, dtype=np.bool_)
+    if not shape.is_empty:
+        trace_outline(shape, frame, mask)
+    low = frame.to_points(np.stack(np.indices(frame.shape), axis=-1)) - 0.5
+    cells = shapely.box(low[..., 0], low[..., 1], low[..., 0] + 1.0, low[..., 1] + 1.0)
+    within = shapely.length(shapely.intersection(shapely.buffer(cells, -1e-6, join_style="mitre"), shape.boundary))
+    assert not (mask & (shapely.distance(cells, shape.boundary) > 1e-9)).any()
+    assert mask[within > 1.0].all()
