@@ -19,10 +19,12 @@ from closedrooms.core.incoming import read_json, reading
 from closedrooms.core.names import is_name, shown
 from closedrooms.core.numbers import FARTHEST, MAX_DOORS, MAX_ROOMS, WIDEST, check_count, is_number, repr_of
 from closedrooms.core.remarks import Remark
-from closedrooms.core.room import Room
+from closedrooms.core.room import Alternative, Room
 
 Feature = tuple[BaseGeometry, dict[str, Any]]
 MAX_FEATURES = 1_000_000
+# Other shapes of one room that are read; three are written.
+MAX_ALTERNATIVES = 100
 # How deep the lists of coordinates of each geometry are, above the positions.
 LISTS = {"Point": 0, "LineString": 1, "MultiPoint": 1, "Polygon": 2, "MultiLineString": 2, "MultiPolygon": 3}
 
@@ -259,13 +261,22 @@ def _door(name: str, geometry: BaseGeometry, properties: dict[str, Any], path: P
 
 
 def write_rooms(path: Path, rooms: Sequence[Room]) -> None:
-    """Write predicted rooms (``kind``, ``score``, ``bounded``) or true rooms (without)."""
+    """Write predicted rooms (``kind``, ``score``, ``bounded``; ``confidence`` and ``alternatives``), or true ones."""
 
     def feature(room: Room) -> Feature:
         properties: dict[str, Any] = {"doors": list(room.doors)}
         if room.kind is not None:
             score = None if room.score is None else round(room.score, 6)
             properties |= {"kind": room.kind, "score": score, "bounded": room.bounded}
+        if room.confidence is not None:
+            properties["confidence"] = round(room.confidence, 4)
+            properties["alternatives"] = [
+                {
+                    "probability": round(other.probability, 4),
+                    "geometry": mapping(shapely.transform(other.polygon, _rounded)),
+                }
+                for other in room.alternatives
+            ]
         return room.polygon, properties
 
     write_features(path, map(feature, rooms))
@@ -280,7 +291,8 @@ def read_rooms(path: Path, *, remarks: list[Remark] | None = None) -> list[Room]
 
     Raises:
         InvalidInputError: Another geometry than Polygon or MultiPolygon, ``doors`` that is no list of ids, a ``score``
-            or ``kind`` of another type, more than ``MAX_ROOMS`` rooms.
+            or ``kind`` of another type, a ``confidence`` or probability that is none, ``alternatives`` that are no list
+            of polygons, more than ``MAX_ROOMS`` rooms.
     """
     features = read_features(path, what="a GeoJSON FeatureCollection of rooms (Polygons)", remarks=remarks)
     check_count(len(features), MAX_ROOMS, "rooms", path)
@@ -300,11 +312,44 @@ def _room(number: int, read: BaseGeometry, properties: dict[str, Any], path: Pat
         raise InvalidInputError(f"room {number} of kind {repr_of(kind)}", expected="a text", where=path)
     if score is not None and not is_number(score):
         raise InvalidInputError(f"room {number} of score {repr_of(score)}", expected="a number", where=path)
+    geometry = _area(number, read, path)
+    known = kind if kind in {"independent", "dependent", "border"} else None
+    confidence = _share(number, properties.get("confidence"), "confidence", path)
+    others = _alternatives(number, properties.get("alternatives") or [], path)
+    bounded = bool(properties.get("bounded"))
+    return Room(geometry, tuple(map(str, doors)), known, score, bounded, confidence, others)  # type: ignore[arg-type]
+
+
+def _area(number: int, read: BaseGeometry, path: Path) -> Polygon | MultiPolygon:
     geometry = read if read.is_valid else _repaired(read)
     if not isinstance(geometry, Polygon | MultiPolygon) or geometry.is_empty:
         raise InvalidInputError(f"room {number} is a {geometry.geom_type}", expected="a Polygon", where=path)
-    known = kind if kind in {"independent", "dependent", "border"} else None
-    return Room(geometry, tuple(map(str, doors)), known, score, bool(properties.get("bounded")))  # type: ignore[arg-type]
+    return geometry
+
+
+def _share(number: int, value: Any, name: str, path: Path) -> float | None:
+    if value is not None and not (is_number(value) and 0.0 <= value <= 1.0):
+        raise InvalidInputError(f"room {number} of {name} {repr_of(value)}", expected="0 to 1", where=path)
+    return value
+
+
+def _alternatives(number: int, given: Any, path: Path) -> tuple[Alternative, ...]:
+    """The other shapes that a room may have.
+
+    Raises:
+        InvalidInputError: Something else.
+    """
+    wanted = f"a list of at most {MAX_ALTERNATIVES} probabilities and geometries"
+    if not isinstance(given, list) or len(given) > MAX_ALTERNATIVES or not all(isinstance(g, dict) for g in given):
+        raise InvalidInputError(f"room {number} with alternatives {repr_of(given)}", expected=wanted, where=path)
+    found = []
+    for other in given:
+        read, _ = _read_feature(number, {"geometry": other.get("geometry")}, path)
+        probability = _share(number, other.get("probability"), "probability", path)
+        if probability is None:
+            raise InvalidInputError(f"room {number} with an alternative of no probability", expected=wanted, where=path)
+        found.append(Alternative(_area(number, read, path), probability))
+    return tuple(found)
 
 
 def _repaired(geometry: BaseGeometry) -> BaseGeometry:

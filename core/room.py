@@ -9,6 +9,19 @@ RoomKind = Literal["independent", "dependent", "border"]
 
 
 @dataclass(frozen=True, slots=True)
+class Alternative:
+    """Another shape that a predicted room may have.
+
+    Attributes:
+        polygon: Free interior, map frame [m].
+        probability: That of the room and its alternatives this one comes nearest to the true room, 0..1.
+    """
+
+    polygon: Polygon | MultiPolygon
+    probability: float
+
+
+@dataclass(frozen=True, slots=True)
 class Room:
     """The free interior of one room in the map frame.
 
@@ -18,6 +31,8 @@ class Room:
         kind: How it was predicted (paper, sections 3.3 and 3.6); ``None`` for a true room.
         score: Value of the evaluation function (paper, section 3.4); ``None`` where none was computed.
         bounded: A search limit cut something while the room was found.
+        confidence: Expected IoU with the true room, 0..1; ``None`` where nothing tells.
+        alternatives: Up to three other shapes, the most probable one first.
     """
 
     polygon: Polygon | MultiPolygon
@@ -25,3 +40,5 @@ class Room:
     kind: RoomKind | None = None
     score: float | None = None
     bounded: bool = False
+    confidence: float | None = None
+    alternatives: tuple[Alternative, ...] = ()

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 from shapely.geometry.base import BaseGeometry
 
@@ -66,7 +67,16 @@ class RosMap:
 
     def rooms_on_map(self, rooms: Iterable[Room]) -> list[Room]:
         """Rooms of the grid's frame in the map frame."""
-        return [replace(room, polygon=self.on_map(room.polygon)) for room in rooms] if self.turned else list(rooms)
+        if not self.turned:
+            return list(rooms)
+        return [
+            replace(
+                room,
+                polygon=self.on_map(room.polygon),
+                alternatives=tuple(replace(o, polygon=self.on_map(o.polygon)) for o in room.alternatives),
+            )
+            for room in rooms
+        ]
 
     def on_map(self, geometry: BaseGeometry) -> Any:
         """A geometry of the grid's frame in the map frame."""
@@ -84,21 +94,38 @@ def write_map(stem: Path, grid: OccupancyGrid, *, map_T_grid: Pose2 = IDENTITY) 
     Raises:
         OutputError: The folder cannot be written.
     """
-    import cv2
-
     values = np.arange(256).astype(np.uint8).view(np.int8)  # every cell value, at its place as a byte without sign
     shades = np.full(256, PIXEL_UNKNOWN, dtype=np.uint8)
     shades[is_free(values)] = PIXEL_FREE
     shades[is_occupied(values)] = PIXEL_OCCUPIED
+    _write(stem, grid.frame, shades[grid.cells[::-1].view(np.uint8)], "trinary", map_T_grid)
+
+
+def write_raw_map(stem: Path, grid: OccupancyGrid, *, map_T_grid: Pose2 = IDENTITY) -> None:
+    """Write ``<stem>.png`` and ``<stem>.yaml`` in the mode ``raw``: values 0 to 100 as they are, 255 for -1.
+
+    Args:
+        stem: Path without suffix.
+        grid: Written with row 0 at the bottom of the picture.
+        map_T_grid: Where the grid's frame lies in the map frame.
+
+    Raises:
+        OutputError: The folder cannot be written.
+    """
+    _write(stem, grid.frame, grid.cells[::-1].view(np.uint8), "raw", map_T_grid)
+
+
+def _write(stem: Path, frame: GridFrame, pixels: npt.NDArray[np.uint8], mode: str, map_T_grid: Pose2) -> None:
+    import cv2
+
     picture = stem.with_name(stem.name + ".png")
-    write_bytes(picture, cv2.imencode(".png", shades[grid.cells[::-1].view(np.uint8)])[1].tobytes())
-    frame = grid.frame
+    write_bytes(picture, cv2.imencode(".png", pixels)[1].tobytes())
     x, y, yaw = frame.origin_x, frame.origin_y, 0.0
     if map_T_grid != IDENTITY:
         x, y, yaw = (map_T_grid @ Pose2(x, y)).as_tuple()
     text = (
         f"image: {picture.name}\n"
-        "mode: trinary\n"
+        f"mode: {mode}\n"
         f"resolution: {round(frame.resolution, 9)!r}\n"
         f"origin: [{round(x, 9)!r}, {round(y, 9)!r}, {round(yaw, 12)!r}]\n"
         "negate: 0\n"

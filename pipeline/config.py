@@ -114,6 +114,10 @@ class PredictConfig:
     record: bool = False
     """Write the recording ``run.rrd`` for the rerun viewer."""
 
+    min_confidence: float = 0.0
+    """Draw only rooms of at least this confidence (expected IoU, 0 to 1) into the map; the others stay in
+    ``rooms.geojson``."""
+
     allow_outside: bool = False
     """Open the picture that the map's ``image:`` names also outside the folder of the YAML."""
 
@@ -122,6 +126,8 @@ class PredictConfig:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "predictor", find_method(self.method).checked(self.predictor))
+        if not 0.0 <= self.min_confidence <= 1.0:
+            raise InvalidInputError(f"min_confidence {self.min_confidence}", expected="0 to 1")
 
 
 def named_sim(noise: str = "medium", lidar: str = "default", body: Body = "kinematic") -> SimConfig:

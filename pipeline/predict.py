@@ -11,13 +11,14 @@ from closedrooms.core.geojson import read_doors, write_doors, write_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.report import Report
 from closedrooms.core.room import Room
-from closedrooms.core.rosmap import read_ros_map, write_map
+from closedrooms.core.rosmap import read_ros_map, write_map, write_raw_map
 from closedrooms.pipeline.config import PredictConfig
 from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.stopwatch import Stopwatch
+from closedrooms.predictor.inpainting import withdraw_unsure
 from closedrooms.predictor.methods import predict
-from closedrooms.predictor.prediction import Prediction
+from closedrooms.predictor.prediction import Prediction, free_probability
 from closedrooms.visualization.no_recording import no_recording
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> R
                 prediction = predict(grid, doors, config.method, config.predictor, trace=config.record)
             except InvalidInputError as error:
                 raise InvalidInputError(str(error), where=config.map) from error
+            prediction = withdraw_unsure(prediction, grid, doors, config.min_confidence)
         with watch.stage("record"), _recording(config, grid, folder / "run.rrd") as observer:
             observer.configuration(manifest["configuration"])
             observer.prediction(grid, doors, prediction)
@@ -70,6 +72,8 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> R
             write_map(folder / "predicted", prediction.grid, map_T_grid=read.map_T_grid)
             write_doors(folder / "doors.geojson", given)
             write_rooms(folder / "rooms.geojson", rooms)
+            probability = free_probability(prediction, grid)
+            write_raw_map(folder / "probability", probability, map_T_grid=read.map_T_grid)
             from closedrooms.visualization.summary import draw_summary
 
             draw_summary(folder / "summary.png", observed, prediction, doors)
@@ -79,25 +83,24 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> R
     return Report(
         folder=config.out,
         title=f"{config.map.name}: {len(prediction.rooms)} of {len(doors)} doors predicted",
-        rows=_rows(prediction, manifest["durations"]["predict"]),
+        rows=_rows(prediction, config.min_confidence, manifest["durations"]["predict"]),
         failures=prediction.failures,
         remarks=remarks,
         figures={"rooms": [_figures(room) for room in rooms]},
     )
 
 
-def _rows(prediction: Prediction, seconds: float) -> list[tuple[str, str, str]]:
+def _rows(prediction: Prediction, least: float, seconds: float) -> list[tuple[str, str, str]]:
     """The table for people."""
+
+    def describe(room: Room) -> str:
+        sure = 0.0 if room.confidence is None else room.confidence
+        told = [room.kind or "room", f"confidence {sure:.2f}" + (", not drawn" if sure < least else "")]
+        return ", ".join([*told, *(["search was cut"] if room.bounded else [])])
+
     return [
         ("doors", "room", "area"),
-        *(
-            (
-                ", ".join(room.doors),
-                f"{room.kind}{', search was cut' if room.bounded else ''}",
-                f"{room.polygon.area:.1f} m2",
-            )
-            for room in prediction.rooms
-        ),
+        *((", ".join(room.doors), describe(room), f"{room.polygon.area:.1f} m2") for room in prediction.rooms),
         *((door, f"not predicted: {reason}", "") for door, reason in prediction.failures.items()),
         ("time", "prediction", f"{seconds:.2f} s"),
     ]
@@ -106,7 +109,8 @@ def _rows(prediction: Prediction, seconds: float) -> list[tuple[str, str, str]]:
 def _figures(room: Room) -> dict[str, Any]:
     """One room for programs."""
     area = round(room.polygon.area, 4)
-    return {"doors": list(room.doors), "kind": room.kind, "area_m2": area, "bounded": room.bounded}
+    head = {"doors": list(room.doors), "kind": room.kind, "area_m2": area, "bounded": room.bounded}
+    return head | {"confidence": room.confidence, "alternatives": len(room.alternatives)}
 
 
 @contextlib.contextmanager

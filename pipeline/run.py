@@ -14,7 +14,7 @@ from closedrooms.core.names import file_name
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
 from closedrooms.core.report import Report
-from closedrooms.core.rosmap import write_map
+from closedrooms.core.rosmap import write_map, write_raw_map
 from closedrooms.core.tum import write_trajectory
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.tour import CoverageTour
@@ -35,7 +35,7 @@ from closedrooms.pipeline.run_metrics import run_metrics
 from closedrooms.pipeline.stopwatch import Stopwatch
 from closedrooms.pipeline.survey import Survey, Truth, survey_building, true_building
 from closedrooms.predictor.methods import predict
-from closedrooms.predictor.prediction import Prediction
+from closedrooms.predictor.prediction import Prediction, free_probability
 from closedrooms.sim.simulation import Simulation
 from closedrooms.visualization.rerun.opening import open_recording
 from closedrooms.worlds.closing import check_closed, closable_rooms, draw_closed
@@ -263,6 +263,7 @@ def _write(folder: Path, found: Finding, metrics: Mapping[str, Any]) -> None:
     write_map(folder / "truth", truth.grid)
     write_doors(folder / "doors.geojson", survey.doors)
     write_rooms(folder / "rooms.geojson", prediction.rooms)
+    write_raw_map(folder / "probability", free_probability(prediction, survey.grid))
     write_rooms(folder / "truth_rooms.geojson", truth.rooms)
     write_trajectory(folder / "trajectory.tum", survey.stamps, survey.estimate)
     write_trajectory(folder / "trajectory_truth.tum", survey.stamps, survey.truth)

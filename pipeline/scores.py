@@ -40,11 +40,12 @@ def room_iou(predicted: Sequence[Room], truth: Sequence[Room]) -> dict[str, floa
     for room in truth:
         for door in room.doors:
             shape = by_door.get(door)
-            figures[door] = 0.0 if shape is None else _iou(shape, room.polygon)
+            figures[door] = 0.0 if shape is None else polygon_iou(shape, room.polygon)
     return dict(sorted(figures.items()))
 
 
-def _iou(a: BaseGeometry, b: BaseGeometry) -> float:
+def polygon_iou(a: BaseGeometry, b: BaseGeometry) -> float:
+    """Intersection over union of two areas, 0 where both are empty."""
     # A room whose outline touches itself (slivers at slanted walls) has no clean boundary to intersect.
     a, b = (shape if shape.is_valid else shapely.make_valid(shape) for shape in (a, b))
     union = a.union(b).area

@@ -1,16 +1,21 @@
 """Predicted rooms drawn into the map (paper, section 3.7)."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 import shapely
+from shapely.geometry.base import BaseGeometry
 
-from closedrooms.core.arrays import handed_over
+from closedrooms.core.arrays import FloatArray, handed_over
+from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, OccupancyGrid, is_free, is_occupied
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import Shape, fill_shape, trace_outline
 from closedrooms.predictor.config import MethodConfig
+from closedrooms.predictor.prediction import Prediction
 from closedrooms.predictor.structure.doorways import FacingDoor
 from closedrooms.predictor.structure.known_window import MAX_CELLS
 
@@ -115,3 +120,44 @@ def find_passage(grid: OccupancyGrid, room: Shape, door: FacingDoor, *, width: f
     low, high = -(steps[free.argmax()] + resolution), steps[inside.argmax()] + resolution
     a, b = middle - width / 2 * along, middle + width / 2 * along
     return shapely.Polygon((a + low * inward, b + low * inward, b + high * inward, a + high * inward))
+
+
+def withdraw_unsure(
+    prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedDoor], least: float
+) -> Prediction:
+    """Take rooms that are not sure enough out of the completed map again; as rooms they stay.
+
+    Args:
+        prediction: With the confidence of each room.
+        grid: The map.
+        doors: Closed doors of the map.
+        least: Confidence of the rooms that stay drawn.
+    """
+    unsure = [room for room in prediction.rooms if room.confidence is not None and room.confidence < least]
+    if not unsure:
+        return prediction
+    sure = [room for room in prediction.rooms if room not in unsure]
+    places = {door.id: shapely.Point(door.midpoint) for door in doors}
+    frame = prediction.grid.frame
+    before, cells = grid.on(frame), prediction.grid.cells.copy()
+    drawn = cells != before.cells
+    # Floor and outline belong to the nearest room, what was opened in known walls to the nearest door.
+    for where, shapes in (
+        (drawn & before.unknown, [[room.polygon for room in group] for group in (sure, unsure)]),
+        (drawn & before.known, [[places[d] for room in group for d in room.doors] for group in (sure, unsure)]),
+    ):
+        changed = np.argwhere(where)
+        points = np.asarray(shapely.points(frame.to_points(changed)))
+        near, far = (_measure_nearest(group, points) for group in shapes)
+        back = changed[far < near]
+        cells[back[:, 0], back[:, 1]] = before.cells[back[:, 0], back[:, 1]]
+    return replace(prediction, grid=OccupancyGrid(frame, handed_over(cells)))
+
+
+def _measure_nearest(shapes: Sequence[BaseGeometry], points: npt.NDArray[np.object_]) -> FloatArray:
+    """Measure the distance of each point to the nearest shape [m], infinite without any, shape (n,)."""
+    distance = np.full(len(points), np.inf)
+    if shapes and len(points):
+        (asked, _), found = shapely.STRtree(shapes).query_nearest(points, return_distance=True, all_matches=False)
+        distance[asked] = found
+    return distance

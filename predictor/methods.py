@@ -63,6 +63,12 @@ class Method:
         module, name = self.function.split(":")
         return getattr(importlib.import_module(module), name)
 
+    def run(self, grid: "OccupancyGrid", doors: "Sequence[ClosedDoor]", config: Any, **shared: Any) -> "Prediction":
+        """Predict, and say how sure every room and cell is, whatever the function itself says of that."""
+        from closedrooms.predictor.confidence.judge import judge
+
+        return judge(self.name, grid, doors, self.predict(grid, doors, config, **shared))
+
     def checked(self, config: Any | None) -> Any:
         """Settings for this method: its defaults for ``None``.
 
@@ -183,8 +189,7 @@ def predict(
     settings = chosen.checked(config)
     if trace and any(item.name == "keep_trace" for item in fields(settings)):
         settings = replace(settings, keep_trace=True)
-    prediction: Prediction = chosen.predict(grid, doors, settings)
-    return prediction
+    return chosen.run(grid, doors, settings)
 
 
 @cache

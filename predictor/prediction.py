@@ -3,12 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
 from shapely.geometry import Polygon
 
-from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray, handed_over
+from closedrooms.core.grid import UNKNOWN, OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import Shape
+from closedrooms.predictor.confidence.belief import Belief
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,9 +64,35 @@ class Prediction:
         rooms: Predicted rooms, in the order of the doors given.
         failures: Why a door could not be predicted, by door id.
         trace: Every stage, where asked for.
+        probability: Per cell the probability that it is free floor of a hidden room, in percent, over all rooms
+            jointly; on the lattice of the map. Cells that the map knows are -1, and beyond its frame it is 0. ``None``
+            where nothing tells.
+        beliefs: What the method itself thinks of each room, empty where it gives one shape alone or ``judge`` has used
+            it.
     """
 
     grid: OccupancyGrid
     rooms: tuple[Room, ...]
     failures: dict[str, str] = field(default_factory=dict)
     trace: PredictionTrace | None = None
+    probability: OccupancyGrid | None = None
+    beliefs: tuple[Belief, ...] = ()
+
+
+def free_probability(prediction: Prediction, grid: OccupancyGrid) -> OccupancyGrid:
+    """The probability of each cell to be free on the frame of the completed map, in percent.
+
+    Args:
+        prediction: Of the map.
+        grid: The map.
+
+    Returns:
+        -1 where the map knows, else 0 to 100.
+    """
+    frame = prediction.grid.frame
+    cells = np.zeros(frame.shape, dtype=np.int8)
+    if prediction.probability is not None:
+        # What lies outside of the window reads as unknown there.
+        np.maximum(prediction.probability.on(frame).cells, 0, out=cells)
+    cells[grid.on(frame).known] = UNKNOWN
+    return OccupancyGrid(frame, handed_over(cells))

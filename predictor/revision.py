@@ -88,6 +88,9 @@ def update(
             shape = _cut_known(scene, observed, index, room)
         if shape is not None and shape.area >= SMALLEST_ROOM:
             rooms[index] = replace(room, polygon=shape)
+            if observed[index].any():
+                # What was seen is no guess any more.
+                rooms[index] = replace(rooms[index], confidence=None, alternatives=())
         elif index < len(prediction.rooms):
             failures |= dict.fromkeys(room.doors, "there is no room where one was predicted")
     looked_into = {index for index in rooms if observed[index].any()}

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 PANEL, TITLE, GAP = 900, 40, 14
 # A room lower than this has its name and figure on one line [pixels].
 TWO_LINES = 44
+# Opacity of a room that is not sure at all and of one that is sure; how sure a room counts of which nothing is known.
+FAINTEST, STRONGEST, USUAL = 0.08, 0.64, 0.57
 # Free space around what is known [m].
 MARGIN = 1.0
 
@@ -130,6 +132,8 @@ def _prediction_panel(
     _draw_rooms(canvas, prediction.rooms, palette, room_iou)
     _draw_doors(canvas, doors)
     title = f"Predicted: {len(prediction.rooms)} of {len(doors)} closed doors"
+    if any(room.alternatives for room in prediction.rooms):
+        title += " (the fainter, the less sure; dashed: what else)"
     if room_iou:
         title += f", mean IoU {np.mean(list(room_iou.values())):.2f}"
     return title, canvas.finished()
@@ -179,7 +183,10 @@ def _draw_rooms(
 ) -> None:
     for room in rooms:
         colour = palette.get(next(iter(room.doors), ""), colours.INK)
-        canvas.fill(room.polygon, colour, opacity=0.4)
+        sure = USUAL if room.confidence is None else room.confidence
+        for other in room.alternatives:
+            canvas.dashed(other.polygon, colour)
+        canvas.fill(room.polygon, colour, opacity=FAINTEST + (STRONGEST - FAINTEST) * sure)
         canvas.outline(room.polygon, colour)
         label = "+".join(room.doors)
         known = [figures[door] for door in room.doors if door in figures]

@@ -38,6 +38,9 @@ class EvaluateConfig:
     tours: bool = True
     """Plan coverage tours too (paper, section 5), on every sample whose run.json says how many rooms the robot saw."""
 
+    probability: bool = False
+    """Write each sample's probability of every cell too (``probability.yaml`` and ``.png``), about 20 kB a map."""
+
     worst: int = 12
     """Samples on the contact sheet of the worst cases."""
 

@@ -106,6 +106,40 @@ def _draw(path: Path, panels: Sequence[tuple[str, list[tuple[str, Series]]]], la
     return True
 
 
+def draw_reliability(path: Path, rows: Sequence[Row], methods: Sequence[str]) -> bool:
+    """Mean IoU of rooms against their confidence, a curve a method.
+
+    Args:
+        path: The PNG.
+        rows: Of :func:`closedrooms.experiments.evaluation.sureness.reliability_rows`.
+        methods: Which to draw.
+
+    Returns:
+        Whether there was anything to draw.
+    """
+    if not rows:
+        return False
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(5.2, 4.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    axes.plot([0.0, 1.0], [0.0, 1.0], color="0.6", linewidth=0.8, linestyle="--", label="as sure as right")
+    for number, method in enumerate(methods):
+        own = [row for row in rows if row["method"] == method]
+        colour = COLOURS.get(method, ROOM_COLOURS[(len(COLOURS) + number) % len(ROOM_COLOURS)])
+        axes.plot(
+            [row["confidence"] for row in own], [row["iou"] for row in own],
+            label=LABELS.get(method, method), color=[v / 255 for v in colour], marker="o", markersize=3.5,
+        )  # fmt: skip
+    axes.set(xlabel="confidence (expected IoU)", ylabel="mean IoU", xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.3)
+    save_figure(figure, path)
+    return True
+
+
 def save_figure(figure: Any, path: Path) -> None:
     """Write a matplotlib figure as PNG, without the version of the library in it."""
     data = io.BytesIO()

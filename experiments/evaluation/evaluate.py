@@ -97,7 +97,9 @@ def _seconds(scores: Sequence[Scores]) -> dict[str, float]:
 
 def _work(samples: Sequence[SamplePath], config: EvaluateConfig) -> Iterator[Outcome]:
     """What comes of the samples, as they are finished."""
-    job = partial(evaluate_sample, methods=config.methods, out=config.out, tours=config.tours)
+    job = partial(
+        evaluate_sample, methods=config.methods, out=config.out, tours=config.tours, probability=config.probability
+    )
     crew: Crew[SamplePath, Outcome] = Crew(min(config.workers, len(samples)))
     for sample, outcome in crew.do(job, samples):
         yield Outcome([], {sample.name: outcome.reason}) if isinstance(outcome, Lost) else outcome

@@ -6,7 +6,7 @@ from typing import Any
 
 from closedrooms.experiments.evaluation.cases import draw_extremes, draw_worst, extreme_cases
 from closedrooms.experiments.evaluation.config import EvaluateConfig, in_order
-from closedrooms.experiments.evaluation.curves import draw_errors, draw_iou
+from closedrooms.experiments.evaluation.curves import draw_errors, draw_iou, draw_reliability
 from closedrooms.experiments.evaluation.listing import SamplePath
 from closedrooms.experiments.evaluation.numbers import number_rows
 from closedrooms.experiments.evaluation.page import Section, write_page
@@ -21,6 +21,7 @@ from closedrooms.experiments.evaluation.summary import (
     subset,
     world_rows,
 )
+from closedrooms.experiments.evaluation.sureness import reliability_rows, sureness_rows
 from closedrooms.experiments.evaluation.tables import write_table
 
 Scores = dict[str, Any]
@@ -28,6 +29,12 @@ Row = dict[str, Any]
 INTERVALS = (
     "Intervals hold 95 %: low to high draws samples (other doors in the same buildings), world low to world high draws "
     "buildings with all their samples (other buildings)."
+)
+SURENESS = (
+    "A room's confidence is the IoU that it is expected to have; groups of equally many rooms. Calibration error: mean "
+    "distance of the two over the groups. AUROC: how well confidence tells rooms of IoU above 0.5. Best of k: the room "
+    "and its first k - 1 alternatives. Brier and log score a cell: unknown cells within 8 m of a closed door; guess: "
+    "the rooms taken as sure."
 )
 
 
@@ -65,6 +72,10 @@ def write_report(
     for name, rows in (("coverage", coverage), ("tests", tests), ("numbers", numbers)):
         if rows:
             write_table(folder / name, rows)
+    sure = sureness_rows(scores)
+    for name, rows in (("sureness", sure), ("reliability", reliability_rows(scores))):
+        if rows:
+            write_table(folder / name, rows)
     sections = _sections(folder, scores, {sample.name: sample for sample in samples}, config, iou, coverage)
     overall = [row for row in iou if row["closed_doors"] == "all"]
     first = Section(
@@ -79,10 +90,13 @@ def write_report(
         "Measure error: coverage error of the prediction in percent.",
         tables=[_table(tests)] if tests else [],
     )
+    surely = []
+    if draw_reliability(folder / "reliability.png", reliability_rows(scores), in_order({r["method"] for r in sure})):
+        surely = [Section("How sure", SURENESS, folder / "reliability.png", [_table(sure)])]
     by_world = Section("Buildings (table 1: most closed doors)", tables=[_table(worlds)])
     tail = [_failure_section(failures)] if failures else []
     title = f"closedrooms evaluate: {len(samples)} samples"
-    write_page(folder / "report.html", title, [first, *sections, tested, by_world, *tail])
+    write_page(folder / "report.html", title, [first, *surely, *sections, tested, by_world, *tail])
     return overall
 
 

@@ -17,6 +17,7 @@ from closedrooms.core.files import write_json
 from closedrooms.core.geojson import write_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.incoming import read_json
+from closedrooms.core.rosmap import write_raw_map
 from closedrooms.experiments.dataset.checksums import digest
 from closedrooms.experiments.evaluation.listing import SamplePath
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
@@ -29,13 +30,14 @@ from closedrooms.experiments.evaluation.scores import (
     room_masks,
     union_of,
 )
+from closedrooms.experiments.evaluation.sureness import score_sureness
 from closedrooms.experiments.evaluation.tours import Tour, code_digest, kept_tour, plan_tour, tour_code, tour_figures
 from closedrooms.pipeline.manifest import versions
 from closedrooms.pipeline.scores import room_iou
 from closedrooms.predictor.config import FacesConfig
 from closedrooms.predictor.methods import find_method
 from closedrooms.predictor.paper.initial_layouts import Started
-from closedrooms.predictor.prediction import Prediction
+from closedrooms.predictor.prediction import Prediction, free_probability
 
 AUTHORS = "authors"
 RESULT = "scores.json"
@@ -65,7 +67,9 @@ class _Hidden:
     share: float
 
 
-def evaluate_sample(sample: SamplePath, methods: Sequence[str], out: Path, *, tours: bool = True) -> Outcome:
+def evaluate_sample(
+    sample: SamplePath, methods: Sequence[str], out: Path, *, tours: bool = True, probability: bool = False
+) -> Outcome:
     """Scores of some methods on one sample, each kept in ``out/<method>/<sample>``.
 
     What was kept before from the same files, with the same method and code, is not done again.
@@ -75,6 +79,7 @@ def evaluate_sample(sample: SamplePath, methods: Sequence[str], out: Path, *, to
         methods: Methods; the authors' own map is scored too where the sample has it.
         out: Folder of the evaluation.
         tours: Plan coverage tours too, where the sample's run.json tells |R|.
+        probability: Write each cell's probability too (``probability.{yaml,png}``).
 
     Raises:
         OutputError: The result cannot be written.
@@ -85,7 +90,7 @@ def evaluate_sample(sample: SamplePath, methods: Sequence[str], out: Path, *, to
         return outcome
     wanted = [*methods, *([AUTHORS] if (sample.folder / "authors.yaml").is_file() else [])]
     content = _content(sample.folder)
-    keys = {method: _fingerprint(content, method, tours=tours) for method in wanted}
+    keys = {method: _fingerprint(content, method, tours=tours, probability=probability) for method in wanted}
     kept = {method: _kept(out / method / sample.name / RESULT, keys[method]) for method in wanted}
     if any(scores is None for scores in kept.values()):
         try:
@@ -102,7 +107,7 @@ def evaluate_sample(sample: SamplePath, methods: Sequence[str], out: Path, *, to
             _make(folder)
             head = _head(read, sample.name, method, keys[method], hidden)
             try:
-                scores = head | _score(read, method, folder, hidden, out, starts, tours=tours)
+                scores = head | _score(read, method, folder, hidden, out, starts, tours=tours, probability=probability)
             except OutputError:
                 raise
             except Exception as error:
@@ -130,17 +135,23 @@ def _content(folder: Path) -> str:
     return content.hexdigest()
 
 
-def _fingerprint(content: str, method: str, *, tours: bool) -> str:
+def _fingerprint(content: str, method: str, *, tours: bool, probability: bool) -> str:
     """Changes with the input, the method, the versions of libraries and the code that predicts, plans and scores."""
     parts = [content, method, json.dumps(versions()), _code(), tour_code() if tours and _has_tour(method) else ""]
+    parts += ["probability"] if probability and method != AUTHORS else []
     return hashlib.sha256(" ".join(parts).encode()).hexdigest()
 
 
 @lru_cache(maxsize=1)
 def _code() -> str:
     root, here = Path(__file__).parents[2], Path(__file__).parent
-    files = [*(root / "predictor").rglob("*.py"), *(root / "core").rglob("*.py"), root / "pipeline" / "scores.py"]
-    return code_digest([*files, *(here / name for name in ("sample.py", "samples.py", "scores.py"))])
+    files = [
+        *(root / "predictor").rglob("*.py"),
+        *(root / "predictor").rglob("*.json"),
+        *(root / "core").rglob("*.py"),
+        root / "pipeline" / "scores.py",
+    ]
+    return code_digest([*files, *(here / name for name in ("sample.py", "samples.py", "scores.py", "sureness.py"))])
 
 
 def _kept(path: Path, key: str) -> Scores | None:
@@ -188,7 +199,7 @@ def predict_with(name: str, sample: Sample, starts: Starts | None = None) -> tup
         started, seconds = (starts or Starts(sample)).of(config)
         shared = {"started": started}
     begin = time.perf_counter()
-    prediction: Prediction = method.predict(sample.observed, sample.doors, config, **shared)
+    prediction = method.run(sample.observed, sample.doors, config, **shared)
     return prediction, seconds + time.perf_counter() - begin
 
 
@@ -217,7 +228,15 @@ def _head(sample: Sample, name: str, method: str, key: str, hidden: _Hidden) -> 
 
 
 def _score(
-    sample: Sample, method: str, folder: Path, hidden: _Hidden, out: Path, starts: Starts, *, tours: bool
+    sample: Sample,
+    method: str,
+    folder: Path,
+    hidden: _Hidden,
+    out: Path,
+    starts: Starts,
+    *,
+    tours: bool,
+    probability: bool,
 ) -> Scores:
     if method == AUTHORS:
         assert sample.authors is not None, "only samples with authors.yaml come here"
@@ -225,6 +244,8 @@ def _score(
         return _hidden_scores(hidden, masks) | {"by_door": {}, "not_seen": []}
     prediction, seconds = predict_with(method, sample, starts)
     write_rooms(folder / "rooms.geojson", prediction.rooms)
+    if probability:
+        write_raw_map(folder / "probability", free_probability(prediction, sample.observed))
     unknown = sample.observed.unknown
     masks = [mask & unknown for mask in room_masks(prediction.rooms, sample.observed.frame)]
     detected = {door.id for door in sample.doors}
@@ -234,6 +255,7 @@ def _score(
         "not_seen": sorted(set(figures) - detected),
         "failures": prediction.failures,
         "seconds": round(seconds, 4),
+        "sure": score_sureness(prediction, sample.observed, sample.doors, sample.truth, sample.rooms),
     }
     if sample.authors is not None:
         theirs = sample.authors.free & unknown

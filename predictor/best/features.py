@@ -354,15 +354,20 @@ FEATURES = (
 WEIGHTS = np.array([feature.weight for feature in FEATURES])
 
 
-def score_rectangles(frame: DoorFrame, evidence: Evidence, entry: Entry, boxes: IntArray) -> FloatArray:
-    """Score rectangles by their evidence, to nine digits, shape (n,).
+def score_rectangles(
+    frame: DoorFrame, evidence: Evidence, entry: Entry, boxes: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Score rectangles by their evidence.
 
     Args:
         frame: The door's frame.
         evidence: Its tables, over ``window_around`` the door at least.
         entry: The door.
         boxes: ``u0, v0, u1, v1`` [cells], shape (n, 4).
+
+    Returns:
+        Scores to nine digits, shape (n,), and what was measured, a column a feature, shape (n, k).
     """
     rectangles = Rectangles(frame, evidence, entry, boxes)
     measured = np.stack([feature.measure(rectangles) for feature in FEATURES], axis=-1)
-    return np.asarray(np.round(measured @ WEIGHTS, 9))
+    return np.round(measured @ WEIGHTS, 9), measured

@@ -38,6 +38,7 @@ class Hypotheses:
         quarter: Where the room lies.
         u: Door along its wall [cells of its frame].
         v: Door across its wall [cells of its frame].
+        measured: A column a feature, shape (n, k).
     """
 
     boxes: IntArray
@@ -47,6 +48,7 @@ class Hypotheses:
     quarter: int
     u: float
     v: float
+    measured: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,13 +80,15 @@ def propose_rectangles(scene: Scene) -> Proposals:
             left, right = entries[i], entries[j]
             if left.right == right.u and right.left == left.u:
                 rooms[i, j] = enter_between(left, right)
-        for doors, (boxes, scores) in _propose_all(frame, mirrored, rooms, scene.config).items():
+        for doors, (boxes, scores, measured) in _propose_all(frame, mirrored, rooms, scene.config).items():
             behind = np.ones(len(boxes), dtype=np.bool_)
             if len(doors) == 2:
                 behind = _spans(boxes, entries[doors[0]], entries[doors[1]])
             if behind.any():
                 most = scene.config.shortlist
-                found[doors] = _shortlist(boxes[behind], scores[behind], rooms[doors], frame, turned, quarter, most)
+                order = np.flatnonzero(behind)[np.lexsort((*boxes[behind].T, -scores[behind]))[:most]]
+                best = boxes[order], scores[order], measured[order]
+                found[doors] = _place(*best, rooms[doors], frame, turned, quarter)
     shared = {(doors[0], doors[1]): own for doors, own in found.items() if len(doors) == 2}
     return Proposals([found[i,] for i in range(len(poses))], shared)
 
@@ -96,16 +100,16 @@ def _spans(boxes: IntArray, first: Entry, second: Entry) -> BoolArray:
 
 def _propose_all(
     frame: DoorFrame, twin: DoorFrame | None, rooms: dict[Doors, Entry], config: BestConfig
-) -> dict[Doors, tuple[IntArray, FloatArray]]:
-    """Propose the rectangles of every room in a frame with their scores: one window's tables at a time in memory."""
+) -> dict[Doors, tuple[IntArray, FloatArray, FloatArray]]:
+    """Propose the rectangles of every room in a frame with scores and features: one window's tables at a time."""
     smallest, largest = in_cells(config.smallest_side), in_cells(config.largest_side)
     seen = rate_sizes(frame)
-    found: dict[Doors, tuple[IntArray, FloatArray]] = {}
+    found: dict[Doors, tuple[IntArray, FloatArray, FloatArray]] = {}
     for window, together in _share_windows(frame, rooms, largest):
         evidence = gather(frame, window, seen, twin)
         for doors in together:
             boxes = propose(frame, evidence, rooms[doors], smallest, largest)
-            found[doors] = boxes, score_rectangles(frame, evidence, rooms[doors], boxes)
+            found[doors] = boxes, *score_rectangles(frame, evidence, rooms[doors], boxes)
         del evidence
     return {doors: found[doors] for doors in rooms}
 
@@ -125,21 +129,19 @@ def _share_windows(frame: DoorFrame, rooms: dict[Doors, Entry], largest: int) ->
     return groups
 
 
-def _shortlist(
+def _place(
     boxes: IntArray,
     scores: FloatArray,
+    measured: FloatArray,
     entry: Entry,
     frame: DoorFrame,
     turned: TurnedMap,
     quarter: int,
-    most: int,
 ) -> Hypotheses:
-    """Keep the best of the rectangles found, best first; ties go by position."""
-    order = np.lexsort((*boxes.T, -scores))[:most]
-    boxes = boxes[order]
+    """Place rectangles of a door's frame in the map, in the order given: best first, ties by position."""
     corners = frame.to_map(boxes[:, [[0, 1], [2, 1], [2, 3], [0, 3]]].astype(np.float64))
     in_map = _turn_back(boxes, turned, quarter)
-    return Hypotheses(in_map, corners, scores[order], turned.angle, quarter, entry.u, entry.v)
+    return Hypotheses(in_map, corners, scores, turned.angle, quarter, entry.u, entry.v, measured)
 
 
 def _turn_back(boxes: IntArray, turned: TurnedMap, quarter: int) -> IntArray:

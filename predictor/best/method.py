@@ -6,12 +6,14 @@ sides is scored by its evidence; the rectangles of all doors are then chosen tog
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import shapely
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
+from closedrooms.predictor.best.belief import believe
 from closedrooms.predictor.best.hypotheses import Hypotheses, propose_rectangles
 from closedrooms.predictor.best.room_shape import trace_rooms
 from closedrooms.predictor.best.scene import Scene, prepare
@@ -19,6 +21,7 @@ from closedrooms.predictor.best.selection import select_jointly
 from closedrooms.predictor.config import BestConfig
 from closedrooms.predictor.inpainting import complete_map
 from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
+from closedrooms.predictor.structure.doorways import find_doorways
 
 
 def predict_best(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: BestConfig) -> Prediction:
@@ -38,11 +41,14 @@ def predict_best(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: BestC
     scene = prepare(grid, doors, config)
     hypotheses = propose_rectangles(scene)
     chosen = select_jointly(scene, hypotheses)
-    rooms, without = trace_rooms(scene, chosen)
-    completed = complete_map(grid, scene.grid, rooms, [pose.facing for pose in scene.poses], config)
+    facing = [pose.facing for pose in scene.poses]
+    openings = find_doorways(scene.grid, facing, width=config.door_width)
+    rooms, without = trace_rooms(scene, chosen, openings)
+    completed = complete_map(grid, scene.grid, rooms, facing, config)
     failures = scene.failures | without
     in_order = {door.id: failures[door.id] for door in doors if door.id in failures}
-    prediction = Prediction(completed, tuple(rooms), in_order)
+    beliefs = believe(scene, chosen, rooms, openings)
+    prediction = Prediction(completed, tuple(rooms), in_order, beliefs=beliefs)
     return _with_trace(prediction, scene, hypotheses.alone) if config.keep_trace and scene.poses else prediction
 
 
@@ -65,4 +71,4 @@ def _with_trace(prediction: Prediction, scene: Scene, alone: Sequence[Hypotheses
         initial={},
         levels=(Level(0, first, scores), Level(1, together, last)),
     )
-    return Prediction(prediction.grid, prediction.rooms, prediction.failures, trace)
+    return replace(prediction, trace=trace)

@@ -15,7 +15,7 @@ from closedrooms.predictor.best.lattice import RESOLUTION, in_cells
 from closedrooms.predictor.best.scene import Scene
 from closedrooms.predictor.best.selection import Choice
 from closedrooms.predictor.disjoint_rooms import NO_ROOM, part_rooms
-from closedrooms.predictor.structure.doorways import Doorway, FacingDoor, find_doorways
+from closedrooms.predictor.structure.doorways import Doorway, FacingDoor
 
 # A rectangle that known space takes less of than this stays a rectangle.
 CLEAN = 0.01
@@ -31,23 +31,25 @@ HALF_WORTH = in_cells(1.0)
 BEYOND, BESIDE, FACING = 0.5, 0.3, 0.05
 
 
-def trace_rooms(scene: Scene, choices: Sequence[Choice]) -> tuple[list[Room], dict[str, str]]:
+def trace_rooms(
+    scene: Scene, choices: Sequence[Choice], openings: Sequence[Doorway | None]
+) -> tuple[list[Room], dict[str, str]]:
     """Subtract known space and its walls from the chosen rectangles and extend them to the leaves of their doors.
 
     Args:
         scene: The map and its doors.
         choices: A rectangle each.
+        openings: Of each door of the scene.
 
     Returns:
         Disjoint rooms in the order of the choices, and why doors have none, by their id.
     """
     facing = [pose.facing for pose in scene.poses]
-    openings = find_doorways(scene.grid, facing, width=scene.config.door_width)
     rooms: list[Room] = []
     failures: dict[str, str] = {}
     for choice in choices:
         names = tuple(facing[i].door.id for i in choice.doors)
-        shape = _trace_room(scene, choice, [opening for i in choice.doors if (opening := openings[i]) is not None])
+        shape = trace_room(scene, choice, choice.corners, openings)
         if shape is None:
             failures |= dict.fromkeys(names, NO_ROOM)
             continue
@@ -58,12 +60,13 @@ def trace_rooms(scene: Scene, choices: Sequence[Choice]) -> tuple[list[Room], di
     return apart, failures | without
 
 
-def _trace_room(scene: Scene, choice: Choice, doorways: Sequence[Doorway]) -> Polygon | None:
-    """Trace one room up to the leaves of its doors; ``None`` where nothing is left of its rectangle."""
+def trace_room(scene: Scene, choice: Choice, corners: FloatArray, openings: Sequence[Doorway | None]) -> Polygon | None:
+    """Trace one rectangle of a room up to the leaves of its doors; ``None`` where nothing is left of it."""
     pose = scene.poses[choice.doors[0]]
+    doorways = [opening for i in choice.doors if (opening := openings[i]) is not None]
     turned = scene.turned[pose.angle]
     for thickness, narrow in ((in_cells(scene.walls.least), NARROW), (ALCOVE_WALL, ALCOVE_NARROW)):
-        shape = subtract_known(turned, choice.corners, thickness, pose.facing, doorways, narrow=narrow)
+        shape = subtract_known(turned, corners, thickness, pose.facing, doorways, narrow=narrow)
         if shape is not None:
             for doorway in doorways:
                 shape = doorway.joined(shape, turned.resolution)

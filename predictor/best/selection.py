@@ -17,6 +17,9 @@ from closedrooms.predictor.best.shared_rooms import merge
 ROUNDS = 20
 # Scores apart by this are e times as likely as each other: the weights were found as those of a log-linear model.
 TEMPERATURE = 1.0
+# What the scores of all rectangles of a door say together is that much vaguer: found on ``fit``, for the likelihood of
+# the rectangles near the true rooms. Rounds in which the rooms of a map settle on each other's places.
+VAGUE, SETTLING = 3.0, 3
 # A safer rectangle may overlap its neighbours by this share more.
 CROWDING = 0.02
 
@@ -30,12 +33,18 @@ class Choice:
         corners: Of its rectangle in the map frame [m], shape (4, 2).
         score: With the others' rooms.
         cut: The search for all rooms ended before nothing got better.
+        options: Its rectangle and all others that it could have.
+        index: Of its rectangle among them.
+        weights: Probability of each, shape (n,).
     """
 
     doors: tuple[int, ...]
     corners: FloatArray
     score: float
     cut: bool
+    options: Hypotheses
+    index: int
+    weights: FloatArray
 
 
 def select_jointly(scene: Scene, proposals: Proposals) -> list[Choice]:
@@ -43,18 +52,22 @@ def select_jointly(scene: Scene, proposals: Proposals) -> list[Choice]:
     alone, thickness = proposals.alone, in_cells(scene.walls.usual)
     # By place, so that the order of the doors changes nothing.
     order = sorted(range(len(alone)), key=lambda i: scene.poses[i].facing.door.midpoint)
-    places, values, cut = choose([alone[i] for i in order], thickness, safe=True)
+    search = _Search([alone[i] for i in order], thickness)
+    places, values, cut = _choose(search, safe=True)
     chosen = {i: (place, value) for i, place, value in zip(order, places, values, strict=True)}
+    weights = dict(zip(order, search.weigh(), strict=True))
     mergers = merge(proposals, [chosen[i][0] for i in range(len(alone))], thickness)
     choices = []
     for i in range(len(alone)):
         merger = next((m for m in mergers if i in (m.first, m.second)), None)
         if merger is None:
-            choices.append(Choice((i,), alone[i].corners[chosen[i][0]], chosen[i][1], cut))
+            at, value = chosen[i]
+            choices.append(Choice((i,), alone[i].corners[at], value, cut, alone[i], at, weights[i]))
         elif i == min(merger.first, merger.second):
             both = proposals.shared[merger.first, merger.second]
             doors = tuple(sorted((merger.first, merger.second)))
-            choices.append(Choice(doors, both.corners[merger.index], merger.score, cut))
+            at = merger.index
+            choices.append(Choice(doors, both.corners[at], merger.score, cut, both, at, _soften(both.scores)))
     return choices
 
 
@@ -75,13 +88,17 @@ def choose(
     Returns:
         Index of the rectangle by door, its score by itself and with the others, whether the search was cut.
     """
-    search = _Search(hypotheses, thickness)
-    alone, first_cut = search.ascend([0] * len(hypotheses))
+    return _choose(_Search(hypotheses, thickness), safe=safe)
+
+
+def _choose(search: "_Search", *, safe: bool) -> tuple[list[int], list[float], bool]:
+    """The same with the tables at hand."""
+    alone, first_cut = search.ascend([0] * len(search.hypotheses))
     surest, second_cut = search.ascend(search.surest_first())
     better = search.total(surest) > search.total(alone) + 1e-9
     done = surest if better else alone
     if safe:
-        done = [search.safest(i, done) for i in range(len(hypotheses))]
+        done = [search.safest(i, done) for i in range(len(search.hypotheses))]
     scores = [float(search.seen_by(i, done)[at]) for i, at in enumerate(done)]
     return done, scores, second_cut if better else first_cut
 
@@ -112,11 +129,25 @@ class _Search:
                 score += table[:, chosen[j]]
         return score
 
+    def weigh(self) -> list[FloatArray]:
+        """Probability of every rectangle of each door, all doors jointly: each sees the others where they may be.
+
+        Mean field: door by door, the others' rectangles count by their probabilities.
+        """
+        weights = [_soften(own.scores) for own in self.hypotheses]
+        for _ in range(SETTLING):
+            for i, own in enumerate(self.hypotheses):
+                score = own.scores.copy()
+                for j, table in self.links[i]:
+                    score += table @ weights[j]
+                weights[i] = _soften(score)
+        return weights
+
     def safest(self, i: int, chosen: list[int]) -> int:
         """The rectangle of a door with the largest expected overlap (IoU), given what the others have chosen."""
         score = self.seen_by(i, chosen) / TEMPERATURE
         weight = np.exp(score - score.max())
-        expected = np.round(_overlaps(self.hypotheses[i].boxes) @ (weight / weight.sum()), 9)
+        expected = np.round(overlaps_of(self.hypotheses[i].boxes) @ (weight / weight.sum()), 9)
         # Not further into a neighbour than the best by score.
         crowd = np.zeros(len(expected))
         for j, table in self.overlaps[i]:
@@ -160,7 +191,13 @@ class _Search:
         return changed
 
 
-def _overlaps(boxes: IntArray) -> FloatArray:
+def _soften(scores: FloatArray) -> FloatArray:
+    """Probabilities of rectangles by their scores, shape (n,)."""
+    weight = np.exp((scores - scores.max()) / VAGUE)
+    return np.asarray(weight / weight.sum())
+
+
+def overlaps_of(boxes: IntArray) -> FloatArray:
     """Intersection over union of every two rectangles, shape (n, n)."""
     sizes = (boxes[:, 2:] - boxes[:, :2]).prod(axis=-1)
     low, high = np.maximum(boxes[:, None, :2], boxes[None, :, :2]), np.minimum(boxes[:, None, 2:], boxes[None, :, 2:])

@@ -34,7 +34,9 @@ def test_predict_completes_a_map(corridor: Path) -> None:
     out = corridor / "out"
     assert call("predict", corridor / "map.yaml", "--doors", corridor / "doors.geojson", "--out", out) == 0
     names = {"map.yaml", "map.png", "predicted.yaml", "predicted.png", "doors.geojson", "rooms.geojson"}
-    assert names | {"run.json", "summary.png"} == {path.name for path in out.iterdir()}
+    assert names | {"run.json", "summary.png", "probability.yaml", "probability.png"} == {
+        path.name for path in out.iterdir()
+    }
     before, after = read_map(out / "map.yaml"), read_map(out / "predicted.yaml")
     assert before.frame == after.frame
     centre = after.frame.to_cells(np.array([6.6, 2.0]))
@@ -42,6 +44,23 @@ def test_predict_completes_a_map(corridor: Path) -> None:
     assert before.unknown[tuple(centre)]
     (room,) = json.loads((out / "rooms.geojson").read_text())["features"]
     assert room["properties"]["doors"] == ["d1"]
+    assert 0.0 < room["properties"]["confidence"] < 1.0
+    assert len(room["properties"]["alternatives"]) in {1, 2, 3}
+    probability = read_map(out / "probability.yaml")
+    assert probability.frame == before.frame
+    assert (probability.cells[before.known] == -1).all()
+    assert probability.cells[tuple(centre)] > 50
+
+
+def test_rooms_that_are_not_sure_enough_stay_out_of_the_map(corridor: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("predict", corridor / "map.yaml", "--doors", corridor / "doors.geojson")
+    assert call(*words, "--min-confidence", "1", "--out", corridor / "out") == 0
+    assert "not drawn" in capsys.readouterr().out
+    before, after = (read_map(corridor / "out" / f"{name}.yaml") for name in ("map", "predicted"))
+    assert np.array_equal(before.cells, after.cells)
+    assert len(json.loads((corridor / "out" / "rooms.geojson").read_text())["features"]) == 1
+    assert call(*words, "--min-confidence", "1.5", "--out", corridor / "never") == 1
+    assert not (corridor / "never").exists()
 
 
 def test_a_door_that_cannot_be_predicted_is_said_and_the_others_are_written(corridor: Path) -> None:

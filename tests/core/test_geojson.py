@@ -10,7 +10,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.geojson import read_doors, read_rooms, write_doors, write_rooms
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
-from closedrooms.core.room import Room
+from closedrooms.core.room import Alternative, Room
 
 
 def collection(path: Path, *features: dict[str, Any]) -> Path:
@@ -181,4 +181,36 @@ def test_null_geometries_and_open_doors_in_any_case_are_left_out_and_counted(tmp
 def test_a_room_with_wrong_properties_is_one_clear_line(tmp_path: Path, wrong: dict[str, Any]) -> None:
     path = collection(tmp_path / "r", multi("Polygon", [[[0, 0], [1, 0], [1, 1], [0, 0]]], **wrong))
     with pytest.raises(InvalidInputError, match="room 0"):
+        read_rooms(path)
+
+
+def test_a_room_is_read_with_its_confidence_and_alternatives(tmp_path: Path) -> None:
+    others = (Alternative(box(0, 0, 3, 3), 0.25), Alternative(box(0, 0, 5, 3), 0.125))
+    room = Room(box(0, 0, 4, 3), ("d",), "border", 1.5, confidence=0.75, alternatives=others)
+    write_rooms(tmp_path / "rooms.geojson", [room])
+    (read,) = read_rooms(tmp_path / "rooms.geojson")
+    assert read == room
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "match"),
+    [
+        ("confidence", 1.5, "confidence"),
+        ("confidence", "high", "confidence"),
+        ("alternatives", {"probability": 1}, "alternatives"),
+        ("alternatives", [3], "alternatives"),
+        ("alternatives", [{"probability": 0.5}], "geometry"),
+        ("alternatives", [{"probability": 0.5, "geometry": {"type": "Point", "coordinates": [0, 0]}}], "Point"),
+        ("alternatives", [{"geometry": {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]]]}}], "no"),
+    ],
+)
+def test_a_confidence_or_alternative_that_is_none_is_refused(
+    tmp_path: Path, name: str, value: object, match: str
+) -> None:
+    path = tmp_path / "rooms.geojson"
+    write_rooms(path, [Room(box(0, 0, 4, 3), ("d",), "border", 1.5, confidence=0.75)])
+    data = json.loads(path.read_text())
+    data["features"][0]["properties"][name] = value
+    path.write_text(json.dumps(data))
+    with pytest.raises(InvalidInputError, match=match):
         read_rooms(path)

@@ -10,7 +10,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.core.rosmap import read_map, read_ros_map, write_map
+from closedrooms.core.rosmap import read_map, read_ros_map, write_map, write_raw_map
 
 HEAD = "resolution: 0.05\norigin: [-1.0, 2.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
 
@@ -267,3 +267,13 @@ def test_a_small_file_does_not_become_a_huge_map(tmp_path: Path) -> None:
     Image.fromarray(bomb).convert("1").save(tmp_path / "m.png")
     with pytest.raises(InvalidInputError, match=r"9000 x 9000.*m\.png$"):
         read_map(path)
+
+
+def test_a_raw_map_keeps_every_value(tmp_path: Path) -> None:
+    cells = np.arange(-1, 101, dtype=np.int8).reshape(6, 17)
+    grid = OccupancyGrid(GridFrame(0.05, 1.0, -2.0, 6, 17), cells)
+    write_raw_map(tmp_path / "probability", grid)
+    assert "mode: raw" in (tmp_path / "probability.yaml").read_text()
+    read = read_map(tmp_path / "probability.yaml")
+    assert np.array_equal(read.cells, cells)
+    assert read.frame == grid.frame

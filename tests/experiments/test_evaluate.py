@@ -16,7 +16,7 @@ from closedrooms.core.errors import ClosedroomsError
 from closedrooms.core.geojson import read_rooms, write_doors, write_rooms
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.core.rosmap import write_map
+from closedrooms.core.rosmap import read_map, write_map
 from closedrooms.experiments.evaluation.config import EvaluateConfig
 from closedrooms.experiments.evaluation.evaluate import evaluate
 from closedrooms.experiments.evaluation.listing import find_samples
@@ -61,12 +61,39 @@ def evaluated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_writes_tables_pictures_and_the_rooms_of_every_sample(evaluated: Path) -> None:
     out = evaluated / "out"
     files = {path.name for path in out.iterdir() if path.is_file()}
-    tables = {f"{name}.{kind}" for name in ("rooms", "samples", "summary", "worlds", "tests", "numbers")
-              for kind in ("csv", "parquet")}  # fmt: skip
-    pictures = {"iou.png", "figure-05.png", "figure-07.png", "figure-09.png", "worst.png"}
+    names = ("rooms", "samples", "summary", "worlds", "tests", "numbers", "sureness", "reliability")
+    tables = {f"{name}.{kind}" for name in names for kind in ("csv", "parquet")}
+    pictures = {"iou.png", "reliability.png", "figure-05.png", "figure-07.png", "figure-09.png", "worst.png"}
     assert files == {"run.json", "report.html", *tables, *pictures}
     assert read_rooms(out / "paper" / "house" / "01" / "rooms.geojson")[0].doors == ("d1",)
     assert not (out / "authors" / "house" / "02").exists()
+
+
+def test_every_method_is_asked_how_sure_it_was(evaluated: Path) -> None:
+    with (evaluated / "out" / "sureness.csv").open() as file:
+        rows = {row["method"]: row for row in csv.DictReader(file)}
+    assert set(rows) == {"paper", "line-of-sight"}
+    for row in rows.values():
+        assert int(row["rooms"]) == 2
+        assert 0.0 <= float(row["calibration_error"]) <= 1.0
+        assert float(row["iou_mean"]) <= float(row["best_of_2"]) <= float(row["best_of_4"])
+        assert 0.0 < float(row["brier"]) < 1.0
+    assert "How sure" in (evaluated / "out" / "report.html").read_text()
+    (room,) = read_rooms(evaluated / "out" / "paper" / "house" / "01" / "rooms.geojson")
+    assert room.confidence is not None
+    assert room.alternatives
+
+
+def test_the_probability_of_every_cell_is_written_on_request(evaluated: Path, tmp_path: Path) -> None:
+    path = evaluated / "data" / "house" / "01"
+    config = EvaluateConfig(datasets=(path,), out=tmp_path, methods=("paper",), workers=1, probability=True)
+    assert not evaluate(config).failures
+    (written,) = tmp_path.rglob("probability.yaml")
+    probability, observed = read_map(written), read_map(path / "map.yaml")
+    known = observed.on(probability.frame).known
+    assert (probability.cells[known] == UNKNOWN).all()
+    assert probability.cells[~known].min() >= 0
+    assert probability.cells.max() > 50
 
 
 def test_both_figures_stand_in_the_table_and_agree_where_they_should(evaluated: Path) -> None:

@@ -44,9 +44,9 @@ def test_nothing_hidden_has_no_rooms() -> None:
 
 def test_small_pieces_are_no_rooms() -> None:
     area = np.zeros(FRAME.shape, dtype=bool)
-    area[5:34, 5:34] = True
+    area[5:24, 5:24] = True
     assert hidden_rooms(area, 0.05) == []
-    area[5:36, 5:36] = True
+    area[5:26, 5:26] = True
     assert len(hidden_rooms(area, 0.05)) == 1
 
 

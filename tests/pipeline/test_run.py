@@ -20,6 +20,7 @@ from closedrooms.worlds.library import DEFAULT_WORLD, load_world
 FILES = {
     "run.json", "map.yaml", "map.png", "predicted.yaml", "predicted.png", "truth.yaml", "truth.png", "doors.geojson",
     "rooms.geojson", "truth_rooms.geojson", "trajectory.tum", "trajectory_truth.tum", "tour.geojson", "summary.png",
+    "probability.yaml", "probability.png",
 }  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from shapely.geometry import Polygon, box
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import OutputError
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.core.room import Room
+from closedrooms.core.room import Alternative, Room
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.visualization import colours
 from closedrooms.visualization.canvas import Canvas
@@ -99,6 +99,27 @@ def test_the_predicted_room_and_the_door_have_their_colours(tmp_path: Path) -> N
     rgb = picture[..., ::-1].reshape(-1, 3).astype(int)
     for colour in (colours.DOOR_CLOSED, colours.room_colours(["d07"])["d07"]):
         assert (np.abs(rgb - colour).max(axis=1) < 12).sum() > 50
+
+
+def test_a_room_is_the_fainter_the_less_sure_and_what_else_it_could_be_is_dashed(tmp_path: Path) -> None:
+    grid, other = a_map(), Alternative(box(3.0, 3.1, 9.0, 6.0), 0.3)
+    middles, edges = [], []
+    for confidence in (0.2, 0.9):
+        room = Room(box(3.0, 3.1, 7.0, 6.0), ("d07",), "independent", 4.2, False, confidence, (other,))
+        draw_summary(tmp_path / "summary.png", grid, Prediction(grid, (room,)), [DOOR])
+        pixels = cv2.imread(str(tmp_path / "summary.png")).astype(int)
+        panel = pixels[:, pixels.shape[1] // 2 :] if pixels.shape[1] > pixels.shape[0] else pixels[len(pixels) // 2 :]
+        colour = np.array(colours.room_colours(["d07"])["d07"][::-1])
+        middles.append(np.abs(panel - colour).sum(axis=2))
+        edges.append((middles[-1] < 60).sum())
+    # The surer room comes nearer to its colour over its whole floor.
+    assert (middles[1] < middles[0] - 10).mean() > 0.02
+    # A dashed ring adds about half the outline of the larger shape.
+    without = Room(box(3.0, 3.1, 7.0, 6.0), ("d07",), "independent", 4.2, False, 0.2)
+    draw_summary(tmp_path / "summary.png", grid, Prediction(grid, (without,)), [DOOR])
+    pixels = cv2.imread(str(tmp_path / "summary.png")).astype(int)
+    panel = pixels[:, pixels.shape[1] // 2 :] if pixels.shape[1] > pixels.shape[0] else pixels[len(pixels) // 2 :]
+    assert edges[0] > 1.1 * (np.abs(panel - colour).sum(axis=2) < 60).sum()
 
 
 def test_a_map_without_anything_known_or_any_door_is_still_a_picture(tmp_path: Path) -> None:

@@ -109,7 +109,7 @@ def _draw(rng: np.random.Generator, u: float) -> Hypotheses:
     low = np.column_stack((rng.integers(0, 60, 4) + int(u), np.zeros(4, dtype=np.int64)))
     boxes = np.concatenate((low, low + rng.integers(30, 90, (4, 2))), axis=1)
     corners = boxes[:, [[0, 1], [2, 1], [2, 3], [0, 3]]] * 0.05
-    return Hypotheses(boxes, corners, -np.sort(-rng.normal(size=4)), 0.0, 0, u, 0.0)
+    return Hypotheses(boxes, corners, -np.sort(-rng.normal(size=4)), 0.0, 0, u, 0.0, np.zeros((4, 1)))
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -121,7 +121,7 @@ def test_two_doors_are_chosen_as_well_as_by_trying_every_pair(seed: int) -> None
 
     def total(i: int, j: int) -> float:
         one = [
-            Hypotheses(s.boxes[[k]], s.corners[[k]], s.scores[[k]], s.angle, s.quarter, s.u, s.v)
+            Hypotheses(s.boxes[[k]], s.corners[[k]], s.scores[[k]], s.angle, s.quarter, s.u, s.v, s.measured)
             for s, k in zip(doors, (i, j), strict=True)
         ]
         _, both, _ = choose(one, 4)
