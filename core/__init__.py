@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
     from closedrooms.core.pose import Pose2
     from closedrooms.core.remarks import Remark
-    from closedrooms.core.room import Room
+    from closedrooms.core.room import Alternative, Room
     from closedrooms.core.rosmap import RosMap, read_map, read_ros_map, write_map
     from closedrooms.core.scan import LaserScan
     from closedrooms.core.tum import read_trajectory, write_trajectory
@@ -35,7 +35,7 @@ _HOMES = {
     "grid": ("FREE", "OCCUPIED", "UNKNOWN", "GridFrame", "OccupancyGrid"),
     "pose": ("Pose2",),
     "remarks": ("Remark",),
-    "room": ("Room",),
+    "room": ("Alternative", "Room"),
     "rosmap": ("RosMap", "read_map", "read_ros_map", "write_map"),
     "scan": ("LaserScan",),
     "tum": ("read_trajectory", "write_trajectory"),
@@ -46,6 +46,7 @@ __all__ = [
     "FREE",
     "OCCUPIED",
     "UNKNOWN",
+    "Alternative",
     "ClosedDoor",
     "ClosedroomsError",
     "DoorSighting",
