@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from closedrooms.core.grid import OccupancyGrid as OccupancyGrid
     from closedrooms.core.pose import Pose2 as Pose2
     from closedrooms.core.remarks import Remark as Remark
+    from closedrooms.core.room import Alternative as Alternative
     from closedrooms.core.room import Room as Room
     from closedrooms.core.rosmap import RosMap as RosMap
     from closedrooms.core.rosmap import read_map as read_map
@@ -54,7 +55,7 @@ _load, __dir__, __all__ = lazy_face(
         "grid": ("FREE", "OCCUPIED", "UNKNOWN", "GridFrame", "OccupancyGrid"),
         "pose": ("Pose2",),
         "remarks": ("Remark",),
-        "room": ("Room",),
+        "room": ("Alternative", "Room"),
         "rosmap": ("RosMap", "read_map", "read_ros_map", "write_map"),
         "scan": ("LaserScan",),
         "tum": ("read_trajectory", "write_trajectory"),
