@@ -29,9 +29,12 @@ map.on('layeradd', ({layer}) => {
   shape.dataset.label = handle.label;
   layer.setIcon(L.divIcon({html: shape, className: '', iconSize: null}));
   layer.getElement().setAttribute('aria-label', handle.kind + ' ' + handle.name);
-  for (const type of ['click', 'dragend']) layer.on(type, () => emitEvent('handle',
-    {type, kind: handle.kind, name: handle.name, x: layer.getLatLng().lng, y: layer.getLatLng().lat}));
+  const tell = type => emitEvent('handle',
+    {type, kind: handle.kind, name: handle.name, x: layer.getLatLng().lng, y: layer.getLatLng().lat});
+  for (const type of ['click', 'dragend']) layer.on(type, () => tell(type));
+  layer.on('keypress', ({originalEvent}) => originalEvent.key === 'Enter' && tell('click'));
 });
+document.addEventListener('keydown', e => (e.ctrlKey || e.metaKey) && e.key === 's' && e.preventDefault());
 true;
 """
 CSS = """
@@ -141,11 +144,21 @@ class MapBoard:
         self.shape(group, LineString(segment), **style)
 
     def handle(
-        self, group: str, point: Point, *, kind: str, name: str, label: str, colour: Colour, draggable: bool = False
+        self,
+        group: str,
+        point: Point,
+        *,
+        kind: str,
+        name: str,
+        label: str,
+        colour: Colour,
+        draggable: bool = False,
+        opacity: float = 1.0,
     ) -> None:
         """Draw a handle at a point [m]: something to click or to drag, or a mere note."""
         options = {
             "draggable": draggable,
+            "opacity": opacity,
             "interactive": kind != "note",
             "keyboard": kind != "note",
             "handle": {"kind": kind, "name": name, "label": label, "colour": css(colour)},
@@ -153,7 +166,7 @@ class MapBoard:
         self._add(group, self._map.marker(latlng=(point[1], point[0]), options=options))
 
     def fade(self, group: str, opacity: float) -> None:
-        """Set how opaque the pictures of a group are, 0..1."""
+        """Set how opaque the pictures or handles of a group are, 0..1."""
         for layer in self._groups.get(group, []):
             layer.run_method("setOpacity", opacity)
 

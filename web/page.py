@@ -1,8 +1,9 @@
 """The page itself: what a session holds, drawn with NiceGUI; what somebody does, handed to the session."""
 
-import asyncio
+import contextlib
 import math
 import time
+from collections.abc import Callable
 from typing import Any
 
 from nicegui import run, ui
@@ -53,6 +54,8 @@ KEYS = (
 ARROWS = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, 1), "ArrowDown": (0, -1)}
 STEP, BIG_STEP, PAN = 0.05, 0.5, 80
 TURNS = {"[": math.radians(5), "]": -math.radians(5), "{": math.radians(45), "}": -math.radians(45)}
+# How long a browser may take to connect [s].
+PATIENCE = 30.0
 # Rooms are filled this much where the slider is all on the side of the prediction.
 FILL = 0.35
 
@@ -64,7 +67,6 @@ class EditPage:
         self._session = session
         self._tour: CoverageTour | str | None = None
         self._busy = False
-        ui.add_css(CSS)
         ui.page_title(f"{session.config.map.name} - closedrooms")
         self._bar()
         with ui.element("div").classes("work"):
@@ -74,7 +76,7 @@ class EditPage:
             with ui.column().classes("side"):
                 self._status = ui.label("").props("data-id=status role=status aria-live=polite")
                 self._list = DoorList(session, self._done, self._select)
-        ui.keyboard(self._pressed, ignore=["input", "select", "textarea"])
+        self._keys = ui.keyboard(self._pressed, ignore=["input", "select", "textarea"])
 
     async def start(self) -> None:
         """Draw the map once the browser is there, offer the draft, predict."""
@@ -130,7 +132,9 @@ class EditPage:
             await self._done(self._session.change(lambda document: document.with_method(event.value)))
 
     async def _ask_settings(self) -> None:
+        self._keys.active = False
         settings = await ask_settings(self._session.document)
+        self._keys.active = True
         if settings is not None:
             await self._done(self._session.change(lambda _: settings))
 
@@ -150,6 +154,7 @@ class EditPage:
     def _faded(self) -> None:
         share = float(self._slider.value)
         self._board.fade("completed", share)
+        self._board.fade("notes", share)
         self._board.restyle("rooms", opacity=share, fillOpacity=FILL * share)
 
     # The map
@@ -262,7 +267,9 @@ class EditPage:
             )
             place = room.polygon.representative_point()
             label = f"{room.polygon.area:.1f} m²"
-            self._board.handle("notes", (place.x, place.y), kind="note", name=label, label=label, colour=INK)
+            self._board.handle(
+                "notes", (place.x, place.y), kind="note", name=label, label=label, colour=INK, opacity=share
+            )
 
     def _draw_tour(self) -> None:
         self._board.clear("tour")
@@ -326,7 +333,7 @@ class EditPage:
 
     async def _save(self) -> None:
         session = self._session
-        if session.out_is_taken and not await _ask(
+        if session.out_is_taken and not await self._ask(
             f"{session.out} holds files already. Replace what a prediction wrote there?", "replace", "keep it"
         ):
             return
@@ -349,22 +356,24 @@ class EditPage:
             return
         when = time.strftime("%d %B, %H:%M", time.localtime(draft.saved))
         question = f"On {when} you left {_count(len(draft.document.doors), 'door')} unsaved here. Go on with them?"
-        if await _ask(question, "go on", "begin anew"):
+        if await self._ask(question, "go on", "begin anew"):
             told = self._session.take(draft)
             if told:
                 _tell(told)
             self.draw()
 
-
-async def _ask(question: str, yes: str, no: str) -> bool:
-    with ui.dialog() as dialog, ui.card():
-        ui.label(question)
-        with ui.row().classes("w-full justify-end"):
-            ui.button(no, on_click=lambda: dialog.submit(False)).props("flat")
-            ui.button(yes, on_click=lambda: dialog.submit(True))
-    answer = await dialog
-    dialog.delete()
-    return bool(answer)
+    async def _ask(self, question: str, yes: str, no: str) -> bool:
+        """Ask before something; keys mean nothing meanwhile."""
+        self._keys.active = False
+        with ui.dialog() as dialog, ui.card():
+            ui.label(question)
+            with ui.row().classes("w-full justify-end"):
+                ui.button(no, on_click=lambda: dialog.submit(False)).props("flat")
+                ui.button(yes, on_click=lambda: dialog.submit(True))
+        answer = await dialog
+        dialog.delete()
+        self._keys.active = True
+        return bool(answer)
 
 
 def _show_keys() -> None:
@@ -394,9 +403,30 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-async def open_page(session: EditSession) -> None:
-    """Build the page of one visitor."""
-    page = EditPage(session)
-    await ui.context.client.connected(timeout=30.0)
-    await page.start()
-    await asyncio.sleep(0)
+async def open_page(begin: Callable[[], EditSession]) -> None:
+    """Build the page of one visitor.
+
+    Args:
+        begin: Reads the map and begins the session; takes seconds for a large one, and may refuse it.
+    """
+    ui.add_css(CSS)
+    ui.page_title("closedrooms")
+    waiting = ui.label("reading the map ...").classes("q-ma-lg")
+    # Who only fetches the page, or has left again, needs no map.
+    with contextlib.suppress(TimeoutError):
+        await ui.context.client.connected(timeout=PATIENCE)
+        try:
+            session = await run.io_bound(begin)
+        except ClosedroomsError as error:
+            waiting.delete()
+            _tell_trouble(str(error))
+            return
+        waiting.delete()
+        await EditPage(session).start()
+
+
+def _tell_trouble(text: str) -> None:
+    with ui.card().classes("q-ma-lg"):
+        ui.label("This map cannot be read.").classes("text-bold")
+        ui.label(text).props("role=alert")
+        ui.button("read it again", on_click=ui.navigate.reload)

@@ -3,12 +3,14 @@
 import secrets
 import socket
 import sys
+import threading
 import webbrowser
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from functools import partial
 from typing import Any
 
-from closedrooms.core.errors import ClosedroomsError, OutputError
+from closedrooms.core.errors import OutputError
 from closedrooms.core.incoming import check_regular
 from closedrooms.core.packages import require
 from closedrooms.pipeline.progress import Progress
@@ -54,6 +56,7 @@ class Desk:
     def __init__(self, config: EditConfig) -> None:
         self._config, self._drafts = config, Drafts()
         self._sheet: MapSheet | None = None
+        self._reading = threading.Lock()
 
     def session(self, visitor: str) -> EditSession:
         """Begin the session of a page.
@@ -61,8 +64,9 @@ class Desk:
         Raises:
             ClosedroomsError: The map cannot be read; the next visit tries again.
         """
-        if self._sheet is None:
-            self._sheet = open_sheet(self._config)
+        with self._reading:
+            if self._sheet is None:
+                self._sheet = open_sheet(self._config)
         return EditSession(self._config, self._sheet, self._drafts, visitor)
 
 
@@ -70,7 +74,7 @@ def _server(config: EditConfig, token: str, port: int) -> Any:
     """The web server with the page behind its gate."""
     import uvicorn
     from fastapi import FastAPI
-    from nicegui import run, ui
+    from nicegui import ui
     from starlette.requests import Request
 
     from closedrooms.web.page import open_page
@@ -78,16 +82,7 @@ def _server(config: EditConfig, token: str, port: int) -> Any:
     desk = Desk(config)
 
     async def page(request: Request) -> None:
-        try:
-            session = await run.io_bound(desk.session, request.scope["closedrooms_visitor"])
-        except ClosedroomsError as error:
-            ui.page_title("closedrooms")
-            with ui.card().classes("q-ma-lg"):
-                ui.label("This map cannot be read.").classes("text-bold")
-                ui.label(str(error)).props("role=alert data-id=trouble")
-                ui.button("read it again", on_click=ui.navigate.reload)
-            return
-        await open_page(session)
+        await open_page(partial(desk.session, request.scope["closedrooms_visitor"]))
 
     ui.page("/")(page)
     app = FastAPI(openapi_url=None)

@@ -73,7 +73,8 @@ def serve(tmp_path: Path) -> Iterator[Serve]:
 
     yield start
     for server in servers:
-        server.stop()
+        _, errors = server.stop()
+        assert "Traceback" not in errors, errors
 
 
 @pytest.fixture(scope="module")
@@ -254,11 +255,12 @@ def test_the_tour_the_completed_map_and_another_method_can_be_chosen(
     corridor: Path, tmp_path: Path, serve: Serve, chromium: Any
 ) -> None:
     doors = tmp_path / "doors.geojson"
-    point = {"type": "Point", "coordinates": [3.0, -0.1]}
-    doors.write_text(json.dumps({"type": "Feature", "properties": {"id": "a"}, "geometry": point}))
+    points = {"type": "MultiPoint", "coordinates": [[3.0, -0.1], [14.0, 5.0]]}
+    doors.write_text(json.dumps({"type": "Feature", "properties": {"id": "a"}, "geometry": points}))
     server = serve(corridor, "--doors", doors)
     with visiting(chromium, server.address) as visitor:
-        visitor.wait("^1 room behind 1 door")
+        visitor.wait("^1 room behind 2 doors")
+        assert visitor.behind()[1] == "it lies outside the known map"
         visitor.page.get_by_label("completed map").click()
         visitor.page.wait_for_function("document.querySelectorAll('.leaflet-image-layer').length === 2")
         visitor.page.get_by_label("tour").click()
@@ -300,12 +302,12 @@ def test_a_hostile_map_and_a_hostile_list_of_doors_are_told_on_the_page(
 def test_whoever_has_no_token_is_refused(corridor: Path, serve: Serve) -> None:
     server = serve(corridor)
     address = server.address.partition("?")[0]
-    for place in ("", "?token=", "?token=guess", "_nicegui_ws/socket.io/?EIO=4&transport=polling"):
-        with pytest.raises(urllib.error.HTTPError) as refused:
-            urllib.request.urlopen(address + place, timeout=30)
-        assert refused.value.code == 403
     foreign = urllib.request.Request(server.address, headers={"Host": "evil.example"})
-    with pytest.raises(urllib.error.HTTPError):
-        urllib.request.urlopen(foreign, timeout=30)
+    polling = "_nicegui_ws/socket.io/?EIO=4&transport=polling"
+    for request in (foreign, *(address + place for place in ("", "?token=", "?token=guess", polling))):
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(request, timeout=30)
+        assert refused.value.code == 403
+        refused.value.close()
     with urllib.request.urlopen(server.address, timeout=30) as answer:
         assert answer.status == 200
