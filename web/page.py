@@ -11,14 +11,12 @@ from nicegui.events import KeyEventArguments, UploadEventArguments, ValueChangeE
 
 from closedrooms.core.door import Point
 from closedrooms.core.errors import ClosedroomsError
-from closedrooms.core.names import shown
 from closedrooms.coverage.tour import CoverageTour
-from closedrooms.coverage.tour_features import make_tour_features
 from closedrooms.predictor.methods import METHODS
-from closedrooms.visualization.colours import INK, TOURS, Colour, room_colours
 from closedrooms.web.door_list import DoorList
-from closedrooms.web.map_board import HandleEvent, MapBoard, css
-from closedrooms.web.pictures import map_url
+from closedrooms.web.map_board import HandleEvent, MapBoard
+from closedrooms.web.map_layers import MapLayers
+from closedrooms.web.prompts import ask, count, icon_button, show_keys, switch, tell
 from closedrooms.web.session import EditSession
 from closedrooms.web.settings_dialog import ask_settings
 
@@ -38,26 +36,12 @@ body { margin: 0; }
   .wide { display: none; }
 }
 """
-KEYS = (
-    ("Ctrl+Z, Ctrl+Y", "undo, redo"),
-    ("Ctrl+S", "save"),
-    ("N", "set a door at the wall nearest to the middle of the view"),
-    ("P", "accept the best proposal that is left"),
-    ("Tab, Enter", "go from door to door on the map, select one"),
-    ("arrows", "move the selected door by 5 cm (Shift: 50 cm), or the view"),
-    ("[ ]", "turn the selected door by 5 degrees (Shift: 45)"),
-    ("Del", "delete the selected door"),
-    ("Esc", "select none"),
-    ("+ -", "zoom"),
-)
 # What a door or the view moves at a press of an arrow, x to the right and y up.
 ARROWS = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, 1), "ArrowDown": (0, -1)}
 STEP, BIG_STEP, PAN = 0.05, 0.5, 80
 TURNS = {"[": math.radians(5), "]": -math.radians(5), "{": math.radians(45), "}": -math.radians(45)}
 # How long a browser may take to connect [s].
 PATIENCE = 30.0
-# Rooms are filled this much where the slider is all on the side of the prediction.
-FILL = 0.35
 
 
 class EditPage:
@@ -72,6 +56,7 @@ class EditPage:
         with ui.element("div").classes("work"):
             with ui.element("div").classes("stage"):
                 self._board = MapBoard(self._clicked, self._pointed, self._handled)
+                self._layers = MapLayers(self._board, session)
                 self._pointer = ui.label("").classes("pointer").props("data-id=pointer")
             with ui.column().classes("side"):
                 self._status = ui.label("").props("data-id=status role=status aria-live=polite")
@@ -81,21 +66,19 @@ class EditPage:
     async def start(self) -> None:
         """Draw the map once the browser is there, offer the draft, predict."""
         await self._board.ready()
-        grid = self._session.sheet.read.grid
-        self._board.picture("map", map_url(grid), grid.frame.bounds)
-        self._board.show(self._session.sheet.bounds)
+        self._layers.draw_map()
         if self._session.trouble:
-            _tell(f"no doors were read: {self._session.trouble}", bad=True)
+            tell(f"no doors were read: {self._session.trouble}", bad=True)
         self.draw()
         await self._offer_draft()
         await self._refresh()
 
     def draw(self) -> None:
         """Draw doors, proposals, rooms and tour as they stand, and the lists beside."""
-        self._draw_rooms()
-        self._draw_doors()
-        self._draw_proposals()
-        self._draw_tour()
+        self._layers.draw_rooms()
+        self._layers.draw_doors()
+        self._layers.draw_proposals()
+        self._layers.draw_tour(self._tour)
         self._list.draw()
         for button, on in ((self._undo, self._session.can_undo), (self._redo, self._session.can_redo)):
             button.set_enabled(on)
@@ -107,24 +90,24 @@ class EditPage:
         session = self._session
         with ui.row().classes("bar"):
             ui.label(session.config.map.name).classes("text-bold wide")
-            self._undo = _button("undo", "undo (Ctrl+Z)", lambda: self._done(session.undo()))
-            self._redo = _button("redo", "redo (Ctrl+Y)", lambda: self._done(session.redo()))
-            _button("add_location", "set a door in the middle of the view (N)", self._door_in_the_middle)
+            self._undo = icon_button("undo", "undo (Ctrl+Z)", lambda: self._done(session.undo()))
+            self._redo = icon_button("redo", "redo (Ctrl+Y)", lambda: self._done(session.redo()))
+            icon_button("add_location", "set a door in the middle of the view (N)", self._door_in_the_middle)
             self._method = ui.select(list(METHODS), value=session.document.method, on_change=self._method_chosen)
             self._method.props("dense options-dense label=method data-id=method").classes("w-32")
-            _button("tune", "settings of the method", self._ask_settings)
-            self._completed = _switch("completed map", self.draw)
-            self._with_tour = _switch("tour", self._tour_switched)
+            icon_button("tune", "settings of the method", self._ask_settings)
+            self._completed = switch("completed map", self._completed_switched)
+            self._with_tour = switch("tour", self._tour_switched)
             with ui.row().classes("items-center no-wrap gap-2"):
                 ui.label("map").classes("wide")
                 self._slider = ui.slider(min=0, max=1, step=0.05, value=1, on_change=self._faded).classes("w-28")
                 self._slider.props('aria-label="between map and prediction" data-id=slider')
                 ui.label("prediction").classes("wide")
             ui.space()
-            _button("folder_open", "take doors from a GeoJSON file", self._pick_file)
+            icon_button("folder_open", "take doors from a GeoJSON file", self._pick_file)
             self._upload = ui.upload(on_upload=self._uploaded, auto_upload=True, max_file_size=20_000_000)
             self._upload.classes("hidden")
-            _button("help_outline", "keys", _show_keys)
+            icon_button("help_outline", "keys", show_keys)
             ui.button("save", icon="save", on_click=self._save).props("dense data-id=save")
 
     async def _method_chosen(self, event: ValueChangeEventArguments[Any]) -> None:
@@ -140,7 +123,7 @@ class EditPage:
 
     async def _tour_switched(self) -> None:
         self._tour = None
-        self._draw_tour()
+        self._layers.draw_tour(self._tour)
         await self._plan_tour()
 
     def _pick_file(self) -> None:
@@ -152,10 +135,11 @@ class EditPage:
         await self._done(self._session.load_doors(event.file.name, content))
 
     def _faded(self) -> None:
-        share = float(self._slider.value)
-        self._board.fade("completed", share)
-        self._board.fade("notes", share)
-        self._board.restyle("rooms", opacity=share, fillOpacity=FILL * share)
+        self._layers.fade(float(self._slider.value))
+
+    def _completed_switched(self) -> None:
+        self._layers.with_completed = bool(self._completed.value)
+        self.draw()
 
     # The map
 
@@ -219,71 +203,12 @@ class EditPage:
         step = BIG_STEP if far else STEP
         await self._done(self._session.change(lambda document: document.shifted(name, (right * step, up * step))))
 
-    # What is drawn
-
-    def _colours(self) -> dict[str, Colour]:
-        return room_colours(door.id for door in self._session.document.doors)
-
-    def _draw_doors(self) -> None:
-        self._board.clear("doors")
-        colours = self._colours()
-        for door in self._session.document.doors:
-            segment, chosen = self._session.segment(door), door.id == self._session.selected
-            self._board.line("doors", segment, color="#000", weight=9, lineCap="butt")
-            self._board.line("doors", segment, color=css(colours[door.id]), weight=5, lineCap="butt")
-            middle = self._session.sheet.point_on_grid(door.midpoint)
-            kind, label = "chosen" if chosen else "door", shown(door.id, longest=16)
-            self._board.handle(
-                "doors", middle, kind=kind, name=door.id, label=label, colour=colours[door.id], draggable=True
-            )
-            for jamb, point in enumerate(segment if chosen else ()):
-                self._board.handle(
-                    "doors", point, kind="jamb", name=str(jamb), label="", colour=colours[door.id], draggable=True
-                )
-
-    def _draw_proposals(self) -> None:
-        self._board.clear("proposals")
-        for number, proposal in self._session.open_proposals:
-            self._board.line("proposals", proposal.segment, color="#fff", weight=8, lineCap="butt")
-            self._board.line("proposals", proposal.segment, color=css(INK), weight=4, dashArray="6 5", lineCap="butt")
-            label = f"{proposal.score:.2f}"
-            self._board.handle(
-                "proposals", proposal.midpoint, kind="proposal", name=str(number), label=label, colour=INK
-            )
-
-    def _draw_rooms(self) -> None:
-        for group in ("completed", "rooms", "notes"):
-            self._board.clear(group)
-        outcome, share, colours = self._session.outcome, float(self._slider.value), self._colours()
-        if outcome is None or outcome.prediction is None:
-            return
-        if self._completed.value:
-            grid = outcome.prediction.grid
-            self._board.picture("completed", map_url(grid), grid.frame.bounds, share)
-        for room in outcome.rooms:
-            colour = css(next((colours[door] for door in room.doors if door in colours), INK))
-            self._board.shape(
-                "rooms", room.polygon, color=colour, weight=2, opacity=share, fillColor=colour, fillOpacity=FILL * share
-            )
-            place = room.polygon.representative_point()
-            label = f"{room.polygon.area:.1f} m²"
-            self._board.handle(
-                "notes", (place.x, place.y), kind="note", name=label, label=label, colour=INK, opacity=share
-            )
-
-    def _draw_tour(self) -> None:
-        self._board.clear("tour")
-        if isinstance(self._tour, CoverageTour):
-            for shape, about in make_tour_features(self._tour, "predicted"):
-                if about["type"] == "tour":
-                    self._board.shape("tour", shape, color=css(TOURS["predicted"]), weight=3, opacity=0.8)
-
     # What comes of it
 
     async def _done(self, told: str) -> None:
         """After an action: tell what it said, draw what stands, predict anew."""
         if told:
-            _tell(told)
+            tell(told)
         self.draw()
         await self._refresh()
 
@@ -312,7 +237,7 @@ class EditPage:
         elif not doors:
             text = "click on a wall where a closed door is, or on a dashed proposal"
         else:
-            text = f"{_count(len(outcome.rooms), 'room')} behind {_count(len(doors), 'door')}, {outcome.seconds:.2f} s"
+            text = f"{count(len(outcome.rooms), 'room')} behind {count(len(doors), 'door')}, {outcome.seconds:.2f} s"
         if isinstance(self._tour, str):
             text += f"; {self._tour}"
         elif self._tour is not None:
@@ -328,7 +253,7 @@ class EditPage:
             tour = await run.io_bound(self._session.tour)
             if outcome is self._session.outcome and not self._session.stale:
                 self._tour = tour
-                self._draw_tour()
+                self._layers.draw_tour(self._tour)
         self._say_outcome()
 
     async def _save(self) -> None:
@@ -341,66 +266,33 @@ class EditPage:
         try:
             report = await run.io_bound(session.save)
         except ClosedroomsError as error:
-            _tell(f"not saved: {error}", bad=True)
+            tell(f"not saved: {error}", bad=True)
         else:
-            _tell(f"saved to {report.folder}: {report.title}")
+            tell(f"saved to {report.folder}: {report.title}")
         self._say_outcome()
 
     async def _offer_draft(self) -> None:
         try:
             draft = self._session.draft()
         except ClosedroomsError as error:
-            _tell(f"what was left of the last visit cannot be read: {error}", bad=True)
+            tell(f"what was left of the last visit cannot be read: {error}", bad=True)
             return
         if draft is None:
             return
         when = time.strftime("%d %B, %H:%M", time.localtime(draft.saved))
-        question = f"On {when} you left {_count(len(draft.document.doors), 'door')} unsaved here. Go on with them?"
+        question = f"On {when} you left {count(len(draft.document.doors), 'door')} unsaved here. Go on with them?"
         if await self._ask(question, "go on", "begin anew"):
             told = self._session.take(draft)
             if told:
-                _tell(told)
+                tell(told)
             self.draw()
 
     async def _ask(self, question: str, yes: str, no: str) -> bool:
         """Ask before something; keys mean nothing meanwhile."""
         self._keys.active = False
-        with ui.dialog() as dialog, ui.card():
-            ui.label(question)
-            with ui.row().classes("w-full justify-end"):
-                ui.button(no, on_click=lambda: dialog.submit(False)).props("flat")
-                ui.button(yes, on_click=lambda: dialog.submit(True))
-        answer = await dialog
-        dialog.delete()
+        answer = await ask(question, yes, no)
         self._keys.active = True
-        return bool(answer)
-
-
-def _show_keys() -> None:
-    with ui.dialog() as dialog, ui.card(), ui.grid(columns="auto 1fr"):
-        for keys, what in KEYS:
-            ui.label(keys).classes("text-bold")
-            ui.label(what)
-    dialog.set_value(True)
-
-
-def _button(icon: str, about: str, work: Any) -> ui.button:
-    button = ui.button(icon=icon, on_click=work).props(f'flat dense round aria-label="{about}"')
-    button.tooltip(about)
-    return button
-
-
-def _switch(about: str, work: Any) -> ui.switch:
-    return ui.switch(about, value=False, on_change=work).props(f'dense aria-label="{about}"')
-
-
-def _tell(text: str, *, bad: bool = False) -> None:
-    kind: Any = "negative" if bad else "info"
-    ui.notify(shown(text, longest=600), type=kind, multi_line=True, close_button=True, timeout=0 if bad else 6000)
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+        return answer
 
 
 async def open_page(begin: Callable[[], EditSession]) -> None:

@@ -48,8 +48,6 @@ class EditSession:
         except InvalidInputError as error:
             self.trouble = str(error)
         self._history = History(Document(config.method, config.predictor, as_saved(doors)))
-        self._begun = self._history.present
-        self._last_saved: Document | None = None
         self.selected: str | None = None
         self.outcome: Outcome | None = None
         self._predicted: Document | None = None
@@ -75,11 +73,6 @@ class EditSession:
     def stale(self) -> bool:
         """Whether the prediction is older than the document."""
         return self._predicted is None or not _same_prediction(self._predicted, self.document)
-
-    @property
-    def unsaved(self) -> bool:
-        """Whether something stands in no folder yet."""
-        return self.document not in (self._last_saved, self._begun)
 
     @property
     def open_proposals(self) -> list[tuple[int, DoorProposal]]:
@@ -237,7 +230,6 @@ class EditSession:
             allow_outside=self.config.allow_outside, predictor=document.settings,
         )  # fmt: skip
         report = save_rooms(config, document.doors, self.config.coverage)
-        self._last_saved = document
         if self.document is document:
             self._drafts.forget(self._visitor, self.config.map)
         return report

@@ -245,6 +245,11 @@ def test_a_proposal_is_accepted_another_dismissed_and_a_door_renamed_turned_and_
         page.wait_for_function(
             "before => document.querySelectorAll('[data-id=doors] input')[2].value !== before", arg=before
         )
+        page.locator("body").press("Escape")
+        page.locator(".handle-chosen").wait_for(state="detached")
+        page.get_by_role("button", name="door kitchen").focus()
+        page.keyboard.press("Enter")
+        page.locator(".handle-chosen").wait_for(timeout=WAIT)
         page.locator("body").press("Delete")
         visitor.wait("click on a wall")
         # A narrow screen shows all of the page without a sideways scroll.
