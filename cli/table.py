@@ -47,6 +47,18 @@ COMMANDS = (
         "pipeline.propose_doors:doors_map",
     ),
     Command(
+        "edit",
+        "Mark closed doors on a map in the browser and see the rooms behind them at once.",
+        "web.config:EditConfig",
+        "web.server:edit_map",
+    ),
+    Command(
+        "view",
+        "Open the recording of a result in the rerun viewer.",
+        "pipeline.view_config:ViewConfig",
+        "pipeline.view:view_recording",
+    ),
+    Command(
         "worlds list",
         "List the bundled worlds, one a line, its name first.",
         "pipeline.config:ListWorlds",

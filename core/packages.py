@@ -18,6 +18,7 @@ BROUGHT_BY = {
     "distributed": "'closedrooms[cluster]'",
     "gtsam": "'closedrooms[slam]'",
     "rosbags": "'closedrooms[bags]'",
+    "nicegui": "'closedrooms[web]'",
 }
 
 

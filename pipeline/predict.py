@@ -1,17 +1,18 @@
 """``closedrooms predict``: the predictor on anybody's map."""
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
 from closedrooms.core.geojson import read_doors, write_doors, write_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.report import Report
 from closedrooms.core.room import Room
-from closedrooms.core.rosmap import read_ros_map, write_map, write_raw_map
+from closedrooms.core.rosmap import RosMap, read_ros_map, write_map, write_raw_map
 from closedrooms.pipeline.config import PredictConfig
 from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
@@ -24,13 +25,24 @@ from closedrooms.visualization.no_recording import no_recording
 if TYPE_CHECKING:
     from closedrooms.visualization.rerun.recorder import Recorder
 
+Beside = Callable[[Path, RosMap, Prediction], dict[str, Any]]
+"""Writes more files into the folder of a prediction; what it returns joins the manifest."""
 
-def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> Report:
+
+def predict_map(
+    config: PredictConfig,
+    *,
+    progress: Progress | None = None,
+    given: Sequence[ClosedDoor] | None = None,
+    beside: Beside | None = None,
+) -> Report:
     """Read a map and its closed doors, predict the rooms behind them, write the folder.
 
     Args:
         config: Options.
         progress: Told what is done.
+        given: Doors in the map frame, in place of those in the file ``config.doors``.
+        beside: Writes more into the folder.
 
     Returns:
         The rooms by door and what failed; all of it is written to ``config.out``.
@@ -45,7 +57,7 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> R
         progress.stage("read")
         read = read_ros_map(config.map, allow_outside=config.allow_outside)
         remarks = list(read.remarks)
-        given = read_doors(config.doors, remarks=remarks)
+        given = read_doors(config.doors, remarks=remarks) if given is None else given
         grid, doors = read.grid, read.doors_on_grid(given)
     manifest: dict[str, Any] = {
         "command": "predict",
@@ -77,6 +89,7 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> R
             from closedrooms.visualization.summary import draw_summary
 
             draw_summary(folder / "summary.png", observed, prediction, doors)
+            manifest |= beside(folder, read, prediction) if beside is not None else {}
         manifest["doors"] = {"given": [door.id for door in doors], "failures": prediction.failures}
         manifest["remarks"] = [remark.as_json() for remark in remarks]
         manifest["durations"] = watch.seconds()

@@ -22,7 +22,8 @@ MAY_IMPORT = {
     "visualization": {*GROUND} - {"pipeline"},
     "pipeline": {*GROUND},
     "experiments": {*GROUND, "experiments"},
-    "cli": {*GROUND, "experiments", "cli"},
+    "web": {*GROUND, "experiments", "web"},
+    "cli": {*GROUND, "experiments", "web", "cli"},
 }
 # What decides; the true pose is told to the pipeline alone.
 DECIDING = ("mapping", "predictor", "coverage", "navigation")

@@ -18,6 +18,8 @@ REQUIRED = {
     "cover": ("m.yaml", "--out", "o"),
     "map": ("log", "--out", "o"),
     "doors": ("m.yaml", "--out", "o"),
+    "edit": ("m.yaml",),
+    "view": ("o",),
     "worlds show": ("office-01", "--out", "o"),
     "worlds generate": ("--kind", "office", "--out", "o"),
     "worlds convert": ("office-01", "o", "--to", "json"),

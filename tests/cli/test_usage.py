@@ -4,7 +4,9 @@ import pytest
 
 USAGE = {
     ("rum",): "unknown command 'rum'; did you mean run?",
-    ("teleport",): "unknown command 'teleport'; expected one of run, predict, cover, map, doors, worlds, dataset,",
+    (
+        "teleport",
+    ): "unknown command 'teleport'; expected one of run, predict, cover, map, doors, edit, view, worlds, dataset,",
     ("--seed", "3"): "--seed before a command",
     ("worlds",): "no command after closedrooms worlds; expected one of list, show, generate, convert",
     ("worlds", "shw", "office-01"): "unknown command 'shw'; did you mean show?",

@@ -1,0 +1,194 @@
+"""The map to pan and zoom: Leaflet in a flat coordinate system, its units metres of the grid's frame."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from nicegui import ui
+from shapely.geometry import LineString, mapping
+from shapely.geometry.base import BaseGeometry
+
+from closedrooms.core.door import Point, Segment
+from closedrooms.visualization.colours import Colour
+
+# A metre takes 2 ** zoom pixels: from a campus on a telephone to a cell of a centimetre. Leaflet is loaded after these
+# options are read, so that the flat coordinate system has to be asked for when the map is made.
+OPTIONS = """{get crs() { return window.L.CRS.Simple; }, minZoom: -6, maxZoom: 11, zoomSnap: 0.25,
+attributionControl: false, keyboard: false, doubleClickZoom: false}"""
+# The scale bar, and markers as handles that tell when they are clicked or dragged: NiceGUI's Leaflet passes neither.
+SCRIPT = """
+const map = getElement(%d).map;
+L.control.scale({imperial: false, maxWidth: 160}).addTo(map);
+map.on('layeradd', ({layer}) => {
+  const handle = layer.options.handle;
+  if (!handle || layer.told) return;
+  layer.told = true;
+  const shape = document.createElement('div');
+  shape.className = 'handle handle-' + handle.kind;
+  shape.style.setProperty('--colour', handle.colour);
+  shape.dataset.label = handle.label;
+  layer.setIcon(L.divIcon({html: shape, className: '', iconSize: null}));
+  layer.getElement().setAttribute('aria-label', handle.kind + ' ' + handle.name);
+  const tell = type => emitEvent('handle',
+    {type, kind: handle.kind, name: handle.name, x: layer.getLatLng().lng, y: layer.getLatLng().lat});
+  for (const type of ['click', 'dragend']) layer.on(type, () => tell(type));
+  layer.on('keypress', ({originalEvent}) => originalEvent.key === 'Enter' && tell('click'));
+});
+document.addEventListener('keydown', e => (e.ctrlKey || e.metaKey) && e.key === 's' && e.preventDefault());
+true;
+"""
+CSS = """
+.leaflet-container { background: #dedede; font: inherit; }
+.leaflet-image-layer { image-rendering: pixelated; }
+.handle { position: absolute; transform: translate(-50%, -50%); width: 16px; height: 16px; border-radius: 50%;
+  background: #fff; border: 3px solid var(--colour); cursor: grab; }
+.handle::before { content: ''; position: absolute; inset: -12px; }
+.handle::after { content: attr(data-label); position: absolute; left: 14px; bottom: 8px; white-space: nowrap;
+  border-radius: 9px; font-size: 12px; line-height: 18px; padding: 0 6px; color: #222; background: #fff;
+  border: 2px solid var(--colour); }
+.handle[data-label='']::after { display: none; }
+.handle-chosen { background: #222; }
+.handle-chosen::after { background: #222; color: #fff; }
+.handle-jamb { width: 12px; height: 12px; border-radius: 2px; cursor: crosshair; }
+.handle-jamb::before { inset: -6px; }
+.handle-proposal { width: 8px; height: 8px; border: 0; background: none; cursor: pointer; }
+.handle-proposal::after { border-style: dashed; }
+.handle-note { width: 0; height: 0; border: 0; background: none; pointer-events: none; }
+.handle-note::after { left: 0; bottom: 0; transform: translate(-50%, 50%); border: 0; font-weight: 600;
+  background: rgba(255, 255, 255, .8); }
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class HandleEvent:
+    """Something happened to a handle.
+
+    Attributes:
+        type: ``click`` or ``dragend``.
+        kind: As it was drawn.
+        name: As it was drawn.
+        point: Where it is now, frame of the grid [m].
+    """
+
+    type: str
+    kind: str
+    name: str
+    point: Point
+
+
+class MapBoard:
+    """The map element; layers are drawn in named groups, of which each replaces its last one.
+
+    Args:
+        on_click: Told where somebody clicked, frame of the grid [m].
+        on_pointer: Told where the pointer is [m].
+        on_handle: Told of handles.
+    """
+
+    def __init__(
+        self,
+        on_click: Callable[[Point], Any],
+        on_pointer: Callable[[Point], Any],
+        on_handle: Callable[[HandleEvent], Any],
+    ) -> None:
+        ui.add_css(CSS)
+        self._map = ui.leaflet(center=(0.0, 0.0), zoom=4).classes("board")
+        self._map.props[":options"] = OPTIONS
+        self._map.clear_layers()
+        self._groups: dict[str, list[Any]] = {}
+        self._map.on("map-click", lambda event: on_click(_point(event.args)))
+        self._map.on("map-mousemove", lambda event: on_pointer(_point(event.args)), throttle=0.1)
+        ui.on("handle", lambda event: on_handle(_handle(event.args)))
+
+    async def ready(self) -> None:
+        """Wait until the browser has made the map, and add what NiceGUI's element lacks."""
+        await self._map.initialized()
+        await ui.run_javascript(SCRIPT % self._map.id, timeout=10.0)
+
+    def show(self, bounds: tuple[float, float, float, float]) -> None:
+        """Fit the view to ``(x_min, y_min, x_max, y_max)`` [m]."""
+        x0, y0, x1, y1 = bounds
+        self._map.run_map_method("fitBounds", [[y0, x0], [y1, x1]])
+
+    def pan(self, right: float, down: float) -> None:
+        """Move the view by pixels."""
+        self._map.run_map_method("panBy", [right, down])
+
+    def zoom(self, steps: int) -> None:
+        """Go nearer, or further away."""
+        self._map.run_map_method("zoomIn" if steps > 0 else "zoomOut", abs(steps))
+
+    @property
+    def middle(self) -> Point:
+        """The middle of the view, frame of the grid [m]."""
+        y, x = self._map.center
+        return (float(x), float(y))
+
+    def clear(self, group: str) -> None:
+        """Remove a group of layers."""
+        for layer in self._groups.pop(group, []):
+            self._map.remove_layer(layer)
+
+    def picture(self, group: str, url: str, bounds: tuple[float, float, float, float], opacity: float = 1.0) -> None:
+        """Draw a picture over ``(x_min, y_min, x_max, y_max)`` [m]."""
+        x0, y0, x1, y1 = bounds
+        self._add(group, self._map.image_overlay(url=url, bounds=[[y0, x0], [y1, x1]], options={"opacity": opacity}))
+
+    def shape(self, group: str, geometry: BaseGeometry, **style: Any) -> None:
+        """Draw a geometry [m]; ``style`` as Leaflet's paths take it."""
+        options = {"style": style, "interactive": False}
+        self._add(group, self._map.generic_layer(name="geoJSON", args=[mapping(geometry), options]))
+
+    def line(self, group: str, segment: Segment, **style: Any) -> None:
+        """Draw a segment [m]."""
+        self.shape(group, LineString(segment), **style)
+
+    def handle(
+        self,
+        group: str,
+        point: Point,
+        *,
+        kind: str,
+        name: str,
+        label: str,
+        colour: Colour,
+        draggable: bool = False,
+        opacity: float = 1.0,
+    ) -> None:
+        """Draw a handle at a point [m]: something to click or to drag, or a mere note."""
+        options = {
+            "draggable": draggable,
+            "opacity": opacity,
+            "interactive": kind != "note",
+            "keyboard": kind != "note",
+            "handle": {"kind": kind, "name": name, "label": label, "colour": css(colour)},
+        }
+        self._add(group, self._map.marker(latlng=(point[1], point[0]), options=options))
+
+    def fade(self, group: str, opacity: float) -> None:
+        """Set how opaque the pictures or handles of a group are, 0..1."""
+        for layer in self._groups.get(group, []):
+            layer.run_method("setOpacity", opacity)
+
+    def restyle(self, group: str, **style: Any) -> None:
+        """Change the style of the shapes of a group."""
+        for layer in self._groups.get(group, []):
+            layer.run_method("setStyle", style)
+
+    def _add(self, group: str, layer: Any) -> None:
+        self._groups.setdefault(group, []).append(layer)
+
+
+def css(colour: Colour) -> str:
+    """A colour as style sheets write it."""
+    return "#{:02x}{:02x}{:02x}".format(*colour)
+
+
+def _point(args: Any) -> Point:
+    place = args["latlng"]
+    return (float(place["lng"]), float(place["lat"]))
+
+
+def _handle(args: Any) -> HandleEvent:
+    point = (float(args["x"]), float(args["y"]))
+    return HandleEvent(str(args["type"]), str(args["kind"]), str(args["name"]), point)
