@@ -1,16 +1,26 @@
 """Pictures of a recording as the viewer shows it, one a tab: ``python benchmarks/screenshots.py run.rrd OUT``.
 
 Needs no screen and no GPU (Debian: ``mesa-vulkan-drivers libvulkan1``). Unlike ``rerun --screenshot-to`` it waits for
-the recording to be loaded, and it can go through all tabs and to any time.
+the recording to be loaded, and it goes through all tabs, tabs within tabs too, at any number of times. Says which
+views are empty: what a view shows between its frame and its title is one colour.
 """
 
+import sys
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import tyro
+from PIL import Image
 from rerun.experimental import ViewerClient
+
+# A view without content shows its background, a hint in its middle at most. So many of its pixels must differ from the
+# commonest colour: one letter has 20, the hint of an empty view is known by its text [pixels].
+LEAST_DRAWN = 40
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,61 +33,59 @@ class ScreenshotConfig:
     """Folder for ``<tab>.png``."""
     tabs: tuple[str, ...] = ()
     """Names of the tabs; all by default."""
-    sim_time: float | None = None
-    """Time of the simulation to go to [s]; the end by default."""
-    stage: int | None = None
-    """Step of the timeline ``stage`` to go to instead."""
-    settle: float = 2.0
-    """How long the viewer may load and draw before a picture is taken [s]."""
+    sim_times: tuple[float, ...] = ()
+    """Times of the simulation to go to [s]; the end by default."""
+    stages: tuple[int, ...] = ()
+    """Steps of the timeline ``stage`` to go to."""
+    settle: float = 1.0
+    """How long the viewer may draw before a picture is taken [s]; four times as long to load."""
     width: int = 1400
     """Width of the pictures [pixels]."""
     port: int = 9877
     """Port of the viewer that is started."""
 
 
-def take(config: ScreenshotConfig) -> list[Path]:
-    """Start a viewer, open the recording, take one picture a tab."""
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """One picture.
+
+    Attributes:
+        tab: Names of the tabs that it shows, from the outermost.
+        moment: ``sim_time`` or ``stage`` with its value, or ``end``.
+        path: The file.
+        empty: Names of views that show nothing.
+    """
+
+    tab: str
+    moment: str
+    path: Path
+    empty: tuple[str, ...]
+
+
+def take(config: ScreenshotConfig) -> list[Shot]:
+    """Start a viewer, open the recording, take one picture a tab and moment."""
     config.out.mkdir(parents=True, exist_ok=True)
-    pictures = []
+    moments: list[tuple[str, dict[str, Any]]] = [
+        *((f"t{at:05.0f}", {"timeline": "sim_time", "duration": at}) for at in config.sim_times),
+        *((f"stage{at:02d}", {"timeline": "stage", "sequence": at}) for at in config.stages),
+    ]
+    shots = []
     with ViewerClient.spawn(headless=True, port=config.port) as viewer:
         viewer.open(str(config.recording.resolve()))
-        time.sleep(config.settle)
+        time.sleep(4 * config.settle)
         blueprint = viewer.get_blueprint().blueprint
-        root, tabs = _tabs(blueprint)
-        for name, tab in tabs.items():
-            if config.tabs and name not in config.tabs:
+        for name, choices in list(_tabs(blueprint)):
+            if config.tabs and name.split(" - ")[0] not in config.tabs:
                 continue
-            blueprint[root]["ContainerBlueprint"]["active_tab"] = tab
+            for container, tab in choices:
+                blueprint[container]["ContainerBlueprint"]["active_tab"] = tab
             viewer.set_blueprint(blueprint, of="recording")
-            if config.stage is not None:
-                viewer.set_time("stage", sequence=config.stage, play_state="paused")
-            elif config.sim_time is not None:
-                viewer.set_time("sim_time", duration=config.sim_time, play_state="paused")
-            time.sleep(config.settle)
-            pictures.append(config.out / f"{name.lower()}.png")
-            pictures[-1].write_bytes(viewer.take_screenshot(max_size=config.width))
-            for view in viewer.get_state().views:
-                print(*(f"{name}: {view.name}: {report}" for report in view.reports), sep="\n", end="")
-    return pictures
-
-
-def _tabs(blueprint: dict[str, Any]) -> tuple[str, dict[str, str]]:
-    """Path of the outermost tab container, and its tabs by name."""
-    containers = {
-        path: content["ContainerBlueprint"] for path, content in blueprint.items() if "ContainerBlueprint" in content
-    }
-    inner = {f"/{path}" for container in containers.values() for path in container["contents"]}
-    root = next(path for path in containers if path not in inner and "active_tab" in containers[path])
-    return root, {_name(blueprint[f"/{tab}"]): tab for tab in containers[root]["contents"]}
-
-
-def _name(content: dict[str, Any]) -> str:
-    """What a tab that holds a container or a single view is called."""
-    return str(
-        next(content[kind]["display_name"] for kind in ("ContainerBlueprint", "ViewBlueprint") if kind in content)
-    )
-
-
-if __name__ == "__main__":
-    for picture in take(tyro.cli(ScreenshotConfig)):
-        print(picture)
+            for moment, where in moments or [("end", {})]:
+                if where:
+                    rest = {key: value for key, value in where.items() if key != "timeline"}
+                    viewer.set_time(where["timeline"], play_state="paused", **rest)
+                time.sleep(config.settle)
+                path = config.out / f"{_file_name(name)}-{moment}.png"
+                path.write_bytes(viewer.take_screenshot(max_size=config.width))
+                shots.append(Shot(name, moment, path, tuple(_empty_views(viewer, path))))
+    return shots

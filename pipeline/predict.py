@@ -114,11 +114,9 @@ def _recording(config: PredictConfig, grid: OccupancyGrid, path: Path) -> Iterat
     if not config.record:
         yield no_recording()
         return
-    from closedrooms.visualization.rerun.blueprint import Layout
     from closedrooms.visualization.rerun.recorder import Recorder
 
     row, col, rows, cols = grid.known_bounds() or (0, 0, *grid.frame.shape)
     bounds = grid.frame.cropped(row, col, rows, cols).bounds
-    layout = Layout(bounds, building=False, mapping=False, coverage=False)
-    with Recorder(path, name=config.map.stem, layout=layout) as recorder:
+    with Recorder(path, name=config.map.stem, bounds=bounds) as recorder:
         yield recorder

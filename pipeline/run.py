@@ -27,11 +27,13 @@ from closedrooms.pipeline.bounds import check_size, too_narrow
 from closedrooms.pipeline.config import RunConfig
 from closedrooms.pipeline.drive import DriveResult, DriveSettings, drive_tour
 from closedrooms.pipeline.drive_report import draw_drive, drive_features, drive_metrics
+from closedrooms.pipeline.live_recording import GrowingPrediction
 from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.report import markdown, run_report
 from closedrooms.pipeline.run_log import RunLog
 from closedrooms.pipeline.run_metrics import run_metrics
+from closedrooms.pipeline.scores import room_iou
 from closedrooms.pipeline.stopwatch import Stopwatch
 from closedrooms.pipeline.survey import Survey, Truth, survey_building, true_building
 from closedrooms.predictor.methods import predict
@@ -41,6 +43,7 @@ from closedrooms.visualization.rerun.opening import open_recording
 from closedrooms.worlds.closing import check_closed, closable_rooms, draw_closed
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan
+from closedrooms.worlds.truth import true_rooms
 
 if TYPE_CHECKING:
     from closedrooms.visualization.rerun.recorder import Recorder
@@ -106,9 +109,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
     name, record = f"{plan.name}-{config.seed}", config.record
     with (
         output_folder(folder, manifest) as staging,
-        open_recording(
-            staging / "run.rrd" if record else None, plan, config.sim.robot, name=name, driving=config.drive
-        ) as recorder,
+        open_recording(staging / "run.rrd" if record else None, config.sim.robot, name=name) as recorder,
         Simulation(plan, closed, config.sim, config.seed) as sim,
     ):
         recorder.configuration(manifest["configuration"])
@@ -144,13 +145,20 @@ def _find_out(
 ) -> Finding:
     """Explore, predict, plan tours and, on demand, drive the predicted one."""
     plan, map_T_world = log.sim.plan, log.sim.world_T_map.inverse()
-    survey = survey_building(log, mapper, config.navigation, recorder=recorder, progress=progress, watch=watch)
+    growth = None
+    if config.record:
+        method = partial(predict, method=config.method, config=config.predictor, trace=True)
+        growth = GrowingPrediction(recorder, method, true_rooms(plan, closed, map_T_world))
+    survey = survey_building(
+        log, mapper, config.navigation, recorder=recorder, growth=growth, progress=progress, watch=watch
+    )
     with watch.stage("predict"):
         progress.stage("predict")
         prediction = predict(survey.grid, survey.doors, config.method, config.predictor, trace=config.record)
         truth = true_building(plan, closed, prediction.grid.frame, map_T_world)
-        recorder.prediction(survey.grid, survey.doors, prediction)
         recorder.truth(truth.grid, truth.rooms)
+        iou = room_iou(prediction.rooms, truth.rooms)
+        recorder.prediction(survey.grid, survey.doors, prediction, iou=iou)
     survey = replace(survey, grid=survey.grid.on(truth.grid.frame))
     prediction = replace(prediction, grid=prediction.grid.on(truth.grid.frame))
     with watch.stage("cover"):

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.room import Room
 from closedrooms.predictor.best.candidates import window_around
 from closedrooms.predictor.best.door_frame import DoorFrame, TurnedMap, Window, door_frame, find_faces_in
@@ -70,7 +70,7 @@ def _find_faces(scene: Scene) -> tuple[FloatArray, FloatArray]:
     return np.concatenate(lines), np.concatenate(facing)
 
 
-def _find_runs(edges: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+def _find_runs(edges: BoolArray) -> tuple[IntArray, IntArray, IntArray]:
     """Find stretches of edges along the rows: row, first edge and the one after the last, each of shape (n,)."""
     steps = np.diff(np.pad(edges.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     row, low = np.nonzero(steps == 1)

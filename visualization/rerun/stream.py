@@ -9,10 +9,10 @@ from types import TracebackType
 from typing import Any, Self
 
 import rerun as rr
+import rerun.blueprint as rrb
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import OutputError
-from closedrooms.visualization.rerun.blueprint import Layout, arrange
 
 APPLICATION = "closedrooms"
 # Chunks are cut by size alone: a cut by wall-clock time would differ from one run to the next.
@@ -21,7 +21,10 @@ NEVER_SECONDS = 1e6
 
 
 class Stage(IntEnum):
-    """Steps of the timeline ``stage``; level k of the expansion is ``EXPANSION + k``, but before ``ROOMS``."""
+    """Steps of the timeline ``stage``; level k of the layouts is ``EXPANSION + k``, but before ``ROOMS``.
+
+    A method that weighs whole rooms shows its wall faces at ``SEGMENTS`` and its candidates at ``INITIAL``.
+    """
 
     BUILDING = 0
     MAPPING = 1
@@ -52,6 +55,8 @@ class RecordingStream:
             send_properties=False,
             batcher_config=rr.ChunkBatcherConfig(flush_tick=NEVER_SECONDS, flush_num_bytes=CHUNK_BYTES),
         )
+        self.live = False
+        """Whether somebody watches while it is written."""
         self._handler = rr.LoggingHandler("log")
         self._log_level = logging.NOTSET
 
@@ -88,9 +93,9 @@ class RecordingStream:
         except RuntimeError as failure:
             raise OutputError(f"cannot write the recording ({failure}): {self._path}") from failure
 
-    def arrange(self, layout: Layout) -> None:
-        """Say how the recording opens; once, as soon as it is known where the maps lie."""
-        self._rec.send_blueprint(arrange(layout))
+    def arrange(self, blueprint: rrb.Blueprint) -> None:
+        """Say how the recording opens; the last one counts."""
+        self._rec.send_blueprint(blueprint)
 
     def at(self, stamp: float | None = None, stage: int | None = None) -> None:
         """What follows belongs to ``stamp`` [s] and ``stage``; either stays as it was where not given."""
@@ -111,6 +116,14 @@ class RecordingStream:
             rr.TimeColumn("stage", sequence=[int(stage) for stage in stages]),
         ]
         self._rec.send_columns(path, times, columns)
+
+    def say(self, title: str, text: str) -> None:
+        """What happens at this stage, for the view ``Stage``."""
+        self.log("stage", rr.TextDocument(f"## {title}\n{text}", media_type=rr.MediaType.MARKDOWN))
+
+    def clear(self, path: str) -> None:
+        """Take away what lies below a path, from now on."""
+        self.log(path, rr.Clear(recursive=True))
 
     def property(self, name: str, values: dict[str, str]) -> None:
         """A property of the whole recording, shown by the viewer beside its name."""
