@@ -20,8 +20,15 @@ if TYPE_CHECKING:
     from closedrooms.visualization.rerun.recorder import Recorder
 
 
+# What is known has grown much when it has by this factor.
+GROWN = 1.5
+
+
 class GrowingPrediction:
-    """Predicts anew whenever a closed door is first seen, so that a recording shows the prediction grow."""
+    """Predicts anew whenever a closed door is first seen, so that a recording shows the prediction grow.
+
+    With a door known, it also does when what is known has grown by half: else it would stand still for minutes.
+    """
 
     def __init__(self, recorder: "Recorder", predict: Predict, truth: Sequence[Room]) -> None:
         """Prepare.
@@ -33,13 +40,16 @@ class GrowingPrediction:
         """
         self._recorder, self._predict, self._truth = recorder, predict, truth
         self._seen: set[str] = set()
+        self._known = 0
 
     def __call__(self, grid: OccupancyGrid, doors: Sequence[ClosedDoor], stamp: float) -> None:
-        """Predict if there is a door that was not there before."""
+        """Predict if there is a door that was not there before, or much that was not known."""
         new = [door.id for door in doors if door.id not in self._seen]
-        if not new:
+        known = int(grid.known.sum())
+        if not doors or not (new or known > GROWN * self._known):
             return
         self._seen.update(new)
+        self._known = known
         prediction = self._predict(grid, doors)
         iou = room_iou(prediction.rooms, self._truth)
         iou = {door: iou[door] for door in iou if door in self._seen}

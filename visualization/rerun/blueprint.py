@@ -158,8 +158,7 @@ def _mapping(layout: Layout) -> rrb.Container:
 def _evidence(layout: Layout) -> rrb.Container:
     """What was seen, what was weighed, what came of it."""
     plain = ["+ /prediction/input", "+ /prediction/doors/**"]
-    wide = _is_wide(layout)
-    aspect = 1.6 if wide else 0.8
+    aspect = 1.9
     return rrb.Grid(
         _from_above(
             layout,
@@ -169,8 +168,8 @@ def _evidence(layout: Layout) -> rrb.Container:
         ),
         _from_above(
             layout,
-            "Candidates by door with their scores (filled: chosen, yellow: runner-up)",
-            [*plain, "+ /prediction/candidates/**"],
+            "Candidates by door with their scores (filled: chosen, violet: runner-up)",
+            ["+ /prediction/input", "+ /prediction/doors/bars", "+ /prediction/candidates/**"],
             aspect=aspect,
         ),
         _from_above(layout, "Rooms chosen together", [*plain, "+ /prediction/layouts/**"], aspect=aspect),

@@ -398,7 +398,7 @@ def _room_said(room: Room, iou: Mapping[str, float]) -> str:
     """One line of the log on a predicted room."""
     known = [iou[door] for door in room.doors if door in iou]
     held = f", IoU with the true room {min(known):.2f}" if known else ""
-    return f"behind {', '.join(room.doors)}: {room.kind or 'room'} of {room.polygon.area:.1f} m²{held}"
+    return f"behind {', '.join(room.doors)}: {f'{room.kind} room' if room.kind else 'room'} of {room.polygon.area:.1f} m²{held}"
 
 
 def _markdown(text: str) -> rr.TextDocument:

@@ -22,7 +22,7 @@ DRAWN, LISTED = 12, 4
 # Bars of a chart: the terms in which the chosen candidate and the runner-up differ most.
 BARS = 12
 CHOSEN, RUNNER_UP = "chosen", "runner_up"
-BAR_COLOURS: dict[str, Colour] = {CHOSEN: colours.ESTIMATE, RUNNER_UP: colours.GOAL}
+BAR_COLOURS: dict[str, Colour] = {CHOSEN: colours.ESTIMATE, RUNNER_UP: colours.LOOP}
 
 
 def room_name(room: "WeighedRoom") -> str:
@@ -79,7 +79,7 @@ def _draw_faces(stream: RecordingStream, trace: "WeighedTrace", *, staged: bool)
 
 
 def _draw_candidates(stream: RecordingStream, room: "WeighedRoom", palette: Mapping[str, Colour]) -> None:
-    """The best candidates as thin outlines with their joint scores, the chosen one filled, the runner-up in yellow."""
+    """The best candidates as thin outlines with their joint scores, the chosen one filled, the runner-up in violet."""
     root = f"prediction/candidates/{room_name(room)}"
     colour = palette[room.doors[0]]
     shapes = np.asarray(shapely.polygons(room.corners))
@@ -113,7 +113,7 @@ def _draw_bars(stream: RecordingStream, room: "WeighedRoom") -> None:
         widths = np.full(len(terms), 0.38)
         bars = rr.BarChart(pairs[:, column], color=[*colour, 255], abscissa=at + shift, widths=widths)
         stream.log(f"weighing/{room_name(room)}/{name}", bars, static=True)
-    head = ["| bar | evidence | chosen (blue) | runner-up (yellow) |", "| ---: | --- | ---: | ---: |"]
+    head = ["| bar | evidence | chosen (blue) | runner-up (violet) |", "| ---: | --- | ---: | ---: |"]
     rows = [f"| {number} | {name} | {a:+.2f} | {b:+.2f} |" for number, (name, (a, b)) in enumerate(terms, 1)]
     second = 0.0 if room.runner_up is None else room.joint[room.runner_up]
     rest = room.joint[room.chosen] - pairs[:, 0].sum(), second - pairs[:, 1].sum()
