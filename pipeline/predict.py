@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
-from closedrooms.core.geojson import read_doors, write_doors, write_rooms
+from closedrooms.core.geojson import write_doors, write_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.report import Report
 from closedrooms.core.room import Room
 from closedrooms.core.rosmap import read_ros_map, write_map
 from closedrooms.pipeline.config import PredictConfig
+from closedrooms.pipeline.given_doors import given_doors
 from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.stopwatch import Stopwatch
@@ -44,7 +45,7 @@ def predict_map(config: PredictConfig, *, progress: Progress | None = None) -> R
         progress.stage("read")
         read = read_ros_map(config.map, allow_outside=config.allow_outside)
         remarks = list(read.remarks)
-        given = read_doors(config.doors, remarks=remarks)
+        given = given_doors(config.doors, remarks)
         grid, doors = read.grid, read.doors_on_grid(given)
     manifest: dict[str, Any] = {
         "command": "predict",

@@ -13,18 +13,21 @@ if TYPE_CHECKING:
 
 
 @contextlib.contextmanager
-def open_recording(path: Path | None, robot: RobotConfig, *, name: str) -> Iterator["Recorder"]:
+def open_recording(
+    path: Path | None, robot: RobotConfig, *, name: str, viewer: str | None = None
+) -> Iterator["Recorder"]:
     """The recorder of one run in a building.
 
     Args:
         path: The file to write (``.rrd``), or ``None`` for a recorder that does nothing.
         robot: As it is drawn.
         name: Of the recording.
+        viewer: Where it is streamed to while it is written.
     """
     if path is None:
         yield no_recording()
         return
     from closedrooms.visualization.rerun.recorder import Recorder
 
-    with Recorder(path, name=name, robot_radius=robot.radius) as recorder:
+    with Recorder(path, name=name, robot_radius=robot.radius, viewer=viewer) as recorder:
         yield recorder

@@ -59,7 +59,15 @@ class Recorder:
     :class:`closedrooms.visualization.rerun.stream.Stage`.
     """
 
-    def __init__(self, path: Path, *, name: str, bounds: Bounds | None = None, robot_radius: float = 0.2) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        name: str,
+        bounds: Bounds | None = None,
+        robot_radius: float = 0.2,
+        viewer: str | None = None,
+    ) -> None:
         """Prepare a recording.
 
         Args:
@@ -67,8 +75,9 @@ class Recorder:
             name: Name and identity of the recording: the same for equal runs.
             bounds: Where the maps lie, ``x_min, y_min, x_max, y_max`` [m]; found out where not given.
             robot_radius: Size of the robot that is drawn [m].
+            viewer: Where it is streamed to while it is written, see :func:`~.live.open_viewer`.
         """
-        self._stream = RecordingStream(path, name)
+        self._stream = RecordingStream(path, name, viewer)
         self._curves = Curves(self._stream)
         self._holds = Contents()
         self._bounds = bounds
@@ -150,7 +159,7 @@ class Recorder:
             self._last_scan = scan.stamp
             ends = map_T_robot.transform(Pose2(*scan.robot_T_sensor).transform(scan.points_sensor()))
             self._scans.append((scan.stamp, self._stage, ends))
-            if len(self._scans) >= SCAN_BATCH:
+            if len(self._scans) >= (1 if self._stream.live else SCAN_BATCH):
                 self._send_scans()
 
     def _begin_mapping(self, stamp: float) -> None:
@@ -398,7 +407,8 @@ def _room_said(room: Room, iou: Mapping[str, float]) -> str:
     """One line of the log on a predicted room."""
     known = [iou[door] for door in room.doors if door in iou]
     held = f", IoU with the true room {min(known):.2f}" if known else ""
-    return f"behind {', '.join(room.doors)}: {f'{room.kind} room' if room.kind else 'room'} of {room.polygon.area:.1f} m²{held}"
+    kind = f"{room.kind} room" if room.kind else "room"
+    return f"behind {', '.join(room.doors)}: {kind} of {room.polygon.area:.1f} m²{held}"
 
 
 def _markdown(text: str) -> rr.TextDocument:

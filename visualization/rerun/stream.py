@@ -18,6 +18,8 @@ APPLICATION = "closedrooms"
 # Chunks are cut by size alone: a cut by wall-clock time would differ from one run to the next.
 CHUNK_BYTES = 1_000_000
 NEVER_SECONDS = 1e6
+# How long those who watch wait for what has happened [s].
+LIVE_SECONDS = 0.2
 
 
 class Stage(IntEnum):
@@ -46,23 +48,36 @@ class RecordingStream:
     No wall clock is recorded, so that equal runs give equal recordings.
     """
 
-    def __init__(self, path: Path, name: str) -> None:
-        self._path, self._name = path, name
+    def __init__(self, path: Path, name: str, viewer: str | None = None) -> None:
+        """Prepare a file.
+
+        Args:
+            path: The file.
+            name: Of the recording.
+            viewer: Where it is streamed to while it is written. Batches are then cut by time too, so that two equal
+                runs give the same values in files that differ.
+        """
+        self._path, self._name, self._viewer = path, name, viewer
         self._stage: int = Stage.BUILDING
         self._rec = rr.RecordingStream(
             APPLICATION,
             recording_id=f"{APPLICATION}-{name}",
             send_properties=False,
-            batcher_config=rr.ChunkBatcherConfig(flush_tick=NEVER_SECONDS, flush_num_bytes=CHUNK_BYTES),
+            batcher_config=rr.ChunkBatcherConfig(
+                flush_tick=NEVER_SECONDS if viewer is None else LIVE_SECONDS, flush_num_bytes=CHUNK_BYTES
+            ),
         )
-        self.live = False
+        self.live = viewer is not None
         """Whether somebody watches while it is written."""
         self._handler = rr.LoggingHandler("log")
         self._log_level = logging.NOTSET
 
     def __enter__(self) -> Self:
         with self._clear_errors():
-            self._rec.save(self._path)
+            if self._viewer is None:
+                self._rec.save(self._path)
+            else:
+                self._rec.set_sinks(rr.FileSink(str(self._path)), rr.GrpcSink(self._viewer))
         self._rec.set_log_time_enabled(False)
         self._rec.send_recording_name(self._name)
         # The logging handler writes to the recording of its thread.
