@@ -5,6 +5,7 @@ the recording to be loaded, and it goes through all tabs, tabs within tabs too, 
 views are empty: what a view shows between its frame and its title is one colour.
 """
 
+import socket
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -49,8 +50,8 @@ class ScreenshotConfig:
     """How long the viewer may draw before a picture is taken [s]; four times as long to load."""
     width: int = 1400
     """Width of the pictures [pixels]."""
-    port: int = 9877
-    """Port of the viewer that is started."""
+    port: int = 0
+    """Port of the viewer that is started; a free one by default: at a port in use it would be another one's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ def take(config: ScreenshotConfig) -> list[Shot]:
         *((f"stage{at:02d}", {"timeline": "stage", "sequence": at}) for at in config.stages),
     ]
     shots = []
-    with ViewerClient.spawn(headless=True, port=config.port, executable_path=_viewer()) as viewer:
+    with ViewerClient.spawn(headless=True, port=config.port or _free_port(), executable_path=_viewer()) as viewer:
         viewer.open(str(config.recording.resolve()))
         time.sleep(4 * config.settle)
         blueprint = viewer.get_blueprint().blueprint
@@ -99,6 +100,12 @@ def take(config: ScreenshotConfig) -> list[Shot]:
                 picture.thumbnail((config.width, config.width))
                 picture.save(path)
     return shots
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
 
 
 def _viewer() -> str | None:

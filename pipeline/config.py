@@ -214,6 +214,9 @@ class MapConfig:
 class ListWorlds:
     """Options of ``closedrooms worlds list``."""
 
+    verbose: bool = False
+    """Also the area, the kinds of rooms, furniture and which doors can be closed."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ShowWorld:
@@ -222,14 +225,21 @@ class ShowWorld:
     world: tyro.conf.Positional[str]
     """Name of a bundled world or a file that the importers read."""
 
-    out: Path
+    out: Path | None = None
     """Picture to write (PNG)."""
+
+    text: bool = False
+    """Print rooms and doors, with or without a picture."""
 
     level: str | None = None
     """Which level of a file with several."""
 
     force: bool = False
     """Replace a picture that is there already."""
+
+    def __post_init__(self) -> None:
+        if self.out is None and not self.text:
+            raise InvalidInputError("nothing to show", expected="--out PNG, --text, or both")
 
 
 @dataclass(frozen=True, kw_only=True)

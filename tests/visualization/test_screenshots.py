@@ -79,7 +79,7 @@ def test_a_tab_for_what_the_recording_does_not_hold_is_found_empty(tmp_path: Pat
         recorder.map(grid, 0.0)
         # What the recorder never does.
         recorder._holds = replace(recorder._holds, truth=True, room_iou=True)
-    shots = screenshots.take(screenshots.ScreenshotConfig(recording=path, out=tmp_path, settle=0.6, port=9879))
+    shots = screenshots.take(screenshots.ScreenshotConfig(recording=path, out=tmp_path, settle=0.6))
     empty = {view for shot in shots for view in shot.empty if shot.tab == "Rooms"}
     assert any(view.startswith("Truth") for view in empty), empty
     assert any(view.startswith("IoU") for view in empty), empty
