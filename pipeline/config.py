@@ -273,7 +273,7 @@ class ConvertWorld:
     """File to write."""
 
     to: str
-    """Format to write: json, rosmap, sdf or stage."""
+    """Format to write: json, obj, rosmap, sdf, stage or urdf."""
 
     level: str | None = None
     """Which level of a file with several."""

@@ -131,6 +131,8 @@ def beside(path: Path, to: str) -> list[Path]:
         case "rosmap":
             stem = map_stem(path)
             return [stem.with_name(stem.name + ending) for ending in (".yaml", ".png", ".doors.geojson")]
+        case "urdf":
+            return [path, path.with_suffix(".obj")]
         case "stage":
             return [path.with_suffix(ending) for ending in (".world", ".png")]
     return []
@@ -143,11 +145,19 @@ def map_stem(path: Path) -> Path:
 
 def exporters() -> dict[str, Callable[[Path, FloorPlan], None]]:
     """Writers of floor plans by the name of their format."""
+    from closedrooms.worlds.formats.mesh import write_obj, write_urdf
     from closedrooms.worlds.formats.native import write_plan
     from closedrooms.worlds.formats.sdf import write_sdf
     from closedrooms.worlds.formats.stage import write_stage
 
-    return {"json": write_plan, "rosmap": write_ros_map, "sdf": write_sdf, "stage": write_stage}
+    return {
+        "json": write_plan,
+        "obj": write_obj,
+        "rosmap": write_ros_map,
+        "sdf": write_sdf,
+        "stage": write_stage,
+        "urdf": write_urdf,
+    }
 
 
 def write_ros_map(path: Path, plan: FloorPlan) -> None:

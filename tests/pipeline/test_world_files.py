@@ -52,7 +52,9 @@ def test_convert_to_a_ros_map_gives_the_true_map_of_the_building(tmp_path: Path)
 
 
 def test_an_unknown_format_lists_the_valid_ones(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="unknown format 'dwg'; expected one of json, rosmap, sdf, stage"):
+    with pytest.raises(
+        InvalidInputError, match="unknown format 'dwg'; expected one of json, obj, rosmap, sdf, stage, urdf"
+    ):
         convert_world("office-01", tmp_path / "m", "dwg")
     assert {"json", "rosmap"} <= set(exporters())
     assert not list(tmp_path.iterdir())
