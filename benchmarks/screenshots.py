@@ -1,16 +1,35 @@
 """Pictures of a recording as the viewer shows it, one a tab: ``python benchmarks/screenshots.py run.rrd OUT``.
 
 Needs no screen and no GPU (Debian: ``mesa-vulkan-drivers libvulkan1``). Unlike ``rerun --screenshot-to`` it waits for
-the recording to be loaded, and it can go through all tabs and to any time.
+the recording to be loaded, and it goes through all tabs, tabs within tabs too, at any number of times. Says which
+views are empty: what a view shows between its frame and its title is one colour.
 """
 
+import socket
+import sys
 import time
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import tyro
+from PIL import Image
 from rerun.experimental import ViewerClient
+
+# A view is empty when fewer of its pixels are drawn, of a million: a robot that has seen one corridor fills thousands,
+# an empty map none.
+LEAST_DRAWN = 100
+# Drawn is what differs from the commonest colour by so much in any channel; in plots, whose axes are grey, what has
+# colour: channels apart by so much.
+DIFFERS, COLOURED = 24, 48
+# The headless window of 1920 x 1080: menu, bar of tabs or title of a view, collapsed time panel, and what of a view may
+# belong to the line between two [pixels].
+MENU, BAR, TIME_PANEL, EDGE = 38, 28, 29, 4
+Area = tuple[float, float, float, float]
+PLOTS = {"TimeSeries", "BarChart", "StateTimeline"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,52 +42,117 @@ class ScreenshotConfig:
     """Folder for ``<tab>.png``."""
     tabs: tuple[str, ...] = ()
     """Names of the tabs; all by default."""
-    sim_time: float | None = None
-    """Time of the simulation to go to [s]; the end by default."""
-    stage: int | None = None
-    """Step of the timeline ``stage`` to go to instead."""
-    settle: float = 2.0
-    """How long the viewer may load and draw before a picture is taken [s]."""
+    sim_times: tuple[float, ...] = ()
+    """Times of the simulation to go to [s]; the end by default."""
+    stages: tuple[int, ...] = ()
+    """Steps of the timeline ``stage`` to go to."""
+    settle: float = 1.0
+    """How long the viewer may draw before a picture is taken [s]; four times as long to load."""
     width: int = 1400
     """Width of the pictures [pixels]."""
-    port: int = 9877
-    """Port of the viewer that is started."""
+    port: int = 0
+    """Port of the viewer that is started; a free one by default: at a port in use it would be another one's."""
 
 
-def take(config: ScreenshotConfig) -> list[Path]:
-    """Start a viewer, open the recording, take one picture a tab."""
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """One picture.
+
+    Attributes:
+        tab: Names of the tabs that it shows, from the outermost.
+        moment: ``sim_time`` or ``stage`` with its value, or ``end``.
+        path: The file.
+        empty: Names of views that show nothing.
+    """
+
+    tab: str
+    moment: str
+    path: Path
+    empty: tuple[str, ...]
+
+
+def take(config: ScreenshotConfig) -> list[Shot]:
+    """Start a viewer, open the recording, take one picture a tab and moment."""
     config.out.mkdir(parents=True, exist_ok=True)
-    pictures = []
-    with ViewerClient.spawn(headless=True, port=config.port) as viewer:
+    moments: list[tuple[str, dict[str, Any]]] = [
+        *((f"t{at:05.0f}", {"timeline": "sim_time", "duration": at}) for at in config.sim_times),
+        *((f"stage{at:02d}", {"timeline": "stage", "sequence": at}) for at in config.stages),
+    ]
+    shots = []
+    with ViewerClient.spawn(headless=True, port=config.port or _free_port(), executable_path=_viewer()) as viewer:
         viewer.open(str(config.recording.resolve()))
-        time.sleep(config.settle)
+        time.sleep(4 * config.settle)
         blueprint = viewer.get_blueprint().blueprint
-        root, tabs = _tabs(blueprint)
-        for name, tab in tabs.items():
-            if config.tabs and name not in config.tabs:
+        for name, choices in list(_tabs(blueprint)):
+            if config.tabs and name.split(" - ")[0] not in config.tabs:
                 continue
-            blueprint[root]["ContainerBlueprint"]["active_tab"] = tab
+            for container, tab in choices:
+                blueprint[container]["ContainerBlueprint"]["active_tab"] = tab
             viewer.set_blueprint(blueprint, of="recording")
-            if config.stage is not None:
-                viewer.set_time("stage", sequence=config.stage, play_state="paused")
-            elif config.sim_time is not None:
-                viewer.set_time("sim_time", duration=config.sim_time, play_state="paused")
-            time.sleep(config.settle)
-            pictures.append(config.out / f"{name.lower()}.png")
-            pictures[-1].write_bytes(viewer.take_screenshot(max_size=config.width))
-            for view in viewer.get_state().views:
-                print(*(f"{name}: {view.name}: {report}" for report in view.reports), sep="\n", end="")
-    return pictures
+            for moment, where in moments or [("end", {})]:
+                if where:
+                    rest = {key: value for key, value in where.items() if key != "timeline"}
+                    viewer.set_time(where["timeline"], play_state="paused", **rest)
+                time.sleep(config.settle)
+                path = config.out / f"{_file_name(name)}-{moment}.png"
+                picture = Image.open(BytesIO(viewer.take_screenshot())).convert("RGB")
+                shots.append(Shot(name, moment, path, tuple(_find_empty(viewer, blueprint, picture))))
+                picture.thumbnail((config.width, config.width))
+                picture.save(path)
+    return shots
 
 
-def _tabs(blueprint: dict[str, Any]) -> tuple[str, dict[str, str]]:
-    """Path of the outermost tab container, and its tabs by name."""
-    containers = {
-        path: content["ContainerBlueprint"] for path, content in blueprint.items() if "ContainerBlueprint" in content
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def _viewer() -> str | None:
+    """The viewer that came with this Python's rerun-sdk, whatever the search path."""
+    beside = Path(sys.executable).with_name("rerun")
+    return str(beside) if beside.exists() else None
+
+
+def _tabs(blueprint: dict[str, Any]) -> Iterator[tuple[str, list[tuple[str, str]]]]:
+    """Every combination of a tab and the tabs within it: its name, and which tab each container then shows."""
+    yield from _choices(blueprint, _root(blueprint))
+
+
+def _choices(blueprint: dict[str, Any], path: str) -> Iterator[tuple[str, list[tuple[str, str]]]]:
+    container = _containers(blueprint).get(path)
+    if container is None:
+        yield "", []
+        return
+    children = container["contents"]
+    if container["container_kind"] == "Tabs":
+        for child in children:
+            for name, choices in _choices(blueprint, f"/{child}"):
+                own = _name(blueprint[f"/{child}"])
+                yield " - ".join(filter(None, (own, name))), [(path, child), *choices]
+        return
+    # Tabs side by side are gone through one after the other, the rest as they open.
+    several = [list(_choices(blueprint, f"/{child}")) for child in children]
+    first = [found[0] for found in several]
+    name = " - ".join(filter(None, (name for name, _ in first)))
+    yield name, [choice for _, choices in first for choice in choices]
+    for at, found in enumerate(several):
+        for name, choices in found[1:]:
+            rest = [choice for other, (_, own) in enumerate(first) if other != at for choice in own]
+            yield name, [*rest, *choices]
+
+
+def _containers(blueprint: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Containers by path; of one value in a list the viewer gives the value alone."""
+    lists = ("contents", "col_shares", "row_shares")
+    return {
+        path: {
+            key: [value] if key in lists and not isinstance(value, list) else value
+            for key, value in content["ContainerBlueprint"].items()
+        }
+        for path, content in blueprint.items()
+        if "ContainerBlueprint" in content
     }
-    inner = {f"/{path}" for container in containers.values() for path in container["contents"]}
-    root = next(path for path in containers if path not in inner and "active_tab" in containers[path])
-    return root, {_name(blueprint[f"/{tab}"]): tab for tab in containers[root]["contents"]}
 
 
 def _name(content: dict[str, Any]) -> str:
@@ -78,6 +162,68 @@ def _name(content: dict[str, Any]) -> str:
     )
 
 
+def _places(blueprint: dict[str, Any], path: str, area: Area) -> Iterator[tuple[str, Area]]:
+    """Ids of the views on the tabs in front, and what of the window each takes, below its own title."""
+    x0, y0, x1, y1 = area
+    container = _containers(blueprint).get(path)
+    if container is None:
+        yield path.rsplit("/", 1)[-1], (x0, y0 + BAR, x1, y1)
+        return
+    children = [f"/{child}" for child in container["contents"]]
+    kind = container["container_kind"]
+    if kind == "Tabs":
+        yield from _places(blueprint, f"/{container['active_tab']}", (x0, y0 + BAR, x1, y1))
+        return
+    columns = {"Horizontal": len(children), "Vertical": 1}.get(kind) or container["grid_columns"]
+    rows = -(-len(children) // columns)
+    xs = _divide(x0, x1, container.get("col_shares") or [1.0] * columns)
+    ys = _divide(y0, y1, container.get("row_shares") or [1.0] * rows)
+    for number, child in enumerate(children):
+        row, column = divmod(number, columns)
+        yield from _places(blueprint, child, (xs[column], ys[row], xs[column + 1], ys[row + 1]))
+
+
+def _divide(first: float, last: float, shares: Sequence[float]) -> list[float]:
+    ends = np.concatenate(([0.0], np.cumsum(shares))) / sum(shares)
+    return [float(first + (last - first) * end) for end in ends]
+
+
+def _root(blueprint: dict[str, Any]) -> str:
+    """The outermost container."""
+    inner = {f"/{path}" for container in _containers(blueprint).values() for path in container["contents"]}
+    return next(path for path in _containers(blueprint) if path not in inner)
+
+
+def _find_empty(viewer: ViewerClient, blueprint: dict[str, Any], picture: Image.Image) -> Iterator[str]:
+    """Names of the views that show nothing, and what the viewer complains of."""
+    pixels = np.array(picture).astype(int)
+    views = {view.view_id: view for view in viewer.get_state().views}
+    area = (0.0, float(MENU), float(picture.width), float(picture.height - TIME_PANEL))
+    for place, (x0, y0, x1, y1) in _places(blueprint, _root(blueprint), area):
+        view = views.get(place)
+        if view is None:  # the viewer made nothing of it
+            yield _name(blueprint[f"/view/{place}"])
+            continue
+        inside = pixels[round(y0) + EDGE : round(y1) - EDGE, round(x0) + EDGE : round(x1) - EDGE]
+        if is_empty(inside, plot=view.view_class in PLOTS):
+            yield f"{view.name} ({view.view_class})"
+        yield from (f"{view.name}: {report}" for report in view.reports)
+
+
+def is_empty(pixels: "np.ndarray[Any, Any]", *, plot: bool) -> bool:
+    """Whether a picture of a view shows nothing, shape (rows, columns, 3)."""
+    if plot:
+        drawn = np.ptp(pixels, axis=-1) >= COLOURED
+    else:
+        colours, counts = np.unique(pixels.reshape(-1, 3), axis=0, return_counts=True)
+        drawn = np.abs(pixels - colours[counts.argmax()]).max(axis=-1) >= DIFFERS
+    return bool(drawn.mean() < LEAST_DRAWN / 1e6)
+
+
+def _file_name(name: str) -> str:
+    return "".join(letter if letter.isalnum() else "-" for letter in name.lower()).strip("-")
+
+
 if __name__ == "__main__":
-    for picture in take(tyro.cli(ScreenshotConfig)):
-        print(picture)
+    for shot in take(tyro.cli(ScreenshotConfig)):
+        print(shot.path, *(f"\n  EMPTY {name}" for name in shot.empty), sep="")

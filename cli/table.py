@@ -20,7 +20,7 @@ COMMANDS = (
         "run",
         "Simulate a robot in a building with closed doors, map it, predict the closed rooms, plan a tour.",
         "pipeline.config:RunConfig",
-        "pipeline.run:run",
+        "pipeline.runs:run_all",
     ),
     Command(
         "predict",

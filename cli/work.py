@@ -1,6 +1,6 @@
 """What a command does where the use case itself does not return a report."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,14 +16,20 @@ def list_worlds(config: ListWorlds, *, progress: Progress) -> Iterable[str]:  # 
     """List the bundled worlds."""
     from closedrooms.pipeline.world_files import list_worlds as work
 
-    return work()
+    return work(verbose=config.verbose)
 
 
-def show_world(config: ShowWorld, *, progress: Progress) -> Report:  # noqa: ARG001
-    """Draw a floor plan."""
+def show_world(config: ShowWorld, *, progress: Progress) -> Report | Iterable[str]:  # noqa: ARG001
+    """Draw a floor plan, or tell what is in it, or both."""
+    from closedrooms.pipeline.world_files import describe_world
     from closedrooms.pipeline.world_files import show_world as work
+    from closedrooms.worlds.library import load_world
 
+    if config.out is None:
+        return describe_world(load_world(config.world, level=config.level))
     plan = work(config.world, config.out, level=config.level, force=config.force)
+    if config.text:
+        return [*describe_world(plan), "", f"written to {config.out}"]
     return _report(plan, config.out)
 
 
@@ -37,16 +43,18 @@ def generate_world(config: GenerateWorld, *, progress: Progress) -> Report:  # n
 
 def convert_world(config: ConvertWorld, *, progress: Progress) -> Report:  # noqa: ARG001
     """Convert a floor plan to another format."""
+    from closedrooms.pipeline.world_files import beside
     from closedrooms.pipeline.world_files import convert_world as work
 
     plan = work(config.source, config.destination, config.to, level=config.level, force=config.force)
-    return _report(plan, config.destination)
+    return _report(plan, config.destination, beside(config.destination, config.to))
 
 
-def _report(plan: "FloorPlan", written: Path) -> Report:
-    """What the plan holds, and what was dropped, repaired or guessed when it was read."""
+def _report(plan: "FloorPlan", written: Path, files: Sequence[Path] = ()) -> Report:
+    """What the plan holds, what was dropped, repaired or guessed when it was read, and every file of several."""
     from closedrooms.worlds.closing import closable_rooms
 
     figures = {"rooms": len(plan.rooms), "doors": len(plan.doors), "closable rooms": len(closable_rooms(plan))}
     rows = [("figure", "value"), *((name, str(value)) for name, value in figures.items())]
+    rows += [("file", str(file)) for file in files]
     return Report(folder=written, title=plan.name, rows=rows, remarks=plan.remarks, figures=figures)

@@ -27,6 +27,12 @@ class RunConfig:
     world: tyro.conf.Positional[str] = "office-07"
     """Name of a bundled world (see ``closedrooms worlds list``) or a file that the importers read."""
 
+    more_worlds: tyro.conf.Positional[tuple[str, ...]] = ()
+    """Further worlds: a run directory each in the folder ``--out`` (``runs``), and one table."""
+
+    seeds: tuple[int, ...] = ()
+    """Several seeds, e.g. ``--seeds 0 1 2``: a run of every world for each, in place of ``--seed``."""
+
     close: int | None = None
     """How many rooms to close, drawn by the seed; 5, or as many as the world has, when no doors are named either."""
 
@@ -54,11 +60,20 @@ class RunConfig:
     record: bool = True
     """Write the recording ``run.rrd`` for the rerun viewer."""
 
+    live: bool = False
+    """Open the rerun viewer and stream the recording to it while it is written."""
+
+    web: bool = False
+    """The same, served to a browser on this machine: for those without a desktop."""
+
     keep_scans: bool = False
     """Write ``scans.npz``: every scan with odometry, estimated and true pose."""
 
+    bag: bool = False
+    """Write what the robot sensed as a rosbag 2, ``sensed/`` (MCAP: LaserScan, Odometry, tf)."""
+
     out: Path | None = None
-    """The run directory; ``runs/<world>-<seed>`` when not given."""
+    """The run directory; ``runs/<world>-<seed>`` when not given. Of several runs the folder that holds theirs."""
 
     gui: bool = False
     """Watch the bodies in PyBullet's window while the robot drives; needs a display."""
@@ -86,8 +101,11 @@ class RunConfig:
             raise InvalidInputError("both --close and --close-doors", expected="one of them")
         if self.close is not None and self.close < 0:
             raise InvalidInputError(f"--close {self.close}", expected="a number of rooms of at least 0")
-        if self.seed < 0:
-            raise InvalidInputError(f"--seed {self.seed}", expected="a whole number of at least 0")
+        for name, seed in (("--seed", self.seed), *(("--seeds", seed) for seed in self.seeds)):
+            if seed < 0:
+                raise InvalidInputError(f"{name} {seed}", expected="a whole number of at least 0")
+        if (self.live or self.web) and not self.record:
+            raise InvalidInputError("--live without a recording", expected="no --no-record")
         if self.sim is None:
             object.__setattr__(self, "sim", named_sim(self.noise, self.lidar, self.BODY))
         if self.gui:
@@ -103,7 +121,7 @@ class PredictConfig:
     """The map: a ROS map_server YAML."""
 
     doors: Path
-    """Closed doors: GeoJSON Points or LineStrings in the map frame, metres."""
+    """Closed doors in the map frame, metres: GeoJSON Points or LineStrings, or a bag of points clicked in RViz."""
 
     out: Path
     """Folder to write."""
@@ -209,6 +227,9 @@ class MapConfig:
 class ListWorlds:
     """Options of ``closedrooms worlds list``."""
 
+    verbose: bool = False
+    """Also the area, the kinds of rooms, furniture and which doors can be closed."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ShowWorld:
@@ -217,14 +238,21 @@ class ShowWorld:
     world: tyro.conf.Positional[str]
     """Name of a bundled world or a file that the importers read."""
 
-    out: Path
+    out: Path | None = None
     """Picture to write (PNG)."""
+
+    text: bool = False
+    """Print rooms and doors, with or without a picture."""
 
     level: str | None = None
     """Which level of a file with several."""
 
     force: bool = False
     """Replace a picture that is there already."""
+
+    def __post_init__(self) -> None:
+        if self.out is None and not self.text:
+            raise InvalidInputError("nothing to show", expected="--out PNG, --text, or both")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -258,7 +286,7 @@ class ConvertWorld:
     """File to write."""
 
     to: str
-    """Format to write: json, rosmap, sdf or stage."""
+    """Format to write: json, obj, rosmap, sdf, stage or urdf."""
 
     level: str | None = None
     """Which level of a file with several."""

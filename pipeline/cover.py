@@ -7,7 +7,7 @@ import numpy as np
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
-from closedrooms.core.geojson import read_doors, write_doors, write_features
+from closedrooms.core.geojson import write_doors, write_features
 from closedrooms.core.report import Report
 from closedrooms.core.rosmap import RosMap, read_ros_map, write_map
 from closedrooms.coverage.drivable_path import find_drivable_paths
@@ -16,6 +16,7 @@ from closedrooms.coverage.tour import CoverageTour
 from closedrooms.coverage.tour_features import make_tour_features
 from closedrooms.coverage.tour_planner import plan_coverage
 from closedrooms.pipeline.config import CoverConfig
+from closedrooms.pipeline.given_doors import given_doors
 from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.stopwatch import Stopwatch
@@ -38,7 +39,7 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Repor
         progress.stage("read")
         read = read_ros_map(config.map, allow_outside=config.allow_outside)
         remarks = list(read.remarks)
-        given = read_doors(config.doors, remarks=remarks) if config.doors else []
+        given = given_doors(config.doors, remarks) if config.doors else []
         grid, doors = read.grid, read.doors_on_grid(given)
         start = None if config.start is None else _on_grid(read, config.start)
     manifest: dict[str, Any] = {

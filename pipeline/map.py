@@ -58,7 +58,7 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> Report:
     }
     with (
         output_folder(config.out, manifest) as folder,
-        _recording(config, run, folder / "run.rrd") as observer,
+        _recording(config, folder / "run.rrd") as observer,
     ):
         observer.configuration(manifest["configuration"])
         log_watch = LogWatch(observer, run)
@@ -136,13 +136,11 @@ def _write(folder: Path, run: RecordedRun, built: BuiltMap) -> None:
 
 
 @contextlib.contextmanager
-def _recording(config: MapConfig, run: RecordedRun, path: Path) -> Iterator["Recorder"]:
+def _recording(config: MapConfig, path: Path) -> Iterator["Recorder"]:
     if not config.record:
         yield no_recording()
         return
-    from closedrooms.visualization.rerun.blueprint import Layout
     from closedrooms.visualization.rerun.recorder import Recorder
 
-    layout = Layout(building=False, prediction=False, coverage=False, reference=run.reference is not None)
-    with Recorder(path, name=config.log.name.split(".")[0], layout=layout) as recorder:
+    with Recorder(path, name=config.log.name.split(".")[0]) as recorder:
         yield recorder

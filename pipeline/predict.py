@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_output_folder, output_folder
-from closedrooms.core.geojson import read_doors, write_doors, write_rooms
+from closedrooms.core.geojson import write_doors, write_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.report import Report
 from closedrooms.core.room import Room
 from closedrooms.core.rosmap import RosMap, read_ros_map, write_map, write_raw_map
 from closedrooms.pipeline.config import PredictConfig
+from closedrooms.pipeline.given_doors import given_doors
 from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.stopwatch import Stopwatch
@@ -57,7 +58,7 @@ def predict_map(
         progress.stage("read")
         read = read_ros_map(config.map, allow_outside=config.allow_outside)
         remarks = list(read.remarks)
-        given = read_doors(config.doors, remarks=remarks) if given is None else given
+        given = given_doors(config.doors, remarks) if given is None else given
         grid, doors = read.grid, read.doors_on_grid(given)
     manifest: dict[str, Any] = {
         "command": "predict",
@@ -131,11 +132,9 @@ def _recording(config: PredictConfig, grid: OccupancyGrid, path: Path) -> Iterat
     if not config.record:
         yield no_recording()
         return
-    from closedrooms.visualization.rerun.blueprint import Layout
     from closedrooms.visualization.rerun.recorder import Recorder
 
     row, col, rows, cols = grid.known_bounds() or (0, 0, *grid.frame.shape)
     bounds = grid.frame.cropped(row, col, rows, cols).bounds
-    layout = Layout(bounds, building=False, mapping=False, coverage=False)
-    with Recorder(path, name=config.map.stem, layout=layout) as recorder:
+    with Recorder(path, name=config.map.stem, bounds=bounds) as recorder:
         yield recorder

@@ -23,6 +23,9 @@ class Progress(Protocol):
     def advance(self, done: float, note: str = "") -> None:
         """Say how much of the stage is done, in the unit of its total, and one short note."""
 
+    def tell(self, line: str) -> None:
+        """Say one line that stays."""
+
 
 class Silent:
     """No progress: for use as a library and in tests."""
@@ -32,6 +35,9 @@ class Silent:
 
     def advance(self, done: float, note: str = "") -> None:
         """Ignore an advance."""
+
+    def tell(self, line: str) -> None:
+        """Ignore a line."""
 
 
 class Pace:
@@ -114,7 +120,7 @@ class Terminal:
         """Begin a stage: a new bar on a terminal, a line elsewhere."""
         self._pace = Pace(name, total, time.monotonic())
         if not self._live:
-            self._tell(f"{name} ...")
+            self.tell(f"{name} ...")
             return
         if self._task is not None:
             self._progress.remove_task(self._task)  # type: ignore[arg-type]
@@ -129,9 +135,10 @@ class Terminal:
         line = self._pace.line(done, shown(note), now)
         if now - self._pace.said >= self._every:
             self._pace.said = now
-            self._tell(line)
+            self.tell(line)
 
-    def _tell(self, line: str) -> None:
+    def tell(self, line: str) -> None:
+        """Print one line to standard error, above the bar where there is one."""
         if not self._quiet:
             self._error.print(line, highlight=False, markup=False, soft_wrap=True)
 

@@ -1,6 +1,7 @@
 """The main job: simulate, map, predict, plan, compare with the truth, write the run directory."""
 
-from collections.abc import Mapping, Sequence
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -20,6 +21,7 @@ from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.tour import CoverageTour
 from closedrooms.coverage.tour_features import make_tour_features
 from closedrooms.coverage.tour_planner import plan_coverage
+from closedrooms.mapping.logs.bag_writer import check_bags, write_bag
 from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.tour_follower import TourPlan
@@ -27,11 +29,13 @@ from closedrooms.pipeline.bounds import check_size, check_width, too_narrow
 from closedrooms.pipeline.config import RunConfig
 from closedrooms.pipeline.drive import DriveResult, DriveSettings, drive_tour
 from closedrooms.pipeline.drive_report import draw_drive, drive_features, drive_metrics
+from closedrooms.pipeline.live_recording import GrowingPrediction
 from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.report import markdown, run_report
 from closedrooms.pipeline.run_log import RunLog
 from closedrooms.pipeline.run_metrics import run_metrics
+from closedrooms.pipeline.scores import room_iou
 from closedrooms.pipeline.stopwatch import Stopwatch
 from closedrooms.pipeline.survey import Survey, Truth, survey_building, true_building
 from closedrooms.predictor.methods import predict
@@ -41,6 +45,7 @@ from closedrooms.visualization.rerun.opening import open_recording
 from closedrooms.worlds.closing import check_closed, closable_rooms, draw_closed
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan
+from closedrooms.worlds.truth import true_rooms
 
 if TYPE_CHECKING:
     from closedrooms.visualization.rerun.recorder import Recorder
@@ -72,6 +77,10 @@ class Finding:
     driven: DriveResult | None = None
 
 
+# What says where a run is written and watched, and how many there are, but nothing of its result.
+ASIDE = ("out", "world", "more_worlds", "seeds", "live", "web")
+
+
 def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
     """Simulate a robot in a building with closed doors and predict what it could not see.
 
@@ -98,10 +107,12 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
         folder = config.out or Path("runs") / f"{file_name(plan.name)}-{config.seed}"
         check_output_folder(folder, "run")
         check_width(plan, config.sim.robot)
+        if config.bag:
+            check_bags()
         check_size(plan, config.mapper.resolution, config.navigation)
     manifest: dict[str, Any] = {
         "command": "run",
-        "configuration": resolved(config, leave_out=("out", "world")),
+        "configuration": resolved(config, leave_out=ASIDE),
         "paths": {"world": input_path(config.world)},
         "world": plan.name,
         "seed": config.seed,
@@ -110,15 +121,14 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
     }
     name, record = f"{plan.name}-{config.seed}", config.record
     with (
+        _watched(config, progress) as viewer,
         output_folder(folder, manifest) as staging,
-        open_recording(
-            staging / "run.rrd" if record else None, plan, config.sim.robot, name=name, driving=config.drive
-        ) as recorder,
+        open_recording(staging / "run.rrd" if record else None, config.sim.robot, name=name, viewer=viewer) as recorder,
         Simulation(plan, closed, config.sim, config.seed) as sim,
     ):
         recorder.configuration(manifest["configuration"])
         recorder.building(plan, sim.world_T_map.inverse(), closed)
-        log, mapper = RunLog(sim, progress, keep_scans=config.keep_scans), Mapper(config.mapper)
+        log, mapper = RunLog(sim, progress, keep_scans=config.keep_scans or config.bag), Mapper(config.mapper)
         found = _find_out(config, closed, log, mapper, recorder, progress, watch)
         remarks = [
             *plan.remarks,
@@ -132,11 +142,25 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
             _write(staging, found, manifest["metrics"])
             if config.keep_scans:
                 write_scans(staging / "scans.npz", log.recorded(), estimate=mapper.trajectory()[1])
+            if config.bag:
+                write_bag(staging / "sensed", log.recorded())
         manifest["durations"] = watch.seconds()
         title = f"{plan.name}, seed {config.seed}, noise {config.noise}"
         result = run_report(folder, title, manifest, stopped=_stopped(found), remarks=remarks)
         recorder.table(markdown(result))
     return result
+
+
+@contextlib.contextmanager
+def _watched(config: RunConfig, progress: Progress) -> Iterator[str | None]:
+    """A viewer to stream to, on demand."""
+    if not (config.live or config.web):
+        yield None
+        return
+    from closedrooms.visualization.rerun.live import open_viewer
+
+    with open_viewer(web=config.web, tell=progress.tell) as viewer:
+        yield viewer
 
 
 def _find_out(
@@ -150,13 +174,20 @@ def _find_out(
 ) -> Finding:
     """Explore, predict, plan tours and, on demand, drive the predicted one."""
     plan, map_T_world = log.sim.plan, log.sim.world_T_map.inverse()
-    survey = survey_building(log, mapper, config.navigation, recorder=recorder, progress=progress, watch=watch)
+    growth = None
+    if config.record:
+        method = partial(predict, method=config.method, config=config.predictor, trace=True)
+        growth = GrowingPrediction(recorder, method, true_rooms(plan, closed, map_T_world))
+    survey = survey_building(
+        log, mapper, config.navigation, recorder=recorder, growth=growth, progress=progress, watch=watch
+    )
     with watch.stage("predict"):
         progress.stage("predict")
         prediction = predict(survey.grid, survey.doors, config.method, config.predictor, trace=config.record)
         truth = true_building(plan, closed, prediction.grid.frame, map_T_world)
-        recorder.prediction(survey.grid, survey.doors, prediction)
         recorder.truth(truth.grid, truth.rooms)
+        iou = room_iou(prediction.rooms, truth.rooms)
+        recorder.prediction(survey.grid, survey.doors, prediction, iou=iou)
     survey = replace(survey, grid=survey.grid.on(truth.grid.frame))
     prediction = replace(prediction, grid=prediction.grid.on(truth.grid.frame))
     with watch.stage("cover"):

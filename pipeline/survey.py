@@ -14,7 +14,7 @@ from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.control_loop import LoopLog, run_loop
 from closedrooms.navigation.explorer import Explorer
 from closedrooms.pipeline.bounds import Outline
-from closedrooms.pipeline.live_recording import ExplorationRecording
+from closedrooms.pipeline.live_recording import ExplorationRecording, GrowingPrediction
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.run_log import RunLog
 from closedrooms.pipeline.stopwatch import Stopwatch
@@ -63,6 +63,7 @@ def survey_building(
     navigation: NavigationConfig,
     *,
     recorder: "Recorder | None" = None,
+    growth: GrowingPrediction | None = None,
     progress: Progress | None = None,
     watch: Stopwatch | None = None,
 ) -> Survey:
@@ -73,6 +74,7 @@ def survey_building(
         mapper: A fresh mapper; it keeps its keyframes.
         navigation: Exploration.
         recorder: Told of every step.
+        growth: Told whenever a closed door is first seen.
         progress: Told of the stages.
         watch: Given the wall-clock time of each stage.
     """
@@ -82,7 +84,7 @@ def survey_building(
     explorer, outline = Explorer(config), Outline(log.sim.plan)
     exploration = run_loop(
         log, mapper, explorer, config,
-        on_step=ExplorationRecording(recorder, log, mapper, explorer),
+        on_step=ExplorationRecording(recorder, log, mapper, explorer, growth),
         stop=lambda _: outline.check(log.sim.world_T_robot),
     )  # fmt: skip
     end = float(exploration.stamps[-1])
@@ -99,6 +101,7 @@ def survey_building(
         recorder.trajectory(stamps, poses)
         recorder.map(grid, end, final=True)
         recorder.doors(doors, end)
+        recorder.note(f"map finished: {len(mapper.loops)} loops closed, {len(doors)} closed doors seen")
     return Survey(grid, doors, exploration, explorer.searches, stamps, poses, log.truth)
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files import check_new_files
+from closedrooms.core.names import shown
 from closedrooms.worlds.library import DEFAULT_WORLD, PLANS, bundled_names, load_world, read_world
 from closedrooms.worlds.plan import FloorPlan
 
@@ -12,8 +13,8 @@ from closedrooms.worlds.plan import FloorPlan
 MAP_RESOLUTION = 0.05
 
 
-def list_worlds() -> list[str]:
-    """One line a bundled world, its name first."""
+def list_worlds(*, verbose: bool = False) -> list[str]:
+    """One line a bundled world, its name first; with ``verbose`` more lines on each."""
     import shapely
 
     from closedrooms.worlds.closing import closable_rooms
@@ -30,6 +31,45 @@ def list_worlds() -> list[str]:
             f"{name:<10} {size:>11}  {len(plan.rooms):3d} rooms  {len(plan.doors):3d} doors  "
             f"{len(closable_rooms(plan)):2d} closable  {plan.meta.get('shape', ''):<6}{default}".rstrip()
         )
+        if verbose:
+            lines += _details(plan)
+    return lines
+
+
+def _details(plan: FloorPlan) -> list[str]:
+    """What a plan holds beside its figures."""
+    from collections import Counter
+
+    from closedrooms.worlds.closing import closable_rooms
+
+    kinds = ", ".join(f"{count} {kind}" for kind, count in Counter(room.label for room in plan.rooms).most_common())
+    doors = sorted(door for doors in closable_rooms(plan).values() for door in doors)
+    area = sum(room.polygon.area for room in plan.rooms)
+    furniture = f", {len(plan.furniture)} pieces of furniture" if plan.furniture else ""
+    return [f"    {area:.0f} m2 of floor{furniture}: {kinds}", f"    can be closed: {', '.join(doors) or 'none'}"]
+
+
+def describe_world(plan: FloorPlan) -> list[str]:
+    """A plan in words: its rooms with area and doors, its doors with place, width and rooms."""
+    from closedrooms.worlds.closing import closable_rooms
+
+    closable = closable_rooms(plan)
+    marked = {door for doors in closable.values() for door in doors}
+    by_room: dict[str, list[str]] = {}
+    for door in plan.doors:
+        for room in door.rooms:
+            by_room.setdefault(str(room), []).append(door.id)
+    lines = [shown(plan.name), *_details(plan), "", f"{'room':<16} {'kind':<12} {'area':>9}  doors"]
+    for place in plan.rooms:
+        can = "  (closable)" if place.id in closable else ""
+        doors = ", ".join(map(shown, by_room.get(place.id, [])))
+        lines.append(f"{shown(place.id):<16} {shown(place.label):<12} {place.polygon.area:6.1f} m2  {doors}{can}")
+    lines += ["", f"{'door':<16} {'x [m]':>8} {'y [m]':>8} {'width':>7}  between"]
+    for door in plan.doors:
+        x, y = door.midpoint
+        rooms = " and ".join("outside" if room is None else shown(room) for room in door.rooms)
+        can = "  (closable)" if door.id in marked else ""
+        lines.append(f"{shown(door.id):<16} {x:8.2f} {y:8.2f} {door.width:5.2f} m  {rooms}{can}")
     return lines
 
 
@@ -91,6 +131,8 @@ def beside(path: Path, to: str) -> list[Path]:
         case "rosmap":
             stem = map_stem(path)
             return [stem.with_name(stem.name + ending) for ending in (".yaml", ".png", ".doors.geojson")]
+        case "urdf":
+            return [path, path.with_suffix(".obj")]
         case "stage":
             return [path.with_suffix(ending) for ending in (".world", ".png")]
     return []
@@ -103,11 +145,19 @@ def map_stem(path: Path) -> Path:
 
 def exporters() -> dict[str, Callable[[Path, FloorPlan], None]]:
     """Writers of floor plans by the name of their format."""
+    from closedrooms.worlds.formats.mesh import write_obj, write_urdf
     from closedrooms.worlds.formats.native import write_plan
     from closedrooms.worlds.formats.sdf import write_sdf
     from closedrooms.worlds.formats.stage import write_stage
 
-    return {"json": write_plan, "rosmap": write_ros_map, "sdf": write_sdf, "stage": write_stage}
+    return {
+        "json": write_plan,
+        "obj": write_obj,
+        "rosmap": write_ros_map,
+        "sdf": write_sdf,
+        "stage": write_stage,
+        "urdf": write_urdf,
+    }
 
 
 def write_ros_map(path: Path, plan: FloorPlan) -> None:

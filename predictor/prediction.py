@@ -56,6 +56,49 @@ class PredictionTrace:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class WeighedRoom:
+    """What a method weighed for one room: its candidates, and why one of them was taken.
+
+    Attributes:
+        doors: Ids of the doors that lead to it.
+        corners: Of the candidates, rectangles in the map frame [m], best by itself first, shape (n, 4, 2).
+        scores: Of each by itself, shape (n,).
+        joint: Of each beside the rooms that the other doors were given, shape (n,).
+        chosen: Index of the one that was taken.
+        runner_up: Index of the best one that is another room, ``None`` where all are much the same.
+        terms: What each kind of evidence counts for the chosen one and for the runner-up, by name; a column sums up to
+            the joint score.
+    """
+
+    doors: tuple[str, ...]
+    corners: FloatArray
+    scores: FloatArray
+    joint: FloatArray
+    chosen: int
+    runner_up: int | None
+    terms: Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WeighedTrace:
+    """What a method that weighs whole rooms saw and weighed; all coordinates in the map frame [m].
+
+    Attributes:
+        faces: Wall faces ``x0, y0, x1, y1``, shape (n, 4).
+        directions: Where each of them faces [rad], shape (n,).
+        axes: Axes about which the building is symmetric, ``x0, y0, x1, y1``, shape (k, 4).
+        rooms: The candidates, room by room.
+        levels: Each door's best candidate by itself, then the rooms chosen together.
+    """
+
+    faces: FloatArray
+    directions: FloatArray
+    axes: FloatArray
+    rooms: tuple[WeighedRoom, ...]
+    levels: tuple[Level, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
     """A completed map with the rooms that complete it.
 
@@ -74,7 +117,7 @@ class Prediction:
     grid: OccupancyGrid
     rooms: tuple[Room, ...]
     failures: dict[str, str] = field(default_factory=dict)
-    trace: PredictionTrace | None = None
+    trace: PredictionTrace | WeighedTrace | None = None
     probability: OccupancyGrid | None = None
     beliefs: tuple[Belief, ...] = ()
 

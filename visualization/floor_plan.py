@@ -1,6 +1,7 @@
 """Pictures of floor plans."""
 
 import io
+import math
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from shapely.geometry.polygon import orient
 
 from closedrooms.core.files import write_bytes
 from closedrooms.core.names import plot_text
+from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.geometry import door_leaf, wall_area
 from closedrooms.worlds.plan import FloorPlan, PlanDoor
 from closedrooms.worlds.start_pose import start_pose
@@ -22,13 +24,18 @@ COLOURS = {
     "bathroom": "#d6eef0", "store": "#e6e0ea", "closet": "#e6e0ea", "stairs": "#e3e3e3", "elevator": "#e3e3e3",
 }  # fmt: skip
 OTHER, WALL, OPEN, CLOSED, START = "#ece9f3", "#3b3f46", "#9a6b3f", "#c0392b", "#1f77b4"
+CLOSABLE = "#1b4f9c"
+# Room for numbers along the axes [inches].
+MARGIN = 0.42
 DOTS_PER_INCH = 110
 # Characters of 10 points in an inch of title, and how many of a name are shown at least.
 CHARACTERS_PER_INCH, SHORTEST_NAME = 11.0, 12
 
 
 def draw_plan(plan: FloorPlan, path_png: str | Path, *, closed: Collection[str] = ()) -> None:
-    """Write a picture of a plan: rooms by label, walls, doors open or closed, furniture, the start.
+    """Write a picture of a plan: rooms by label, walls, doors by name, furniture, the start; axes in metres.
+
+    Doors of rooms that ``closedrooms run`` may close have their names in bold blue, the others in brown.
 
     Args:
         plan: The building.
@@ -47,9 +54,12 @@ def draw_plan(plan: FloorPlan, path_png: str | Path, *, closed: Collection[str] 
     inches = 11.0 / max(width, height)
     figure = Figure(figsize=(max(width * inches, 4.0), max(height * inches, 2.5)), dpi=DOTS_PER_INCH)
     FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 0.95))
+    left, low = MARGIN / figure.get_figwidth(), MARGIN / figure.get_figheight()
+    axes = figure.add_axes((left, low, 1.0 - 1.2 * left, 0.95 - low))
     axes.set_aspect("equal")
-    axes.set_axis_off()
+    axes.tick_params(labelsize=6, length=2)
+    axes.set_xlabel("x [m]", fontsize=7, labelpad=1)
+    axes.set_ylabel("y [m]", fontsize=7, labelpad=1)
     axes.set_xlim(x_min - 1.0, x_max + 1.0)
     axes.set_ylim(y_min - 1.0, y_max + 1.0)
     for room in plan.rooms:
@@ -57,8 +67,11 @@ def draw_plan(plan: FloorPlan, path_png: str | Path, *, closed: Collection[str] 
     for thing in plan.furniture:
         _fill(axes, thing.polygon, "#b9a58c", edgecolor="#8a7559")
     _fill(axes, walls, WALL)
+    closable = {door for doors in closable_rooms(plan).values() for door in doors}
     for door in plan.doors:
         _draw_door(axes, plan, door, closed=door.id in closed)
+        _name_door(axes, door, CLOSED if door.id in closed else CLOSABLE if door.id in closable else OPEN)
+    _draw_scale(axes, x_max - x_min)
     _write_labels(axes, plan)
     pose = start_pose(plan)
     axes.plot(pose.x, pose.y, marker=(3, 0, pose.theta * 57.29578 - 90.0), color=START, markersize=9)
@@ -100,13 +113,27 @@ def _fill(axes: Any, area: Polygon | MultiPolygon, colour: str, *, edgecolor: st
 def _draw_door(axes: Any, plan: FloorPlan, door: PlanDoor, *, closed: bool) -> None:
     if closed:
         _fill(axes, door_leaf(plan, door).buffer(0.06), CLOSED)
-        axes.annotate(plot_text(door.id), door.midpoint, xytext=(4, 4), textcoords="offset points", fontsize=6,
-                      color=CLOSED, parse_math=False)  # fmt: skip
     elif door.kind == "hinged":
         _draw_swing(axes, plan, door)
     else:
         xs, ys = zip(*door.segment, strict=True)
         axes.plot(xs, ys, color=OPEN, lw=1.2, ls="-" if door.kind == "double" else ":")
+
+
+def _name_door(axes: Any, door: PlanDoor, colour: str) -> None:
+    weight = "normal" if colour == OPEN else "bold"
+    axes.annotate(plot_text(door.id), door.midpoint, xytext=(3, 3), textcoords="offset points", fontsize=5.5,
+                  color=colour, weight=weight, parse_math=False)  # fmt: skip
+
+
+def _draw_scale(axes: Any, width: float) -> None:
+    """A bar of 1, 2 or 5 times a power of ten metres, at most a fifth of the building, in the lower right corner."""
+    power = 10.0 ** math.floor(math.log10(width / 5.0))
+    length = max(step * power for step in (1.0, 2.0, 5.0) if step * power <= width / 5.0)
+    (_, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    y = low + 0.015 * (high - low)
+    axes.plot([right - 0.3 - length, right - 0.3], [y, y], color=WALL, lw=3, solid_capstyle="butt")
+    axes.text(right - 0.3 - length / 2, y, f"{length:g} m", fontsize=6, ha="center", va="bottom", color=WALL)
 
 
 def _draw_swing(axes: Any, plan: FloorPlan, door: PlanDoor) -> None:

@@ -139,9 +139,7 @@ def _make_sample(task: Task, variant: Variant, plan: FloorPlan) -> None:
     }
     with (
         output_folder(task.folder, manifest) as staging,
-        open_recording(
-            staging / "run.rrd" if config.record else None, plan, config.sim.robot, name=variant.id
-        ) as recorder,
+        open_recording(staging / "run.rrd" if config.record else None, config.sim.robot, name=variant.id) as recorder,
     ):
         recorder.configuration(manifest["configuration"])
         recorder.building(plan, start.inverse(), closed)

@@ -41,6 +41,20 @@ def read_bag(path: Path, options: BagOptions) -> RecordedRun:
         InvalidInputError: ``rosbags`` is not installed, a broken bag, a topic missing or ambiguous, a mounting that is
             unknown or not level.
     """
+    with opened_bag(path) as reader:
+        wanted, remarks = choose_connections(reader.connections, options)
+        messages = read_messages(reader, wanted)
+    with reading(path, "a rosbag"):
+        return _resolved(messages, options, remarks)
+
+
+@contextlib.contextmanager
+def opened_bag(path: Path) -> Iterator[Any]:
+    """A reader of a bag of any kind.
+
+    Raises:
+        InvalidInputError: ``rosbags`` is not installed, or a broken bag.
+    """
     try:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
@@ -50,12 +64,13 @@ def read_bag(path: Path, options: BagOptions) -> RecordedRun:
         ) from error
     for file in path.iterdir() if is_folder(path) else [path]:
         check_regular(file, "a rosbag")
-    with reading(path, "a rosbag"), _named(path) as named:
+    with (
+        reading(path, "a rosbag"),
+        _named(path) as named,
         # Bags of ROS 2 before Iron do not carry the definitions of their messages.
-        with AnyReader([named], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            wanted, remarks = choose_connections(reader.connections, options)
-            messages = read_messages(reader, wanted)
-        return _resolved(messages, options, remarks)
+        AnyReader([named], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader,
+    ):
+        yield reader
 
 
 @contextlib.contextmanager

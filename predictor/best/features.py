@@ -371,3 +371,9 @@ def score_rectangles(
     rectangles = Rectangles(frame, evidence, entry, boxes)
     measured = np.stack([feature.measure(rectangles) for feature in FEATURES], axis=-1)
     return np.round(measured @ WEIGHTS, 9), measured
+
+
+def weigh_rectangles(frame: DoorFrame, evidence: Evidence, entry: Entry, boxes: IntArray) -> dict[str, FloatArray]:
+    """Say what each feature counts in :func:`score_rectangles`, by its name, each of shape (n,)."""
+    rectangles = Rectangles(frame, evidence, entry, boxes)
+    return {feature.name: np.asarray(feature.measure(rectangles) * feature.weight) for feature in FEATURES}

@@ -6,21 +6,18 @@ sides is scored by its evidence; the rectangles of all doors are then chosen tog
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
-
-import numpy as np
-import shapely
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.best.belief import believe
-from closedrooms.predictor.best.hypotheses import Hypotheses, propose_rectangles
+from closedrooms.predictor.best.hypotheses import propose_rectangles
 from closedrooms.predictor.best.room_shape import trace_rooms
-from closedrooms.predictor.best.scene import Scene, prepare
+from closedrooms.predictor.best.scene import prepare
 from closedrooms.predictor.best.selection import select_jointly
+from closedrooms.predictor.best.trace import trace_of
 from closedrooms.predictor.config import BestConfig
 from closedrooms.predictor.inpainting import complete_map
-from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
+from closedrooms.predictor.prediction import Prediction
 from closedrooms.predictor.structure.doorways import find_doorways
 
 
@@ -48,27 +45,5 @@ def predict_best(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: BestC
     failures = scene.failures | without
     in_order = {door.id: failures[door.id] for door in doors if door.id in failures}
     beliefs = believe(scene, chosen, rooms, openings)
-    prediction = Prediction(completed, tuple(rooms), in_order, beliefs=beliefs)
-    return _with_trace(prediction, scene, hypotheses.alone) if config.keep_trace and scene.poses else prediction
-
-
-def _with_trace(prediction: Prediction, scene: Scene, alone: Sequence[Hypotheses]) -> Prediction:
-    """Add two levels: each door's best rectangle by itself, and the rooms chosen together."""
-    names = [pose.facing.door.id for pose in scene.poses]
-    first = {name: shapely.Polygon(own.corners[0]) for name, own in zip(names, alone, strict=True)}
-    scores = {name: float(own.scores[0]) for name, own in zip(names, alone, strict=True)}
-    together = {door: room.polygon for room in prediction.rooms for door in room.doors}
-    last = {door: room.score or 0.0 for room in prediction.rooms for door in room.doors}
-    none = np.zeros(0, dtype=np.bool_)
-    trace = PredictionTrace(
-        segments=np.zeros((0, 4)),
-        clusters=np.zeros(0, dtype=np.int64),
-        lines=np.zeros((0, 4)),
-        line_kinds=(),
-        faces=(),
-        unknown=none,
-        border=none,
-        initial={},
-        levels=(Level(0, first, scores), Level(1, together, last)),
-    )
-    return replace(prediction, trace=trace)
+    trace = trace_of(scene, hypotheses, chosen, rooms) if config.keep_trace and scene.poses else None
+    return Prediction(completed, tuple(rooms), in_order, trace, beliefs=beliefs)

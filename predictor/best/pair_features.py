@@ -150,11 +150,26 @@ def score_pairs(a: Hypotheses, b: Hypotheses, thickness: int) -> tuple[FloatArra
     if a.angle != b.angle:
         slanted = _overlap_slanted(a.corners, b.corners)
         return OVERLAP_WEIGHT * slanted, slanted
+    pairs = _pair_up(a, b, thickness)
+    return np.asarray(_measure(pairs) @ WEIGHTS), pairs.overlap
+
+
+def weigh_pairs(a: Hypotheses, b: Hypotheses, thickness: int) -> dict[str, FloatArray]:
+    """Say what each feature counts in :func:`score_pairs`, by its name, each of shape (n, m)."""
+    if a.angle != b.angle:
+        return {"overlap": OVERLAP_WEIGHT * _overlap_slanted(a.corners, b.corners)}
+    terms = _measure(_pair_up(a, b, thickness)) * WEIGHTS
+    return {feature.name: terms[..., number] for number, feature in enumerate(PAIR_FEATURES)}
+
+
+def _pair_up(a: Hypotheses, b: Hypotheses, thickness: int) -> Pairs:
     in_one_wall = a.quarter == b.quarter and abs(a.v - b.v) < SAME_WALL
     back = (3, 0, 1, 2)[a.quarter] if in_one_wall else None
-    pairs = Pairs(a.boxes, b.boxes, back, thickness, agree=float(np.exp(-abs(a.u - b.u) / DEPTH_REACH)))
-    features = np.stack([feature.measure(pairs) for feature in PAIR_FEATURES], axis=-1)
-    return np.asarray(features @ WEIGHTS), pairs.overlap
+    return Pairs(a.boxes, b.boxes, back, thickness, agree=float(np.exp(-abs(a.u - b.u) / DEPTH_REACH)))
+
+
+def _measure(pairs: Pairs) -> FloatArray:
+    return np.stack([feature.measure(pairs) for feature in PAIR_FEATURES], axis=-1)
 
 
 def _overlap_slanted(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ USAGE = {
     ("run", "--radius", "0.3"): "unknown option --radius; did you mean --sim.robot.radius?",
     ("run", "--no-recrod"): "unknown option --no-recrod; did you mean --record?",
     ("run", "--xyzzy"): "unknown option --xyzzy; closedrooms run --help-all lists what there is",
-    ("run", "a", "b"): "unexpected argument 'b'",
+    ("worlds", "show", "a", "b", "--out", "x.png"): "unexpected argument 'b'",
     ("run", "--noise", "hihg"): "--noise: unknown value 'hihg'; did you mean high?",
     ("run", "--noise", "deafening"): "--noise: unknown value 'deafening'; expected one of none, low, medium, high",
     ("run", "--seed", "x"): "--seed: invalid literal",

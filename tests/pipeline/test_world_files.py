@@ -5,7 +5,14 @@ from PIL import Image
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.rosmap import read_map
-from closedrooms.pipeline.world_files import convert_world, exporters, generate_world, list_worlds, show_world
+from closedrooms.pipeline.world_files import (
+    convert_world,
+    describe_world,
+    exporters,
+    generate_world,
+    list_worlds,
+    show_world,
+)
 from closedrooms.worlds.formats.native import read_plan
 from closedrooms.worlds.library import bundled_names, load_world
 
@@ -45,7 +52,9 @@ def test_convert_to_a_ros_map_gives_the_true_map_of_the_building(tmp_path: Path)
 
 
 def test_an_unknown_format_lists_the_valid_ones(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="unknown format 'dwg'; expected one of json, rosmap, sdf, stage"):
+    with pytest.raises(
+        InvalidInputError, match="unknown format 'dwg'; expected one of json, obj, rosmap, sdf, stage, urdf"
+    ):
         convert_world("office-01", tmp_path / "m", "dwg")
     assert {"json", "rosmap"} <= set(exporters())
     assert not list(tmp_path.iterdir())
@@ -63,3 +72,20 @@ def test_a_level_of_a_world_with_one_floor_is_refused() -> None:
         load_world("office-01", level="L1")
     with pytest.raises(InvalidInputError, match="--level L1 of a world with one floor"):
         load_world(str(FIXTURES / "kth_small.xml"), level="L1")
+
+
+def test_more_lines_name_the_kinds_of_rooms_and_the_doors_that_can_be_closed() -> None:
+    lines = list_worlds(verbose=True)
+    assert len(lines) == 3 * len(list_worlds())
+    at = next(number for number, line in enumerate(lines) if line.startswith("office-01"))
+    assert "3 shared office" in lines[at + 1]
+    assert lines[at + 2].split(": ")[1].split(", ") == [f"d{number:02d}" for number in range(7)]
+
+
+def test_a_plan_in_words_has_every_room_and_door() -> None:
+    plan = load_world("office-07")
+    lines = describe_world(plan)
+    for thing in (*plan.rooms, *plan.doors):
+        assert sum(line.startswith(f"{thing.id} ") for line in lines) == 1
+    assert not next(line for line in lines if line.startswith("d09 ")).endswith("(closable)")
+    assert next(line for line in lines if line.startswith("d10 ")).endswith("(closable)")

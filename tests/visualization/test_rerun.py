@@ -22,7 +22,6 @@ from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
 from closedrooms.visualization import colours
 from closedrooms.visualization.no_recording import no_recording
 from closedrooms.visualization.rerun import drawables
-from closedrooms.visualization.rerun.blueprint import Layout
 from closedrooms.visualization.rerun.recorder import Recorder
 from closedrooms.visualization.rerun.stream import Stage
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom, Wall
@@ -87,7 +86,7 @@ def a_scan(stamp: float) -> LaserScan:
 def record_run(path: Path, *, shift: float = 0.0, seconds: float = 4.0, out: str = "here") -> None:
     """A whole run in miniature; ``shift`` moves the robot."""
     door = ClosedDoor("d01", (5.45, 1.5), ((5.0, 1.5), (5.9, 1.5)), 0.9)
-    with Recorder(path, name="two-rooms-0", layout=Layout(driving=True)) as recorder:
+    with Recorder(path, name="two-rooms-0") as recorder:
         recorder.configuration({"seed": 0, "lidar": {"beams": 36}, "level": None, "out": out})
         recorder.building(a_plan(), Pose2(-1.0, -1.5), {"d01"})
         for number in range(round(seconds * 10)):
@@ -225,7 +224,7 @@ def test_a_map_is_drawn_the_right_way_up() -> None:
 
 def test_a_prediction_without_a_run_has_only_stages(tmp_path: Path) -> None:
     path = tmp_path / "predict.rrd"
-    with Recorder(path, name="map", layout=Layout(building=False, mapping=False, coverage=False)) as recorder:
+    with Recorder(path, name="map") as recorder:
         recorder.prediction(a_map(), [ClosedDoor("d01", (5.0, 3.0))], a_prediction())
     assert rerun("verify", path) == 0
     assert {n for chunk in RrdReader(path).stream().to_chunks() for n in chunk.timeline_names} == {"stage"}
@@ -236,7 +235,7 @@ def test_a_prediction_without_rooms_or_lines_can_be_recorded(tmp_path: Path) -> 
     no = np.zeros(0, dtype=bool)
     trace = PredictionTrace(nothing, np.zeros(0), nothing, (), (), no, no, {}, ())
     path = tmp_path / "empty.rrd"
-    with Recorder(path, name="empty", layout=Layout(building=False, mapping=False)) as recorder:
+    with Recorder(path, name="empty") as recorder:
         recorder.prediction(a_map(), [], Prediction(a_map(), (), {}, trace))
         recorder.tours({})
     assert rerun("verify", path) == 0
@@ -244,7 +243,7 @@ def test_a_prediction_without_rooms_or_lines_can_be_recorded(tmp_path: Path) -> 
 
 def test_a_log_of_a_real_robot_needs_no_truth(tmp_path: Path) -> None:
     path = tmp_path / "log.rrd"
-    with Recorder(path, name="log", layout=Layout(building=False, prediction=False, coverage=False)) as recorder:
+    with Recorder(path, name="log") as recorder:
         for number in range(10):
             recorder.scan(a_scan(number * 1.0), Pose2(number, 0.0), Pose2(number, 0.1))
             recorder.map(a_map(), number * 1.0)
@@ -255,7 +254,7 @@ def test_a_log_of_a_real_robot_needs_no_truth(tmp_path: Path) -> None:
 def test_a_reference_that_comes_afterwards_gives_errors(tmp_path: Path) -> None:
     path = tmp_path / "log.rrd"
     stamps = np.arange(10.0)
-    with Recorder(path, name="log", layout=Layout(building=False, prediction=False, coverage=False)) as recorder:
+    with Recorder(path, name="log") as recorder:
         for stamp in stamps:
             recorder.scan(a_scan(stamp), Pose2(stamp, 0.0), Pose2(stamp, 0.1))
         recorder.reference(stamps, np.column_stack((stamps, np.zeros((10, 2)))))
@@ -266,18 +265,20 @@ def test_a_reference_that_comes_afterwards_gives_errors(tmp_path: Path) -> None:
 def test_a_room_that_is_no_longer_predicted_vanishes(tmp_path: Path) -> None:
     path = tmp_path / "drive.rrd"
     nothing_left = Prediction(a_map(), (), {}, None)
-    with Recorder(path, name="drive", layout=Layout(building=False, driving=True)) as recorder:
+    with Recorder(path, name="drive") as recorder:
         recorder.revision(a_prediction(), np.zeros((2, 2)), 1.0)
         recorder.revision(nothing_left, np.zeros((2, 2)), 2.0)
-    cleared = [row for row in rows(path, "/driving/predicted/rooms/d01") if row.get("Clear:is_recursive")]
-    assert [row["stage"] for row in cleared] == [Stage.DRIVING]
+    cleared = [row for row in rows(path, "/driving/predicted/rooms") if row.get("Clear:is_recursive")]
+    assert [row["sim_time"].total_seconds() for row in cleared] == [1.0, 2.0]
+    drawn = [row for row in rows(path, "/driving/predicted/rooms/d01") if "sim_time" in row]
+    assert [row["sim_time"].total_seconds() for row in drawn] == [1.0]
 
 
 def test_messages_of_the_library_reach_the_recording_and_the_handler_goes(tmp_path: Path) -> None:
     path = tmp_path / "log.rrd"
     logger = logging.getLogger("closedrooms")
     before = logger.level
-    with Recorder(path, name="log", layout=Layout()) as recorder:
+    with Recorder(path, name="log") as recorder:
         logging.getLogger("closedrooms.mapping.mapper").info("a loop was closed")
         recorder.note("noted")
     texts = [row["TextLog:text"][0] for e in entities(path) if e.startswith("/log/") for row in rows(path, e)]
@@ -287,7 +288,7 @@ def test_messages_of_the_library_reach_the_recording_and_the_handler_goes(tmp_pa
 
 
 def test_an_error_inside_closes_the_file_and_stays_an_error(tmp_path: Path) -> None:
-    with pytest.raises(ZeroDivisionError), Recorder(tmp_path / "x.rrd", name="x", layout=Layout()):
+    with pytest.raises(ZeroDivisionError), Recorder(tmp_path / "x.rrd", name="x"):
         raise ZeroDivisionError
     assert logging.getLogger("closedrooms").handlers == []
 

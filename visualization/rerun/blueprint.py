@@ -12,56 +12,90 @@ from closedrooms.visualization import colours
 Bounds = tuple[float, float, float, float]
 BACKGROUND = [colours.UNKNOWN] * 3
 # The viewer's default vertical field of view is 55 degrees.
+# Where nothing is known yet [m].
+DEFAULT_BOUNDS: Bounds = (-20.0, -20.0, 20.0, 20.0)
+# Bar charts on one page of the tab Weighing.
+CHARTS = 4
 HALF_VIEW = math.radians(55.0) / 2
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
-    """Which stages a recording has.
+class Contents:
+    """What a recording holds by now; tabs and views are made of nothing else.
 
     Attributes:
-        bounds: ``x_min, y_min, x_max, y_max`` [m] in the map frame that a map seen from above shows; a recorder
-            replaces them by those of the building or of the map as soon as it knows them.
-        building: There is a simulated building (tab ``Building``).
-        mapping: There is a robot that maps (tab ``Mapping``).
-        reference: True poses are known beside the estimated ones.
-        prediction: There is a prediction (tabs ``Structure``, ``Expansion``, ``Rooms``).
-        coverage: There are tours (tab ``Coverage``).
-        driving: The robot drives the tour (tab ``Driving``).
-        active: Name of the tab in front, by default the last stage but the tables.
+        building: A simulated building (tab ``Building``).
+        door_states: Closed doors whose state is known.
+        mapping: A robot that maps (tab ``Mapping``).
+        reference: True poses beside the estimated ones.
+        weighed: Entity names of the rooms whose candidates a method weighed (tabs ``Evidence``, ``Weighing``).
+        expansion: Lines, faces and layouts level by level (tabs ``Structure``, ``Expansion``).
+        rooms: Predicted rooms (tab ``Rooms``).
+        room_iou: How well each room is predicted, over time.
+        truth: The true map and rooms.
+        tours: Names of the maps with a tour (tab ``Coverage``).
+        driving: The robot drives a tour (tab ``Driving``).
+        result: A table of results (tab ``Result``).
+        configuration: The configuration as resolved.
+        active: Name of the tab in front.
     """
 
-    bounds: Bounds = (-20.0, -20.0, 20.0, 20.0)
-    building: bool = True
-    mapping: bool = True
-    reference: bool = True
-    prediction: bool = True
-    coverage: bool = True
+    building: bool = False
+    door_states: bool = False
+    mapping: bool = False
+    reference: bool = False
+    weighed: tuple[str, ...] = ()
+    expansion: bool = False
+    rooms: bool = False
+    room_iou: bool = False
+    truth: bool = False
+    tours: tuple[str, ...] = ()
     driving: bool = False
-    active: str | None = None
+    result: bool = False
+    configuration: bool = False
+    active: str = "Building"
 
 
-def arrange(layout: Layout) -> rrb.Blueprint:
-    """The blueprint of a recording."""
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What a recording holds, and where: ``bounds`` are ``x_min, y_min, x_max, y_max`` [m] in the map frame."""
+
+    holds: Contents
+    bounds: Bounds
+
+
+def arrange(holds: Contents, bounds: Bounds | None) -> rrb.Blueprint:
+    """The blueprint of a recording.
+
+    Args:
+        holds: What the recording holds.
+        bounds: What a map seen from above shows.
+    """
+    layout = Layout(holds, bounds or DEFAULT_BOUNDS)
     tabs: list[rrb.Container | rrb.View] = []
-    if layout.building:
+    if holds.building:
         tabs.append(_building(layout))
-    if layout.mapping:
+    if holds.mapping:
         tabs.append(_mapping(layout))
-    if layout.prediction:
-        tabs += [_structure(layout), _expansion(layout), _rooms(layout)]
-    if layout.coverage:
+    if holds.weighed:
+        tabs += [_evidence(layout), _weighing(layout)]
+    if holds.expansion:
+        tabs += [_structure(layout), _expansion(layout)]
+    if holds.rooms or holds.truth:
+        tabs.append(_rooms(layout))
+    if holds.tours:
         tabs.append(_coverage(layout))
-    if layout.driving:
+    if holds.driving:
         tabs.append(_driving(layout))
-    tabs.append(_result())
+    if holds.result or holds.configuration:
+        tabs.append(_result(layout))
     names = [str(tab.name) for tab in tabs]
-    active = names.index(layout.active) if layout.active in names else 0
+    active = names.index(holds.active) if holds.active in names else 0
     return rrb.Blueprint(
-        rrb.Tabs(*tabs, active_tab=active),
+        *([rrb.Tabs(*tabs, active_tab=active)] if tabs else []),
         rrb.TimePanel(
             state="collapsed",
-            timeline="sim_time" if layout.mapping else "stage",
+            timeline="sim_time" if holds.mapping or holds.building else "stage",
             # Opens at the end, where every view holds something; one scrubs back from there.
             play_state="following",
             # A sequence has no speed of its own: two stages a second can be followed by eye.
@@ -96,12 +130,11 @@ def _building(layout: Layout) -> rrb.Container:
         background=BACKGROUND,
         line_grid=False,
     )
-    side = rrb.Vertical(
-        rrb.TextDocumentView(origin="/stage", name="Stage"),
-        rrb.StateTimelineView(origin="/door_states", name="Closed doors"),
-        _log(),
-        row_shares=[2, 4, 3],
-    )
+    views: list[rrb.View] = [rrb.TextDocumentView(origin="/stage", name="Stage")]
+    if layout.holds.door_states:
+        views.append(rrb.StateTimelineView(origin="/door_states", name="Closed doors, over sim_time [s]"))
+    views.append(_log())
+    side = rrb.Vertical(*views, row_shares=[2, 4, 4][: len(views)])
     return rrb.Horizontal(view, side, column_shares=[3, 1], name="Building")
 
 
@@ -112,13 +145,63 @@ def _mapping(layout: Layout) -> rrb.Container:
         "heading_error": "Heading error [deg]",
         "odometry_error": "Error of the odometry alone [m]",
     }
+    titles = errors if layout.holds.reference else {}
     side = rrb.Vertical(
-        *(_series(name, title) for name, title in errors.items() if layout.reference),
+        *(_series(name, title) for name, title in titles.items()),
         _series("known_area", "Known area [m²]"),
         rrb.Tabs(rrb.TextDocumentView(origin="/legend", name="Colours"), _log(), active_tab=0),
-        row_shares=[3] * (4 if layout.reference else 1) + [4],
+        row_shares=[3] * (len(titles) + 1) + [4],
     )
     return rrb.Horizontal(view, side, column_shares=[2, 1], name="Mapping")
+
+
+def _evidence(layout: Layout) -> rrb.Container:
+    """What was seen, what was weighed, what came of it."""
+    plain = ["+ /prediction/input", "+ /prediction/doors/**"]
+    aspect = 1.9
+    return rrb.Grid(
+        _from_above(
+            layout,
+            "Wall faces by the way they face (violet: axis of symmetry)",
+            [*plain, "+ /prediction/wall_faces", "+ /prediction/symmetry"],
+            aspect=aspect,
+        ),
+        _from_above(
+            layout,
+            "Candidates by door with their scores (filled: chosen, violet: runner-up)",
+            ["+ /prediction/input", "+ /prediction/doors/bars", "+ /prediction/candidates/**"],
+            aspect=aspect,
+        ),
+        _from_above(layout, "Rooms chosen together", [*plain, "+ /prediction/layouts/**"], aspect=aspect),
+        rrb.TextDocumentView(origin="/weighing/candidates", name="Candidates at the end"),
+        grid_columns=2,
+        name="Evidence",
+    )
+
+
+def _weighing(layout: Layout) -> rrb.Container:
+    """For each room a bar chart of the terms of the chosen candidate against the runner-up, and their names."""
+    rooms = layout.holds.weighed
+    pages = [
+        rrb.Grid(*(_weighed(room) for room in rooms[at : at + CHARTS]), grid_columns=2, name=_page(rooms, at))
+        for at in range(0, len(rooms), CHARTS)
+    ]
+    return rrb.Tabs(*pages, active_tab=0, name="Weighing")
+
+
+def _page(rooms: Sequence[str], at: int) -> str:
+    page = rooms[at : at + CHARTS]
+    return page[0] if len(page) == 1 else f"{page[0]} to {page[-1]}"
+
+
+def _weighed(room: str) -> rrb.Container:
+    chart = rrb.BarChartView(
+        origin=f"/weighing/{room}",
+        contents=[f"+ /weighing/{room}/chosen", f"+ /weighing/{room}/runner_up"],
+        name=f"{room}: what each term counts [log-odds], by number",
+        plot_legend=rrb.PlotLegend(visible=False),
+    )
+    return rrb.Horizontal(chart, rrb.TextDocumentView(origin=f"/weighing/{room}/terms", name=f"{room}: terms"))
 
 
 def _structure(layout: Layout) -> rrb.Container:
@@ -145,7 +228,7 @@ def _expansion(layout: Layout) -> rrb.Container:
     )
     side = rrb.Vertical(
         rrb.TextDocumentView(origin="/stage", name="Stage"),
-        rrb.TimeSeriesView(origin="/metrics/score", name="Score of each room by level (on the timeline stage)"),
+        rrb.TimeSeriesView(origin="/metrics/score", name="Score of each room (no unit) over stage [level]"),
         rrb.TextDocumentView(origin="/prediction/scores", name="Scores"),
         row_shares=[2, 3, 3],
     )
@@ -153,26 +236,38 @@ def _expansion(layout: Layout) -> rrb.Container:
 
 
 def _rooms(layout: Layout) -> rrb.Container:
-    """Prediction and truth, one above the other where the building is wide."""
-    wide = _is_wide(layout)
-    aspect = 3.0 if wide else 0.8
-    views = [_from_above(layout, "Predicted map", ["+ /rooms/predicted/**"], aspect=aspect)]
-    if layout.building:
+    """Prediction and truth, one above the other where the building is wide; beside them how the prediction grew."""
+    holds, wide = layout.holds, _is_wide(layout)
+    aspect = 2.2 if wide else 0.6
+    views = []
+    if holds.rooms:
+        contents = ["+ /rooms/predicted/**", "+ /prediction/doors/bars"]
+        views.append(_from_above(layout, "Predicted map", contents, aspect=aspect))
+    if holds.truth:
         views.append(_from_above(layout, "Truth", ["+ /rooms/truth/**"], aspect=aspect))
-    stack = rrb.Vertical if wide else rrb.Horizontal
-    return stack(*views, name="Rooms")
+    maps = (rrb.Vertical if wide else rrb.Horizontal)(*views)
+    if not holds.mapping:
+        return rrb.Horizontal(maps, name="Rooms")
+    curves = [_series("known_area", "Known area [m²]"), _log()]
+    if holds.room_iou:
+        curves.insert(0, _series("room_iou", "IoU with the true room, by door [0..1]", top=1.0))
+    return rrb.Horizontal(maps, rrb.Vertical(*curves), column_shares=[2, 1], name="Rooms")
 
 
 def _coverage(layout: Layout) -> rrb.Container:
+    titles = {
+        "closed": ("Tour on the map M with its closed doors", "+ /coverage/closed/grid"),
+        "predicted": ("Tour on the predicted map", "+ /coverage/predicted/grid"),
+        "truth": ("Tour on the true map", "+ /rooms/truth/grid"),
+    }
     views: list[rrb.View] = [
-        _from_above(layout, title, [f"+ /coverage/{name}/**", f"+ {grid}"])
-        for name, title, grid in (
-            ("closed", "Tour on the map M with its closed doors", "/prediction/input"),
-            ("predicted", "Tour on the predicted map", "/rooms/predicted/grid"),
-            ("truth", "Tour on the true map", "/rooms/truth/grid"),
-        )
+        _from_above(layout, titles[name][0], [f"+ /coverage/{name}/**", titles[name][1]])
+        for name in layout.holds.tours
+        if name in titles
     ]
-    return rrb.Grid(*views, rrb.TextDocumentView(origin="/result", name="Result"), grid_columns=2, name="Coverage")
+    if layout.holds.result:
+        views.append(rrb.TextDocumentView(origin="/result", name="Result"))
+    return rrb.Grid(*views, grid_columns=2, name="Coverage")
 
 
 def _driving(layout: Layout) -> rrb.Container:
@@ -190,33 +285,33 @@ def _driving(layout: Layout) -> rrb.Container:
         ],
         aspect=1.3,
     )
-    side = rrb.Vertical(
-        rrb.StateTimelineView(origin="/door_states", name="Closed doors"),
-        _series("known_area", "Known area [m²]"),
-        _log(),
-    )
-    return rrb.Horizontal(view, side, column_shares=[2, 1], name="Driving")
+    views = [_series("known_area", "Known area [m²]"), _log()]
+    if layout.holds.door_states:
+        views.insert(0, rrb.StateTimelineView(origin="/door_states", name="Closed doors, over sim_time [s]"))
+    return rrb.Horizontal(view, rrb.Vertical(*views), column_shares=[2, 1], name="Driving")
 
 
-def _result() -> rrb.Container:
-    return rrb.Horizontal(
-        rrb.TextDocumentView(origin="/result", name="Result"),
-        rrb.TextDocumentView(origin="/configuration", name="Configuration"),
-        name="Result",
-    )
+def _result(layout: Layout) -> rrb.Container:
+    views = []
+    if layout.holds.result:
+        views.append(rrb.TextDocumentView(origin="/result", name="Result"))
+    if layout.holds.configuration:
+        views.append(rrb.TextDocumentView(origin="/configuration", name="Configuration"))
+    return rrb.Horizontal(*views, name="Result")
 
 
 def _log() -> rrb.View:
     return rrb.TextLogView(origin="/log", name="Log")
 
 
-def _series(name: str, title: str) -> rrb.View:
-    """Curves over the whole run, whatever the cursor."""
+def _series(name: str, title: str, *, top: float | None = None) -> rrb.View:
+    """Curves over the whole run, whatever the cursor; along the axis the time [s]."""
     always = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
     return rrb.TimeSeriesView(
         origin=f"/metrics/{name}",
-        name=title,
+        name=f"{title} over sim_time [s]",
         axis_x=rrb.TimeAxis(view_range=always),
+        axis_y=None if top is None else rrb.ScalarAxis(range=(0.0, 1.05 * top)),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
     )
 

@@ -34,98 +34,108 @@ def draw_doors(stream: RecordingStream, root: str, doors: Sequence[ClosedDoor]) 
 
 def draw_input(stream: RecordingStream, grid: OccupancyGrid, doors: Sequence[ClosedDoor]) -> None:
     """What a prediction starts from."""
-    stream.at(stage=Stage.SEGMENTS)
     stream.log("prediction/input", drawables.grid_map(grid))
     draw_doors(stream, "prediction/doors", doors)
 
 
-def draw_trace(stream: RecordingStream, trace: "PredictionTrace", palette: Mapping[str, Colour]) -> None:
-    """Segments, lines, faces, initial faces and the expansion level by level, each a stage of its own."""
-    _draw_segments(stream, trace)
-    _draw_lines(stream, trace)
-    _draw_faces(stream, trace)
-    stream.at(stage=Stage.INITIAL)
-    _say(stream, "Initial faces", f"{len(trace.initial)} doors, each with the unknown face behind it (section 3.3)")
+def draw_trace(
+    stream: RecordingStream, trace: "PredictionTrace", palette: Mapping[str, Colour], *, staged: bool
+) -> None:
+    """Segments, lines, faces, initial faces and the expansion level by level, each a stage of its own if ``staged``."""
+    _draw_segments(stream, trace, staged=staged)
+    _draw_lines(stream, trace, staged=staged)
+    _draw_faces(stream, trace, staged=staged)
+    if staged:
+        stream.at(stage=Stage.INITIAL)
+        stream.say("Initial faces", f"{len(trace.initial)} doors, each with the unknown face behind it (section 3.3)")
+    stream.clear("prediction/initial")
     for door, face in sorted(trace.initial.items()):
         stream.log(f"prediction/initial/{door}", drawables.fill([trace.faces[face]], palette[door], alpha=170))
-    for level in trace.levels:
-        stream.at(stage=min(Stage.EXPANSION + level.k, Stage.ROOMS - 1))
-        best = ", ".join(f"{door} {score:.1f}" for door, score in sorted(level.scores.items()))
-        _say(stream, f"Expansion, level {level.k}", f"score by door: {best or 'none'} (section 3.4)")
+    stream.clear("prediction/layouts")
+    for level in trace.levels if staged else trace.levels[-1:]:
+        if staged:
+            stream.at(stage=min(Stage.EXPANSION + level.k, Stage.ROOMS - 1))
+            best = ", ".join(f"{door} {score:.1f}" for door, score in sorted(level.scores.items()))
+            stream.say(f"Expansion, level {level.k}", f"score by door: {best or 'none'} (section 3.4)")
         for door, shape in sorted(level.layouts.items()):
             _draw_room(stream, f"prediction/layouts/{door}", shape, palette[door])
-            if door in level.scores:
+            if staged and door in level.scores:
                 stream.log(f"metrics/score/{door}", rr.Scalars(level.scores[door]))
-    doors = sorted({door for level in trace.levels for door in level.scores})
-    _draw_scores(stream, trace, doors)
-    for door in doors:
-        stream.log(
-            f"metrics/score/{door}",
-            rr.SeriesLines(colors=[palette[door]], names=[door], widths=[2.0]),
-            rr.SeriesPoints(colors=[palette[door]], marker_sizes=[4.0]),
-            static=True,
-        )
+    if staged:
+        _draw_scores(stream, trace, palette)
 
 
 def draw_rooms(
-    stream: RecordingStream, root: str, grid: OccupancyGrid, rooms: Sequence[Room], palette: Mapping[str, Colour]
-) -> set[str]:
-    """A whole map with the rooms behind the doors in the doors' colours; returns the rooms' names."""
-    stream.log(f"{root}/grid", drawables.grid_map(grid))
+    stream: RecordingStream,
+    root: str,
+    grid: OccupancyGrid,
+    rooms: Sequence[Room],
+    palette: Mapping[str, Colour],
+    *,
+    iou: Mapping[str, float] | None = None,
+    static: bool = False,
+) -> None:
+    """A whole map with the rooms behind the doors in the doors' colours, labelled with IoU where known, else area."""
+    stream.log(f"{root}/grid", drawables.grid_map(grid), static=static)
+    if not static:
+        stream.clear(f"{root}/rooms")
     names = ["+".join(room.doors) or f"room-{number}" for number, room in enumerate(rooms)]
     for name, room in zip(names, rooms, strict=True):
-        _draw_room(stream, f"{root}/rooms/{name}", room.polygon, palette.get(next(iter(room.doors), ""), colours.INK))
+        colour = palette.get(next(iter(room.doors), ""), colours.INK)
+        _draw_room(stream, f"{root}/rooms/{name}", room.polygon, colour, static=static)
     places = np.array([shapely.get_coordinates(r.polygon.representative_point())[0] for r in rooms]).reshape(-1, 2)
     stream.log(
         f"{root}/labels",
-        drawables.points(places, colours.PAPER, radius=drawables.THIN, labels=[_label(r) for r in rooms]),
+        drawables.points(places, colours.PAPER, radius=drawables.THIN, labels=[_label(r, iou or {}) for r in rooms]),
+        static=static,
     )
-    return set(names)
 
 
 def draw_tours(stream: RecordingStream, tours: Mapping[str, "CoverageTour"]) -> None:
     """Topological graphs and the tours over them."""
     stream.at(stage=Stage.COVERAGE)
     lengths = ", ".join(f"{name} {tour.length:.1f} m" for name, tour in tours.items())
-    _say(stream, "Coverage", f"tours: {lengths or 'none'} (section 5)")
+    stream.say("Coverage", f"tours: {lengths or 'none'} (section 5)")
     for name, tour in tours.items():
         graph, colour = tour.graph, colours.TOURS.get(name, colours.INK)
         edges = np.asarray(graph.vertices)[graph.pairs]
-        stream.log(f"coverage/{name}/edges", drawables.strips(list(edges), (150, 150, 160), radius=drawables.THIN))
-        stream.log(f"coverage/{name}/tour", drawables.strips([tour.path], colour, z=drawables.Z_PATH))
-        stream.log(f"coverage/{name}/vertices", drawables.points(graph.vertices, colours.INK, radius=drawables.MEDIUM))
         inside = {door: graph.vertices[index] for door, index in sorted(graph.door_vertices.items())}
-        stream.log(
-            f"coverage/{name}/doors",
-            drawables.points(
-                np.array(list(inside.values())), colours.PAPER, radius=drawables.THIN, labels=list(inside)
-            ),
-        )
-        stream.log(
-            f"coverage/{name}/start",
-            drawables.points(np.asarray(tour.path)[:1], colours.GOAL, radius=2 * drawables.THICK),
-        )
+        places = np.array(list(inside.values()))
+        drawn = {
+            "edges": drawables.strips(list(edges), (150, 150, 160), radius=drawables.THIN),
+            "tour": drawables.strips([tour.path], colour, z=drawables.Z_PATH),
+            "vertices": drawables.points(graph.vertices, colours.INK, radius=drawables.MEDIUM),
+            "doors": drawables.points(places, colours.PAPER, radius=drawables.THIN, labels=list(inside)),
+            "start": drawables.points(np.asarray(tour.path)[:1], colours.GOAL, radius=2 * drawables.THICK),
+        }
+        # Planned once, at the end: there whatever the time.
+        for part, what in drawn.items():
+            stream.log(f"coverage/{name}/{part}", what, static=True)
 
 
-def _draw_segments(stream: RecordingStream, trace: "PredictionTrace") -> None:
+def _draw_segments(stream: RecordingStream, trace: "PredictionTrace", *, staged: bool) -> None:
     """Segments coloured by the line that they belong to; those of none in grey."""
-    stream.at(stage=Stage.SEGMENTS)
+    if staged:
+        stream.at(stage=Stage.SEGMENTS)
     segments = np.asarray(trace.segments).reshape(-1, 2, 2)
     clusters = np.asarray(trace.clusters)
     chosen = [
         colours.ROOM_COLOURS[cluster % len(colours.ROOM_COLOURS)] if cluster >= 0 else (130, 130, 130)
         for cluster in clusters.tolist()
     ]
-    _say(stream, "Wall segments", f"{len(segments)} segments on {clusters.max(initial=-1) + 1} lines (section 3.1)")
+    if staged:
+        stream.say("Wall segments", f"{len(segments)} segments on {clusters.max(initial=-1) + 1} lines (section 3.1)")
     stream.log("prediction/segments", drawables.strips(list(segments), *chosen, radius=drawables.THICK))
 
 
-def _draw_lines(stream: RecordingStream, trace: "PredictionTrace") -> None:
-    stream.at(stage=Stage.LINES)
+def _draw_lines(stream: RecordingStream, trace: "PredictionTrace", *, staged: bool) -> None:
+    if staged:
+        stream.at(stage=Stage.LINES)
     lines = np.asarray(trace.lines).reshape(-1, 2, 2)
     kinds = np.asarray(trace.line_kinds)
     counts = ", ".join(f"{int((kinds == kind).sum())} {kind}" for kind in dict.fromkeys(trace.line_kinds))
-    _say(stream, "Lines", f"{counts} (section 3.1)")
+    if staged:
+        stream.say("Lines", f"{counts} (section 3.1)")
     for kind in dict.fromkeys(trace.line_kinds):
         stream.log(
             f"prediction/lines/{kind}",
@@ -133,11 +143,13 @@ def _draw_lines(stream: RecordingStream, trace: "PredictionTrace") -> None:
         )
 
 
-def _draw_faces(stream: RecordingStream, trace: "PredictionTrace") -> None:
+def _draw_faces(stream: RecordingStream, trace: "PredictionTrace", *, staged: bool) -> None:
     """Unknown faces filled, those at the border paler; the edges of all."""
-    stream.at(stage=Stage.FACES)
+    if staged:
+        stream.at(stage=Stage.FACES)
     unknown, border = np.asarray(trace.unknown, dtype=bool), np.asarray(trace.border, dtype=bool)
-    _say(stream, "Faces", f"{len(trace.faces)} faces, {int(unknown.sum())} of them unknown (section 3.2)")
+    if staged:
+        stream.say("Faces", f"{len(trace.faces)} faces, {int(unknown.sum())} of them unknown (section 3.2)")
     stream.log("prediction/faces/edges", drawables.outlines(trace.faces, (120, 120, 130), radius=drawables.THIN))
     for name, chosen, colour in (
         ("unknown", unknown & ~border, (86, 180, 233)),
@@ -150,25 +162,32 @@ def _draw_faces(stream: RecordingStream, trace: "PredictionTrace") -> None:
         )
 
 
-def _draw_scores(stream: RecordingStream, trace: "PredictionTrace", doors: Sequence[str]) -> None:
-    """A row a level, a column a door."""
+def _draw_scores(stream: RecordingStream, trace: "PredictionTrace", palette: Mapping[str, Colour]) -> None:
+    """A row a level, a column a door; and how the curves look."""
+    doors = sorted({door for level in trace.levels for door in level.scores})
     rows = [
         [str(level.k), *(f"{level.scores[door]:.2f}" if door in level.scores else "" for door in doors)]
         for level in trace.levels
     ]
     lines = ["| " + " | ".join(row) + " |" for row in [["level", *doors], ["---:"] * (len(doors) + 1), *rows]]
     stream.log("prediction/scores", rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN), static=True)
+    for door in doors:
+        stream.log(
+            f"metrics/score/{door}",
+            rr.SeriesLines(colors=[palette[door]], names=[door], widths=[2.0]),
+            rr.SeriesPoints(colors=[palette[door]], marker_sizes=[4.0]),
+            static=True,
+        )
 
 
-def _draw_room(stream: RecordingStream, root: str, shape: BaseGeometry, colour: Colour) -> None:
-    stream.log(root, drawables.fill([shape], colour))
-    stream.log(f"{root}/outline", drawables.outlines([shape], colour))
+def _draw_room(
+    stream: RecordingStream, root: str, shape: BaseGeometry, colour: Colour, *, static: bool = False
+) -> None:
+    stream.log(root, drawables.fill([shape], colour), static=static)
+    stream.log(f"{root}/outline", drawables.outlines([shape], colour), static=static)
 
 
-def _label(room: Room) -> str:
-    score = "" if room.score is None else f"  {room.score:.1f}"
-    return "+".join(room.doors) + score
-
-
-def _say(stream: RecordingStream, title: str, text: str) -> None:
-    stream.log("stage", rr.TextDocument(f"## {title}\n{text}", media_type=rr.MediaType.MARKDOWN))
+def _label(room: Room, iou: Mapping[str, float]) -> str:
+    known = [iou[door] for door in room.doors if door in iou]
+    figure = f"IoU {min(known):.2f}" if known else f"{room.polygon.area:.1f} m²"
+    return f"{'+'.join(room.doors)}  {figure}"

@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import rerun as rr
@@ -19,9 +19,11 @@ from closedrooms.core.room import Room
 from closedrooms.core.scan import LaserScan
 from closedrooms.visualization import colours
 from closedrooms.visualization.rerun import drawables
-from closedrooms.visualization.rerun.blueprint import Bounds, Layout
+from closedrooms.visualization.rerun.blueprint import Bounds, Contents, arrange
+from closedrooms.visualization.rerun.curves import Curves
 from closedrooms.visualization.rerun.prediction import draw_doors, draw_input, draw_rooms, draw_tours, draw_trace
 from closedrooms.visualization.rerun.stream import RecordingStream, Stage
+from closedrooms.visualization.rerun.weighed import draw_weighed, room_name
 
 if TYPE_CHECKING:
     from closedrooms.coverage.tour import CoverageTour
@@ -41,7 +43,8 @@ LEGEND = """| colour | what |
 | blue | estimated robot and path |
 | green | true robot and path |
 | orange | odometry |
-| red | scan, closed doors |
+| sky blue | scan |
+| red | closed doors |
 | pink | frontiers |
 | yellow | goal and the way there |
 | violet | loops that were closed |
@@ -56,36 +59,43 @@ class Recorder:
     :class:`closedrooms.visualization.rerun.stream.Stage`.
     """
 
-    def __init__(self, path: Path, *, name: str, layout: Layout, robot_radius: float = 0.2) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        name: str,
+        bounds: Bounds | None = None,
+        robot_radius: float = 0.2,
+        viewer: str | None = None,
+    ) -> None:
         """Prepare a recording.
 
         Args:
             path: The file; missing until the block is entered, whole when it is left.
             name: Name and identity of the recording: the same for equal runs.
-            layout: Which stages there will be, and where the maps lie.
+            bounds: Where the maps lie, ``x_min, y_min, x_max, y_max`` [m]; found out where not given.
             robot_radius: Size of the robot that is drawn [m].
+            viewer: Where it is streamed to while it is written, see :func:`~.live.open_viewer`.
         """
-        self._stream = RecordingStream(path, name)
-        self._layout = layout
-        self._arranged = False
+        self._stream = RecordingStream(path, name, viewer)
+        self._curves = Curves(self._stream)
+        self._holds = Contents()
+        self._bounds = bounds
         self._radius = robot_radius
         self._building: RecordedBuilding | None = None
         self._palette: dict[str, colours.Colour] = {}
-        self._stage: int = Stage.MAPPING
-        self._poses: list[tuple[float, ...]] = []
+        self._stage: int = Stage.BUILDING
         self._scans: list[tuple[float, int, FloatArray]] = []
-        self._corrected: tuple[FloatArray, FloatArray] | None = None
-        self._areas: list[tuple[float, float]] = []
         self._paths: dict[str, list[Point]] = {"odometry": [], "estimate": [], "truth": []}
         self._seen: set[str] = set()
-        self._driven: set[str] = set()
-        self._map_bounds: Bounds | None = None
+        self._floor, self._quarters = 0.0, 0
+        self._grids: dict[str, OccupancyGrid] = {}
         self._last_scan = self._last_map = -np.inf
 
     def __enter__(self) -> Self:
         self._stream.__enter__()
         self._stream.log("legend", _markdown(LEGEND), static=True)
-        self._stream.at(0.0 if self._layout.mapping else None, Stage.BUILDING)
+        self._stream.at(stage=Stage.BUILDING)
         return self
 
     def __exit__(
@@ -93,8 +103,11 @@ class Recorder:
     ) -> None:
         try:
             if error is None:
-                self._send_series()
-                self._arrange()
+                self._send_scans()
+                self._curves.send_poses()
+                self._curves.send_errors()
+                self._hold(reference=self._curves.has_reference)
+                self._stream.arrange(arrange(self._holds, self._bounds))
         finally:
             self._stream.__exit__(kind, error, trace)
 
@@ -102,6 +115,7 @@ class Recorder:
         """The configuration as it was resolved; paths (``out``) are left out, so that equal runs stay equal."""
         kept = {key: value for key, value in values.items() if key != "out"}
         text = json.dumps(kept, indent=2, default=str)
+        self._hold(configuration=True)
         self._stream.log("configuration", _markdown(f"# Configuration\n```json\n{text}\n```"), static=True)
         self._stream.property("configuration", {key: json.dumps(value, default=str) for key, value in kept.items()})
 
@@ -113,10 +127,14 @@ class Recorder:
         self._palette = colours.room_colours(closed)
         self._stream.at(0.0, Stage.BUILDING)
         doors, rooms = len(plan.doors), len(plan.rooms)
-        self._say("Building", f"{markdown_text(plan.name)}: {rooms} rooms, {doors} doors, {len(closed)} of them closed")
-        self._arrange(truth_bounds(plan, map_T_world))
+        text = f"{markdown_text(plan.name)}: {rooms} rooms, {doors} doors, {len(closed)} of them closed"
+        self._stream.say("Building", text)
+        self.note(f"{text}: {', '.join(sorted(closed)) or 'none'}")
+        self._bounds = truth_bounds(plan, map_T_world)
+        self._floor = float(sum(room.polygon.area for room in plan.rooms))
         self._building = RecordedBuilding(self._stream, plan, map_T_world, closed)
         self._draw_robot("building/robot", colours.TRUTH)
+        self._hold(building=True, door_states=bool(closed), active="Building")
 
     def door_states(self, states: Mapping[str, float], stamp: float) -> None:
         """Doors that move."""
@@ -126,17 +144,14 @@ class Recorder:
 
     def scan(self, scan: LaserScan, odometry: Pose2, map_T_robot: Pose2, *, truth: Pose2 | None = None) -> None:
         """Keep the poses, and draw every few scans."""
-        if not self._poses:
+        if len(self._curves) == 1:
+            self._begin_mapping(scan.stamp)
+        if not len(self._curves):
             self._draw_robot("map/robot", colours.ESTIMATE)
             style = rr.Points3D.from_fields(colors=[colours.SCAN], radii=[drawables.MEDIUM])
             self._stream.log("map/scan", style, static=True)
-            self._stream.at(scan.stamp, self._stage)
-            self._say("Mapping", "the robot explores until nothing reachable is left unknown")
-        known = {"odometry": odometry, "estimate": map_T_robot, "truth": truth}
-        unknown = (np.nan,) * 3
-        poses = [unknown if pose is None else pose.as_tuple() for pose in known.values()]
-        self._poses.append((scan.stamp, float(self._stage), *(v for pose in poses for v in pose)))
-        for name, pose in known.items():
+        self._curves.add_poses(scan.stamp, self._stage, odometry, map_T_robot, truth)
+        for name, pose in {"odometry": odometry, "estimate": map_T_robot, "truth": truth}.items():
             path = self._paths[name]
             if pose is not None and (not path or np.hypot(pose.x - path[-1][0], pose.y - path[-1][1]) > PATH_STEP):
                 path.append((pose.x, pose.y))
@@ -144,8 +159,16 @@ class Recorder:
             self._last_scan = scan.stamp
             ends = map_T_robot.transform(Pose2(*scan.robot_T_sensor).transform(scan.points_sensor()))
             self._scans.append((scan.stamp, self._stage, ends))
-            if len(self._scans) >= SCAN_BATCH:
+            if len(self._scans) >= (1 if self._stream.live else SCAN_BATCH):
                 self._send_scans()
+
+    def _begin_mapping(self, stamp: float) -> None:
+        """The first scan still belongs to the stage before, so that every view of it holds a map."""
+        if self._stage == Stage.BUILDING:
+            self._stage = Stage.MAPPING
+        self._stream.at(stamp, self._stage)
+        self._stream.say("Mapping", "the robot explores until nothing reachable is left unknown")
+        self._hold(active="Mapping")
 
     def wants_map(self, stamp: float) -> bool:
         """Whether enough time has passed since the last map."""
@@ -155,18 +178,32 @@ class Recorder:
         """The map and the paths so far, every few seconds."""
         if not final and not self.wants_map(stamp):
             return
-        self._last_map = stamp
-        if not self._arranged:
-            self._map_bounds = _known_bounds(grid)
+        first, self._last_map = not self._holds.mapping, stamp
         self._stream.at(stamp, self._stage)
         self._stream.log("map/grid", drawables.grid_map(grid))
+        if first:
+            # Until something is predicted, what is predicted is what is known.
+            for place in ("prediction/input", "rooms/predicted/grid"):
+                self._stream.log(place, drawables.grid_map(grid))
+        if self._bounds is None or (final and self._building is None):
+            self._bounds = _known_bounds(grid)
         if final:
             self.frontiers(NOTHING, None, None, stamp)
-        self._areas.append((stamp, float(np.count_nonzero(grid.known)) * grid.frame.resolution**2))
+        area = float(np.count_nonzero(grid.known)) * grid.frame.resolution**2
+        self._curves.add("metrics/known_area/map", area, "known area", colours.ESTIMATE)
+        self._note_share(area)
         for name, path in self._paths.items():
             if path:
                 colour = {"odometry": colours.ODOMETRY, "estimate": colours.ESTIMATE, "truth": colours.TRUTH}[name]
                 self._stream.log(f"map/path/{name}", drawables.strips([np.array(path)], colour, z=drawables.Z_PATH))
+        self._hold(mapping=True)
+
+    def _note_share(self, area: float) -> None:
+        """A line of the log whenever another quarter of the floor is known."""
+        quarters = 0 if not self._floor else min(int(4 * area / self._floor), 3)
+        if self._stage == Stage.MAPPING and quarters > self._quarters:
+            self._quarters = quarters
+            self.note(f"{25 * quarters} % of the floor is known, {area:.0f} m²")
 
     def frontiers(self, points: FloatArray, goal: Point | None, path: FloatArray | None, stamp: float) -> None:
         """Frontiers, the goal and the way there."""
@@ -199,52 +236,112 @@ class Recorder:
             path = np.asarray(poses, dtype=np.float64)[:, :2]
             self._paths["estimate"] = [(float(x), float(y)) for x, y in path[:: max(len(path) // 2000, 1)]]
             self._stream.log("map/path/estimate", drawables.strips([path], colours.ESTIMATE, z=drawables.Z_PATH))
-            self._corrected = (np.asarray(stamps, dtype=np.float64), np.asarray(poses, dtype=np.float64))
+            self._curves.corrected = (np.asarray(stamps, dtype=np.float64), np.asarray(poses, dtype=np.float64))
 
     def reference(self, stamps: FloatArray, poses: FloatArray) -> None:
         """Poses to compare with, where the scans came without any."""
-        if len(stamps) != len(self._poses) or not len(stamps):
+        if len(stamps) != len(self._curves) or not len(stamps):
             return
-        self._poses = [(*row[:8], *map(float, pose)) for row, pose in zip(self._poses, poses, strict=True)]
+        self._curves.set_reference(poses)
         self._stream.at(float(stamps[-1]), self._stage)
         way = np.asarray(poses, dtype=np.float64)[:, :2]
         self._stream.log("map/path/truth", drawables.strips([way], colours.TRUTH, z=drawables.Z_PATH))
 
     def truth(self, grid: OccupancyGrid, rooms: Sequence[Room]) -> None:
-        """The true map and rooms."""
-        self._stream.at(stage=Stage.ROOMS)
-        draw_rooms(self._stream, "rooms/truth", grid, rooms, self._palette)
+        """The true map and rooms, there whatever the time."""
+        draw_rooms(self._stream, "rooms/truth", grid, rooms, self._palette, static=True)
+        self._hold(truth=True)
 
-    def prediction(self, observed: OccupancyGrid, doors: Sequence[ClosedDoor], prediction: "Prediction") -> None:
-        """A prediction from its input to the completed map."""
-        self._palette = colours.room_colours({*self._palette, *(door.id for door in doors)})
-        self._arrange(_known_bounds(prediction.grid))
-        draw_input(self._stream, observed, doors)
-        if prediction.trace is not None:
-            draw_trace(self._stream, prediction.trace, self._palette)
-        self._stream.at(stage=Stage.ROOMS)
+    def prediction(
+        self,
+        observed: OccupancyGrid,
+        doors: Sequence[ClosedDoor],
+        prediction: "Prediction",
+        *,
+        iou: Mapping[str, float] | None = None,
+    ) -> None:
+        """The prediction from its input to the completed map, stage by stage.
+
+        Args:
+            observed: The map M.
+            doors: Closed doors in it.
+            prediction: What is predicted behind them.
+            iou: How well, by door (0..1), where the truth is known.
+        """
+        if self._building is None and self._bounds is None:
+            self._bounds = _known_bounds(prediction.grid)
+        self._draw_prediction(observed, doors, prediction, iou or {}, staged=True)
         failures = {markdown_text(door): markdown_text(why) for door, why in prediction.failures.items()}
         failed = "".join(f"\n- {door}: {why}" for door, why in failures.items())
-        self._say("Rooms", f"{len(prediction.rooms)} rooms predicted, {len(prediction.failures)} failed{failed}")
-        draw_rooms(self._stream, "rooms/predicted", prediction.grid, prediction.rooms, self._palette)
+        self._stream.say("Rooms", f"{len(prediction.rooms)} rooms predicted, {len(prediction.failures)} failed{failed}")
+        for room in prediction.rooms:
+            self.note(_room_said(room, iou or {}))
+        for door, why in prediction.failures.items():
+            self.note(f"behind {door}: nothing predicted, {why}")
+        self._grids = {"closed": observed, "predicted": prediction.grid}
         self.table(_rooms_table(prediction))
+        self._hold(active="Rooms")
+
+    def growth(
+        self,
+        observed: OccupancyGrid,
+        doors: Sequence[ClosedDoor],
+        prediction: "Prediction",
+        stamp: float,
+        *,
+        iou: Mapping[str, float] | None = None,
+    ) -> None:
+        """What would be predicted by what is known now, while the robot still explores."""
+        self._stream.at(stamp, self._stage)
+        self._draw_prediction(observed, doors, prediction, iou or {}, staged=False)
+
+    def _draw_prediction(
+        self,
+        observed: OccupancyGrid,
+        doors: Sequence[ClosedDoor],
+        prediction: "Prediction",
+        iou: Mapping[str, float],
+        *,
+        staged: bool,
+    ) -> None:
+        from closedrooms.predictor.prediction import WeighedTrace
+
+        self._palette = colours.room_colours({*self._palette, *(door.id for door in doors)})
+        if staged:
+            self._stream.at(stage=Stage.SEGMENTS)
+        draw_input(self._stream, observed, doors)
+        trace = prediction.trace
+        if isinstance(trace, WeighedTrace):
+            draw_weighed(self._stream, trace, self._palette, staged=staged)
+            self._hold(weighed=tuple(room_name(room) for room in trace.rooms) if staged else self._holds.weighed)
+        elif trace is not None:
+            draw_trace(self._stream, trace, self._palette, staged=staged)
+            self._hold(expansion=True)
+        if staged:
+            self._stream.at(stage=Stage.ROOMS)
+        draw_rooms(self._stream, "rooms/predicted", prediction.grid, prediction.rooms, self._palette, iou=iou)
+        self._curves.add_iou(iou, self._palette)
+        self._hold(rooms=True, room_iou=self._holds.room_iou or bool(iou))
 
     def tours(self, tours: Mapping[str, "CoverageTour"]) -> None:
         """Graphs and tours."""
         draw_tours(self._stream, tours)
-        if self._layout.driving:
-            self._stage = Stage.DRIVING
+        for name in tours:
+            grid = self._grids.get(name)
+            if grid is not None:
+                self._stream.log(f"coverage/{name}/grid", drawables.grid_map(grid), static=True)
+            self.note(f"tour on the {name} map: {tours[name].length:.1f} m")
+        self._stage = Stage.DRIVING
+        self._hold(tours=tuple(tours))
 
     def revision(self, prediction: "Prediction", tour: FloatArray, stamp: float) -> None:
         """The prediction and the rest of the tour while the robot drives."""
         self._stage = Stage.DRIVING
         self._stream.at(stamp, self._stage)
-        self._say("Driving", f"{len(prediction.rooms)} rooms are still predicted")
-        names = draw_rooms(self._stream, "driving/predicted", prediction.grid, prediction.rooms, self._palette)
-        for gone in sorted(self._driven - names):
-            self._stream.log(f"driving/predicted/rooms/{gone}", rr.Clear(recursive=True))
-        self._driven = names
+        self._stream.say("Driving", f"{len(prediction.rooms)} rooms are still predicted")
+        draw_rooms(self._stream, "driving/predicted", prediction.grid, prediction.rooms, self._palette)
         self._stream.log("driving/tour", drawables.strips([np.asarray(tour)], colours.GOAL))
+        self._hold(driving=True, active="Driving")
 
     def note(self, text: str, stamp: float | None = None) -> None:
         """One line of the log."""
@@ -254,15 +351,13 @@ class Recorder:
     def table(self, markdown: str) -> None:
         """The table of results."""
         self._stream.log("result", _markdown(markdown), static=True)
+        self._hold(result=True)
 
-    def _arrange(self, bounds: Bounds | None = None) -> None:
-        """Lay the views out around what is known by now; the first call counts."""
-        if not self._arranged:
-            self._arranged = True
-            self._stream.arrange(replace(self._layout, bounds=bounds or self._map_bounds or self._layout.bounds))
-
-    def _say(self, title: str, text: str) -> None:
-        self._stream.log("stage", _markdown(f"## {title}\n{text}"))
+    def _hold(self, **parts: Any) -> None:
+        """Note what the recording holds by now; who watches sees a tab for it at once."""
+        before, self._holds = self._holds, replace(self._holds, **parts)
+        if self._stream.live and before != self._holds:
+            self._stream.arrange(arrange(self._holds, self._bounds))
 
     def _draw_robot(self, path: str, colour: colours.Colour) -> None:
         self._stream.log(
@@ -280,6 +375,7 @@ class Recorder:
 
     def _send_scans(self) -> None:
         """The scans that were kept since the last time, in one call: many times cheaper than one call each."""
+        self._curves.send_poses()
         if not self._scans:
             return
         lengths = [len(ends) for _, _, ends in self._scans]
@@ -288,38 +384,6 @@ class Recorder:
         stages = [stage for _, stage, _ in self._scans]
         self._stream.columns("map/scan", np.array([stamp for stamp, _, _ in self._scans]), columns, stages)
         self._scans = []
-
-    def _send_series(self) -> None:
-        """Poses, errors and areas, as whole columns."""
-        self._send_scans()
-        if self._areas:
-            stamps, areas = np.array(self._areas).T
-            self._series("metrics/known_area/map", stamps, areas, "known area", colours.ESTIMATE)
-        if not self._poses:
-            return
-        table = np.array(self._poses)
-        stamps, stages, odometry, estimate, truth = np.split(table, [1, 2, 5, 8], axis=1)
-        stamps, steps = stamps[:, 0], stages[:, 0].astype(int).tolist()
-        self._stream.columns("map/robot", stamps, drawables.pose_columns(estimate), steps)
-        given = np.isfinite(truth[:, 0])
-        if not given.any():
-            return
-        if self._building is not None:
-            self._stream.columns("building/robot", stamps, drawables.pose_columns(truth), steps)
-        tracks = {"estimate": (estimate, colours.ESTIMATE)}
-        if self._corrected is not None and np.array_equal(self._corrected[0], stamps[: len(self._corrected[0])]):
-            tracks["corrected"] = (self._corrected[1], colours.LOOP)
-        for name, (poses, colour) in tracks.items():
-            kept = given[: len(poses)]
-            times, theirs, true = stamps[: len(poses)][kept], poses[kept], truth[: len(poses)][kept]
-            self._series(f"metrics/position_error/{name}", times, _apart(theirs, true), name, colour)
-            self._series(f"metrics/heading_error/{name}", times, _turned(theirs, true), name, colour)
-        drift = _apart(odometry[given], truth[given])
-        self._series("metrics/odometry_error/position", stamps[given], drift, "odometry", colours.ODOMETRY)
-
-    def _series(self, path: str, stamps: FloatArray, values: FloatArray, name: str, colour: colours.Colour) -> None:
-        self._stream.log(path, rr.SeriesLines(colors=[colour], names=[name], widths=[1.5]), static=True)
-        self._stream.columns(path, stamps, rr.Scalars.columns(scalars=values), [Stage.MAPPING] * len(stamps))
 
 
 def _known_bounds(grid: OccupancyGrid) -> Bounds | None:
@@ -339,16 +403,12 @@ def _rooms_table(prediction: "Prediction") -> str:
     return "\n".join(["# Prediction", "", *("| " + " | ".join(row) + " |" for row in [*head, *rows])])
 
 
-def _apart(poses: FloatArray, true: FloatArray) -> FloatArray:
-    """Distance [m] of positions, shape (n,)."""
-    distance: FloatArray = np.hypot(poses[:, 0] - true[:, 0], poses[:, 1] - true[:, 1])
-    return distance
-
-
-def _turned(poses: FloatArray, true: FloatArray) -> FloatArray:
-    """Angle [deg] between headings, 0 to 180, shape (n,)."""
-    angle: FloatArray = np.degrees(np.abs((poses[:, 2] - true[:, 2] + np.pi) % (2 * np.pi) - np.pi))
-    return angle
+def _room_said(room: Room, iou: Mapping[str, float]) -> str:
+    """One line of the log on a predicted room."""
+    known = [iou[door] for door in room.doors if door in iou]
+    held = f", IoU with the true room {min(known):.2f}" if known else ""
+    kind = f"{room.kind} room" if room.kind else "room"
+    return f"behind {', '.join(room.doors)}: {kind} of {room.polygon.area:.1f} m²{held}"
 
 
 def _markdown(text: str) -> rr.TextDocument:

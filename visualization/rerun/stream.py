@@ -9,19 +9,24 @@ from types import TracebackType
 from typing import Any, Self
 
 import rerun as rr
+import rerun.blueprint as rrb
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import OutputError
-from closedrooms.visualization.rerun.blueprint import Layout, arrange
 
 APPLICATION = "closedrooms"
 # Chunks are cut by size alone: a cut by wall-clock time would differ from one run to the next.
 CHUNK_BYTES = 1_000_000
 NEVER_SECONDS = 1e6
+# How long those who watch wait for what has happened [s].
+LIVE_SECONDS = 0.2
 
 
 class Stage(IntEnum):
-    """Steps of the timeline ``stage``; level k of the expansion is ``EXPANSION + k``, but before ``ROOMS``."""
+    """Steps of the timeline ``stage``; level k of the layouts is ``EXPANSION + k``, but before ``ROOMS``.
+
+    A method that weighs whole rooms shows its wall faces at ``SEGMENTS`` and its candidates at ``INITIAL``.
+    """
 
     BUILDING = 0
     MAPPING = 1
@@ -43,21 +48,36 @@ class RecordingStream:
     No wall clock is recorded, so that equal runs give equal recordings.
     """
 
-    def __init__(self, path: Path, name: str) -> None:
-        self._path, self._name = path, name
+    def __init__(self, path: Path, name: str, viewer: str | None = None) -> None:
+        """Prepare a file.
+
+        Args:
+            path: The file.
+            name: Of the recording.
+            viewer: Where it is streamed to while it is written. Batches are then cut by time too, so that two equal
+                runs give the same values in files that differ.
+        """
+        self._path, self._name, self._viewer = path, name, viewer
         self._stage: int = Stage.BUILDING
         self._rec = rr.RecordingStream(
             APPLICATION,
             recording_id=f"{APPLICATION}-{name}",
             send_properties=False,
-            batcher_config=rr.ChunkBatcherConfig(flush_tick=NEVER_SECONDS, flush_num_bytes=CHUNK_BYTES),
+            batcher_config=rr.ChunkBatcherConfig(
+                flush_tick=NEVER_SECONDS if viewer is None else LIVE_SECONDS, flush_num_bytes=CHUNK_BYTES
+            ),
         )
+        self.live = viewer is not None
+        """Whether somebody watches while it is written."""
         self._handler = rr.LoggingHandler("log")
         self._log_level = logging.NOTSET
 
     def __enter__(self) -> Self:
         with self._clear_errors():
-            self._rec.save(self._path)
+            if self._viewer is None:
+                self._rec.save(self._path)
+            else:
+                self._rec.set_sinks(rr.FileSink(str(self._path)), rr.GrpcSink(self._viewer))
         self._rec.set_log_time_enabled(False)
         self._rec.send_recording_name(self._name)
         # The logging handler writes to the recording of its thread.
@@ -88,9 +108,9 @@ class RecordingStream:
         except RuntimeError as failure:
             raise OutputError(f"cannot write the recording ({failure}): {self._path}") from failure
 
-    def arrange(self, layout: Layout) -> None:
-        """Say how the recording opens; once, as soon as it is known where the maps lie."""
-        self._rec.send_blueprint(arrange(layout))
+    def arrange(self, blueprint: rrb.Blueprint) -> None:
+        """Say how the recording opens; the last one counts."""
+        self._rec.send_blueprint(blueprint)
 
     def at(self, stamp: float | None = None, stage: int | None = None) -> None:
         """What follows belongs to ``stamp`` [s] and ``stage``; either stays as it was where not given."""
@@ -111,6 +131,14 @@ class RecordingStream:
             rr.TimeColumn("stage", sequence=[int(stage) for stage in stages]),
         ]
         self._rec.send_columns(path, times, columns)
+
+    def say(self, title: str, text: str) -> None:
+        """What happens at this stage, for the view ``Stage``."""
+        self.log("stage", rr.TextDocument(f"## {title}\n{text}", media_type=rr.MediaType.MARKDOWN))
+
+    def clear(self, path: str) -> None:
+        """Take away what lies below a path, from now on."""
+        self.log(path, rr.Clear(recursive=True))
 
     def property(self, name: str, values: dict[str, str]) -> None:
         """A property of the whole recording, shown by the viewer beside its name."""

@@ -12,7 +12,7 @@ from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyG
 from closedrooms.core.pose import Pose2
 from closedrooms.predictor.best.method import predict_best
 from closedrooms.predictor.config import BestConfig
-from closedrooms.predictor.prediction import Prediction
+from closedrooms.predictor.prediction import Prediction, WeighedTrace
 
 CONFIG = BestConfig()
 WALL = 0.2
@@ -214,3 +214,30 @@ def test_a_trace_holds_each_room_by_itself_and_together() -> None:
     assert prediction.trace is not None
     assert [level.k for level in prediction.trace.levels] == [0, 1]
     assert set(prediction.trace.levels[1].layouts) == {"d1a", "d2a"}
+
+
+def test_the_terms_of_a_trace_sum_up_to_the_scores() -> None:
+    grid, doors = _building({"d1a", "d2a"})
+    trace = predict_best(grid, doors, BestConfig(keep_trace=True)).trace
+    assert isinstance(trace, WeighedTrace)
+    assert len(trace.faces) == len(trace.directions) > 0
+    assert [room.doors for room in trace.rooms] == [("d1a",), ("d2a",)]
+    for room in trace.rooms:
+        assert room.runner_up is not None
+        totals = np.array(list(room.terms.values())).sum(axis=0)
+        assert totals == pytest.approx([room.joint[room.chosen], room.joint[room.runner_up]])
+        beside = sum(terms[0] for name, terms in room.terms.items() if name.startswith("neighbours"))
+        assert totals[0] - beside == pytest.approx(room.scores[room.chosen], abs=1e-6)
+        assert any(terms[0] for name, terms in room.terms.items() if name.startswith("neighbours"))
+
+
+def test_a_trace_of_a_room_with_two_doors_weighs_one_room() -> None:
+    grid, doors = _building({"d2a"})
+    (x, y), *_ = (door.midpoint for door in doors)
+    pair = [ClosedDoor("left", (x - 0.9, y)), ClosedDoor("right", (x + 0.9, y))]
+    trace = predict_best(grid, pair, BestConfig(keep_trace=True)).trace
+    assert isinstance(trace, WeighedTrace)
+    (room,) = trace.rooms
+    assert set(room.doors) == {"left", "right"}
+    own = sum(terms[0] for terms in room.terms.values())
+    assert own == pytest.approx(room.scores[room.chosen], abs=1e-6)

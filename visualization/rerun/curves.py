@@ -1,0 +1,108 @@
+"""The curves of a run in a recording: poses, their errors, what is known, how well each room is predicted."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import rerun as rr
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.pose import Pose2
+from closedrooms.visualization import colours
+from closedrooms.visualization.rerun import drawables
+from closedrooms.visualization.rerun.stream import RecordingStream, Stage
+
+UNKNOWN_POSE = (np.nan,) * 3
+ROW = 11
+
+
+class Curves:
+    """Keeps what belongs into curves and sends it as whole columns: many times cheaper than one call a value."""
+
+    def __init__(self, stream: RecordingStream) -> None:
+        self._stream = stream
+        self._poses: list[tuple[float, ...]] = []
+        self._sent = 0
+        self._styled: set[str] = set()
+        self.corrected: tuple[FloatArray, FloatArray] | None = None
+
+    def __len__(self) -> int:
+        return len(self._poses)
+
+    @property
+    def has_reference(self) -> bool:
+        """Whether true poses are known."""
+        return any(np.isfinite(row[8]) for row in self._poses)
+
+    def add_poses(self, stamp: float, stage: int, odometry: Pose2, estimate: Pose2, truth: Pose2 | None) -> None:
+        """The poses at one scan."""
+        third = UNKNOWN_POSE if truth is None else truth.as_tuple()
+        self._poses.append((stamp, float(stage), *odometry.as_tuple(), *estimate.as_tuple(), *third))
+
+    def set_reference(self, poses: FloatArray) -> None:
+        """True poses of every scan, where they come afterwards."""
+        self._poses = [(*row[:8], *map(float, pose)) for row, pose in zip(self._poses, poses, strict=True)]
+
+    def add(self, path: str, value: float, name: str, colour: colours.Colour, *, dots: bool = False) -> None:
+        """One value of a curve, now."""
+        if path not in self._styled:
+            self._styled.add(path)
+            marks = [rr.SeriesPoints(colors=[colour], marker_sizes=[5.0])] if dots else []
+            lines = rr.SeriesLines(colors=[colour], names=[name], widths=[1.5])
+            self._stream.log(path, lines, *marks, static=True)
+        self._stream.log(path, rr.Scalars(value))
+
+    def add_iou(self, iou: Mapping[str, float], palette: Mapping[str, colours.Colour]) -> None:
+        """How well each room is predicted now, by door."""
+        for door, value in iou.items():
+            colour = palette.get(door, colours.INK)
+            self.add(f"metrics/room_iou/{rr.escape_entity_path_part(door)}", value, door, colour, dots=True)
+
+    def send_poses(self) -> None:
+        """The poses since the last time, so that a robot moves."""
+        rows, self._sent = self._poses[self._sent :], len(self._poses)
+        if not rows:
+            return
+        stamps, steps, _, estimate, truth = _split(rows)
+        self._stream.columns("map/robot", stamps, drawables.pose_columns(estimate), steps)
+        if np.isfinite(truth[:, 0]).all():
+            self._stream.columns("building/robot", stamps, drawables.pose_columns(truth), steps)
+
+    def send_errors(self) -> None:
+        """Errors against the true poses, once they are all known."""
+        if not self.has_reference:
+            return
+        stamps, _, odometry, estimate, truth = _split(self._poses)
+        given = np.isfinite(truth[:, 0])
+        tracks = {"estimate": (estimate, colours.ESTIMATE)}
+        if self.corrected is not None and np.array_equal(self.corrected[0], stamps[: len(self.corrected[0])]):
+            tracks["corrected"] = (self.corrected[1], colours.LOOP)
+        for name, (poses, colour) in tracks.items():
+            kept = given[: len(poses)]
+            times, theirs, true = stamps[: len(poses)][kept], poses[kept], truth[: len(poses)][kept]
+            self._send(f"metrics/position_error/{name}", times, _apart(theirs, true), name, colour)
+            self._send(f"metrics/heading_error/{name}", times, _turned(theirs, true), name, colour)
+        drift = _apart(odometry[given], truth[given])
+        self._send("metrics/odometry_error/position", stamps[given], drift, "odometry", colours.ODOMETRY)
+
+    def _send(self, path: str, stamps: FloatArray, values: FloatArray, name: str, colour: colours.Colour) -> None:
+        self._stream.log(path, rr.SeriesLines(colors=[colour], names=[name], widths=[1.5]), static=True)
+        self._stream.columns(path, stamps, rr.Scalars.columns(scalars=values), [Stage.MAPPING] * len(stamps))
+
+
+def _split(rows: list[tuple[float, ...]]) -> tuple[FloatArray, list[int], FloatArray, FloatArray, FloatArray]:
+    """Stamps, stages, and the poses by odometry, estimate and truth."""
+    table = np.array(rows).reshape(-1, ROW)
+    stamps, stages, odometry, estimate, truth = np.split(table, [1, 2, 5, 8], axis=1)
+    return stamps[:, 0], stages[:, 0].astype(int).tolist(), odometry, estimate, truth
+
+
+def _apart(poses: FloatArray, true: FloatArray) -> FloatArray:
+    """Distance [m] of positions, shape (n,)."""
+    distance: FloatArray = np.hypot(poses[:, 0] - true[:, 0], poses[:, 1] - true[:, 1])
+    return distance
+
+
+def _turned(poses: FloatArray, true: FloatArray) -> FloatArray:
+    """Angle [deg] between headings, 0 to 180, shape (n,)."""
+    angle: FloatArray = np.degrees(np.abs((poses[:, 2] - true[:, 2] + np.pi) % (2 * np.pi) - np.pi))
+    return angle
