@@ -2,17 +2,18 @@
 
 import contextlib
 import ctypes
+import logging
 import multiprocessing
 import os
 import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.errors import ClosedroomsError, InvalidInputError
 from closedrooms.core.stopping import SIGNALS, Stop, end_in_time, handle
 from closedrooms.core.unfinished import remove_unfinished
 
@@ -190,6 +191,9 @@ def _cluster(address: str) -> Iterator[Executor]:
         raise InvalidInputError(
             "no scheduler answers", expected="the address of a Dask scheduler, tcp://host:port", where=address
         ) from error
+    # What Dask logs of a lost scheduler are tracebacks; we tell it in a line of our own.
+    for logger in ("distributed", "distributed.client"):
+        logging.getLogger(logger).setLevel(logging.CRITICAL + 1)
     with client:
         yield client.get_executor(pure=False, retries=TRIES - 1)
 
@@ -198,6 +202,7 @@ def _outcomes(
     executor: Executor, function: Callable[[Job], Outcome], jobs: Sequence[Job]
 ) -> Iterator[tuple[Job, Outcome | Lost]]:
     from distributed import KilledWorker
+    from distributed.comm import CommClosedError
 
     waiting = {executor.submit(function, job): job for job in jobs}
     try:
@@ -209,6 +214,11 @@ def _outcomes(
                     yield job, future.result()
                 except KilledWorker as error:
                     yield job, Lost(" ".join(str(error).split()))
+    except (CancelledError, CommClosedError, ConnectionError, TimeoutError) as error:
+        # Dask cancels what its scheduler can no longer tell about.
+        raise ClosedroomsError(
+            "the Dask scheduler was lost; the same command goes on where it stopped once there is one again"
+        ) from error
     except BaseException:
         for future in waiting:
             future.cancel()

@@ -18,6 +18,8 @@ APPLICATION = "closedrooms"
 # Chunks are cut by size alone: a cut by wall-clock time would differ from one run to the next.
 CHUNK_BYTES = 1_000_000
 NEVER_SECONDS = 1e6
+# On a full disk the writer has been seen to wait for ever; an honest flush takes milliseconds.
+FLUSH_SECONDS = 60.0
 
 
 class Stage(IntEnum):
@@ -77,7 +79,7 @@ class RecordingStream:
         rr.set_thread_local_data_recording(self._previous)
         try:
             with self._clear_errors():
-                self._rec.flush()
+                self._rec.flush(timeout_sec=FLUSH_SECONDS)
         finally:
             self._rec.disconnect()
 
