@@ -33,6 +33,7 @@ class Stop:
     """The signal that ends this process, once it has come."""
 
     number: int = 0
+    error: type[BaseException] = Terminated
 
     @property
     def status(self) -> int:
@@ -46,7 +47,7 @@ class Stop:
         """Handle a signal: the first one stops the work, the others would only disturb the clearing away."""
         if not self:
             self.number = number
-            raise Terminated
+            raise self.error(self.status)
 
 
 @contextlib.contextmanager

@@ -166,7 +166,6 @@ def one_thread() -> None:
 def _begin(parent: int) -> None:
     """Prepare a local worker: one thread, no part in the parent's Ctrl-C, and no life after the parent's."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    handle((signal.SIGTERM,), Stop())
     end_in_time((signal.SIGTERM,), lambda _: remove_unfinished(), patience=GRACE / 2)
     # The kernel sends the signal when the parent ends, however it ends; it may have ended already.
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
@@ -174,6 +173,14 @@ def _begin(parent: int) -> None:
     if os.getppid() != parent:
         os._exit(1)
     one_thread()
+    # Until here the signal ends the worker by itself: it has nothing under way.
+    handle((signal.SIGTERM,), _Dismissal())
+
+
+class _Dismissal(Stop):
+    """Ends a worker: multiprocessing tells any other exception in a traceback."""
+
+    error = SystemExit
 
 
 @contextlib.contextmanager
