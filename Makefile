@@ -6,7 +6,9 @@ BIN := $(VENV)/bin
 
 PAPER ?= paper
 
-.PHONY: run test test-slow lint format paper paper-quick clean
+FUZZ ?= 600
+
+.PHONY: run test test-slow fuzz mutants lint format paper paper-quick clean
 
 run: $(VENV)/.ready  ## The main job on a bundled world; writes runs/<world>-0
 	$(BIN)/closedrooms run $(ARGS)
@@ -16,6 +18,13 @@ test: $(VENV)/.ready  ## The default tests (no whole simulated runs)
 
 test-slow: $(VENV)/.ready  ## The tests that simulate whole runs
 	$(BIN)/pytest -q -n 2 -m slow
+
+fuzz: $(VENV)/.ready  ## Spoilt files for every reader; FUZZ=1800 for half an hour
+	$(BIN)/python tests/hostile/test_fuzz.py $(FUZZ)
+
+mutants: $(VENV)/.ready  ## Which changes of one operator the tests do not notice; ARGS="core mapping --sample 10"
+	$(BIN)/pip install --quiet -c constraints.txt cosmic-ray==8.7.0
+	nice $(BIN)/python tests/mutation/mutants.py $(ARGS)
 
 paper: $(VENV)/.ready  ## The paper's protocol in full: 3,885 maps, every method; writes $(PAPER)/, goes on where it stopped
 	$(BIN)/closedrooms dataset all --out $(PAPER)/dataset

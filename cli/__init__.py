@@ -4,11 +4,19 @@
 ``work`` for commands whose use case returns no report.
 """
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
-from closedrooms.core.lazy import lazy_face
 
-if TYPE_CHECKING:
-    from closedrooms.cli.commands import main as main
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status: :func:`closedrooms.cli.commands.main`."""
+    if arguments is None:
+        # A signal while the rest is imported ends the program quietly: nothing has begun.
+        from closedrooms.core.stopping import leave_at_once
 
-__getattr__, __dir__, __all__ = lazy_face(__name__, {"commands": ("main",)})
+        leave_at_once()
+    from closedrooms.cli.commands import main as work
+
+    return work(arguments)
+
+
+__all__ = ["main"]

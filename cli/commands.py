@@ -7,66 +7,116 @@ on SIGTERM. Heavy libraries are imported by the command that needs them, so that
 import contextlib
 import json
 import os
-import signal
 import sys
-import threading
 from collections.abc import Iterator, Sequence
-from types import FrameType
 from typing import Any
 
 from closedrooms.cli.usage import UsageError
-from closedrooms.core.errors import ClosedroomsError
+from closedrooms.core.errors import ClosedroomsError, OutputError
+from closedrooms.core.stopping import SIGNALS, Stop, Terminated, end_in_time, leave_at_once, stopping
+from closedrooms.core.unfinished import remove_unfinished
 
 DONE, BAD_INPUT, WRONG_USAGE, PARTLY_FAILED, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 # Failures that are named on the terminal; the rest stands in files.
 MOST_NAMED = 10
 
 
-class Terminated(BaseException):
-    """SIGTERM: leave as on Ctrl-C, so that nothing half-written stays behind."""
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status.
 
     Args:
-        arguments: Words after the program's name; ``sys.argv`` by default.
+        arguments: Words after the program's name; ``sys.argv`` by default, and then this process is the program's: it
+            ends within 2 s of a signal whatever happens.
     """
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    if arguments is None:
+        _own_process()
     try:
-        with _sigterm(), _missing_packages(words):
-            return _main(words)
+        with stopping() as stop:
+            return _status(list(sys.argv[1:] if arguments is None else arguments), stop)
+    except Terminated:
+        # While the work was just done, or had not begun.
+        return stop.status
+
+
+def _own_process() -> None:
+    """Make this process the program's: signals, closed streams, no modules from the current directory."""
+    leave_at_once()
+    for descriptor, mode in enumerate(("r", "w", "w")):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            # Else the first file that is opened gets the number, and with it what is printed.
+            os.open(os.devnull, os.O_RDWR)
+            name = ("stdin", "stdout", "stderr")[descriptor]
+            setattr(sys, name, os.fdopen(descriptor, mode, closefd=False))
+    end_in_time(SIGNALS, _leave)
+    # `python -m` looks for modules in the current directory first, and workers inherit where to look.
+    if not sys.flags.safe_path and sys.path and sys.path[0] in {"", _here()}:
+        del sys.path[0]
+
+
+def _here() -> str:
+    try:
+        return os.getcwd()  # noqa: PTH109 (as the interpreter spells it)
+    except OSError:
+        return ""
+
+
+def _leave(number: int) -> None:
+    """End without order: the work did not stop in time. Runs beside the main thread and imports nothing."""
+    multiprocessing = sys.modules.get("multiprocessing")
+    for child in multiprocessing.active_children() if multiprocessing else ():
+        child.kill()
+    remove_unfinished()
+    _complain(_last_words(number))
+
+
+def _status(words: list[str], stop: Stop) -> int:
+    try:
+        return _main(words)
     except UsageError as error:
         _complain(str(error))
         return WRONG_USAGE
     except ClosedroomsError as error:
-        _complain(str(error))
-        return BAD_INPUT
+        if not stop:
+            _complain(str(error))
+            return BAD_INPUT
     except KeyboardInterrupt:
-        _complain("interrupted; nothing half-written was left behind")
-        return INTERRUPTED
+        stop.number = stop.number or INTERRUPTED - 128
     except Terminated:
-        _complain("terminated; nothing half-written was left behind")
-        return TERMINATED
-    except BrokenPipeError:
-        # The reader (`| head`) has what it wanted; stdout goes nowhere, so that the interpreter's own flush is silent.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return DONE
+        stop.number = stop.number or TERMINATED - 128
+    except BaseException:
+        # A library may make anything of the exception that a signal has raised in it.
+        if not stop:
+            raise
+    remove_unfinished()
+    _complain(_last_words(stop.number))
+    return stop.status
+
+
+def _last_words(number: int) -> str:
+    what = "interrupted" if number == INTERRUPTED - 128 else "terminated"
+    return f"{what}; nothing half-written was left behind"
 
 
 def _main(words: Sequence[str]) -> int:
     if words[:1] == ["--version"]:
         from importlib.metadata import version
 
-        _say(f"closedrooms {version('closedrooms')}")
+        with _printing():
+            _say(f"closedrooms {version('closedrooms')}")
         return DONE
     from closedrooms.cli.options import configured, load
     from closedrooms.cli.table import read_line
 
-    try:
-        options = read_line(words or ["--help"])
-    except SystemExit as stop:
-        return WRONG_USAGE if not words else int(stop.code or DONE)
+    options, status = None, DONE
+    with _printing():
+        try:
+            options = read_line(words or ["--help"])
+        except SystemExit as stop:  # the help was printed
+            status = WRONG_USAGE if not words else int(stop.code or DONE)
+    if options is None:
+        return status
     from closedrooms.pipeline.progress import Terminal
 
     command = options.about["command"]
@@ -81,16 +131,23 @@ def _show(name: str, result: Any, terminal: Any, options: Any) -> int:
 
     if not isinstance(result, Report):
         lines = list(result)
-        if options.json:
-            _say(json.dumps({"command": name, "lines": lines}))
-        elif not options.quiet:
-            _say("\n".join(lines))
+        with _printing():
+            if options.json:
+                _say(json.dumps({"command": name, "lines": lines}))
+            elif not options.quiet:
+                _say("\n".join(lines))
         return DONE
-    if options.json:
-        _say(json.dumps({"command": name, **result.as_json()}))
-    elif not options.quiet:
-        terminal.table(result.title, result.table())
-        terminal.say(f"written to {result.folder}")
+    try:
+        with _printing():
+            if options.json:
+                _say(json.dumps({"command": name, **result.as_json()}))
+            elif not options.quiet:
+                terminal.table(result.title, result.table())
+                terminal.say(f"written to {result.folder}")
+    except OutputError as error:
+        # All is written, only nobody can read of it here.
+        _complain(str(error))
+        return PARTLY_FAILED
     failures = list(result.failures.items())
     most = len(failures) if options.verbose else MOST_NAMED
     for what, why in failures[:most]:
@@ -101,32 +158,20 @@ def _show(name: str, result: Any, terminal: Any, options: Any) -> int:
 
 
 @contextlib.contextmanager
-def _missing_packages(words: Sequence[str]) -> Iterator[None]:
-    """Name a package that is not installed in one line."""
+def _printing() -> Iterator[None]:
+    """Print on standard output; a reader that has gone (``| head``) has what it wanted.
+
+    Raises:
+        OutputError: What stands behind it is full or broken.
+    """
     try:
         yield
-    except ModuleNotFoundError as error:
-        from closedrooms.core.packages import missing_package
-
-        missing = missing_package(error, by=" ".join(["closedrooms", *words[:1]]))
-        raise missing or error from error
-
-
-@contextlib.contextmanager
-def _sigterm() -> Iterator[None]:
-    """Turn SIGTERM into an exception while a command works; only the main thread may set handlers."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def stop(_number: int, _frame: FrameType | None) -> None:
-        raise Terminated
-
-    before = signal.signal(signal.SIGTERM, stop)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
+        sys.stdout.flush()
+    except OSError as error:
+        # What is left in the buffer goes nowhere, so that the interpreter's own flush at the end is silent.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            raise OutputError(f"cannot write ({error.strerror}): standard output") from error
 
 
 def _say(text: str) -> None:
@@ -134,7 +179,10 @@ def _say(text: str) -> None:
 
 
 def _complain(text: str) -> None:
-    sys.stderr.write(f"closedrooms: {' '.join(text.split())}\n")
+    # Nobody is told where there is nobody to tell.
+    with contextlib.suppress(OSError, ValueError):
+        sys.stderr.write(f"closedrooms: {' '.join(text.split())}\n")
+        sys.stderr.flush()
 
 
 if __name__ == "__main__":

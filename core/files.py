@@ -10,23 +10,25 @@ import fcntl
 import hashlib
 import json
 import os
-import re
-import shutil
 import stat
 import tempfile
 from collections.abc import Iterable, Iterator
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.incoming import read_json
 from closedrooms.core.names import short_name
+from closedrooms.core.unfinished import clear_files, clear_folders, part_of_file, part_of_folder, unfinished
 
 MANIFEST = "run.json"
 PROGRAM = "closedrooms"
 SUMS = "sha256"
 """Key of the manifest: SHA-256 of every file by its path in the folder; of the manifest itself without its entry."""
 MAX_MANIFEST = 50_000_000
+_CLAIMED: ContextVar[dict[Path, tuple[int, ...] | None] | None] = ContextVar("claimed", default=None)
+"""Files that :func:`new_files` is going to write, with what stood there when it began."""
 
 
 def write_bytes(path: Path, data: bytes) -> None:
@@ -39,17 +41,46 @@ def write_bytes(path: Path, data: bytes) -> None:
     """
     _check_name(path)
     with clear_errors(path):
-        _clear_parts(path)
-        temporary = path.with_name(f".{short_name(path.name)}.{os.getpid()}.part")
-        try:
+        clear_files(path)
+        temporary = part_of_file(path)
+        with unfinished(temporary, path):
             with temporary.open("wb") as file:
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
+            _put(temporary, path)
+
+
+def _put(temporary: Path, path: Path) -> None:
+    """Move a whole file to its place; inside :func:`new_files` only there where nothing has appeared or changed."""
+    claimed = _CLAIMED.get()
+    if claimed is None or path.absolute() not in claimed:
+        temporary.replace(path)
+        return
+    before = claimed.pop(path.absolute())
+    if before is None:
+        # A link is made only where there is nothing, in one step.
+        try:
+            os.link(temporary, path)
+        except FileExistsError:
+            raise OutputError(f"a file has appeared at the output meanwhile; expected none: {path}") from None
+        except OSError:  # a file system without links
+            if os.path.lexists(path):
+                raise OutputError(f"a file has appeared at the output meanwhile; expected none: {path}") from None
             temporary.replace(path)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
+    elif before != _identity(path):
+        raise OutputError(f"the output was changed meanwhile; expected the file that was there before: {path}")
+    else:
+        temporary.replace(path)
+
+
+def _identity(path: Path) -> tuple[int, ...] | None:
+    """What tells a file from another one in its place, ``None`` without one."""
+    try:
+        now = path.lstat()
+    except FileNotFoundError:
+        return None
+    return now.st_dev, now.st_ino, now.st_size, now.st_mtime_ns
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -88,6 +119,27 @@ def check_new_files(paths: Iterable[Path], *, force: bool = False, sources: Iter
                     raise OutputError(f"the output is there already; expected a new file, or --force: {path}")
             with tempfile.TemporaryFile(dir=path.parent):
                 pass
+
+
+@contextlib.contextmanager
+def new_files(paths: Iterable[Path], *, force: bool = False, sources: Iterable[Path] = ()) -> Iterator[None]:
+    """Write single files inside the block: :func:`check_new_files` now, and nothing replaced that comes in between.
+
+    Args:
+        paths: Every file that the block is going to write, each once.
+        force: Files that are there now may be replaced.
+        sources: Files that the command reads: never replaced.
+
+    Raises:
+        OutputError: See :func:`check_new_files`; a file has appeared or was changed since the block began.
+    """
+    paths = list(paths)
+    check_new_files(paths, force=force, sources=sources)
+    token = _CLAIMED.set({path.absolute(): _identity(path) for path in paths})
+    try:
+        yield
+    finally:
+        _CLAIMED.reset(token)
 
 
 def is_ours(folder: Path, command: object = None) -> bool:
@@ -141,13 +193,21 @@ def _own_sum(manifest: dict[str, Any]) -> str:
     return hashlib.sha256(_json_text({**manifest, SUMS: sums}).encode()).hexdigest()
 
 
-def check_output_folder(folder: Path, command: object = None) -> None:
+def check_output_folder(folder: Path, command: object = None, *, sources: Iterable[Path | None] = ()) -> None:
     """Fail early when ``folder`` could not be written at the end: something not ours, no right to write, a writer.
 
+    Args:
+        folder: The output.
+        command: As the manifest names it.
+        sources: Files and folders that the command reads: the output replaces none of them.
+
     Raises:
-        OutputError: It is a file, holds anything that the same command did not write or that was changed since, its
-            parent cannot be written, or another process writes it.
+        OutputError: It is a file, holds anything that the same command did not write or that was changed since, or a
+            source; its parent cannot be written, or another process writes it.
     """
+    for source in sources:
+        if source is not None and _holds(folder, source):
+            raise OutputError(f"the output folder holds what is read ({source.name}); expected another one: {folder}")
     _check_name(folder)
     with clear_errors(folder):
         folder = _real(folder)
@@ -157,6 +217,13 @@ def check_output_folder(folder: Path, command: object = None) -> None:
             pass
     with only_writer(folder):
         pass
+
+
+def _holds(folder: Path, source: Path) -> bool:
+    try:
+        return source.exists() and source.resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError):  # a name that the system refuses is said where it is read
+        return False
 
 
 def _check_replaceable(folder: Path, command: object) -> None:
@@ -198,20 +265,16 @@ def output_folder(folder: Path, manifest: dict[str, Any]) -> Iterator[Path]:
     command = manifest.get("command")
     check_output_folder(folder, command)
     folder = _real(folder)
-    with only_writer(folder):
-        with clear_errors(folder):
-            _clear_unfinished(folder)
-            prefix = f".{short_name(folder.name)}."
-            staging = Path(tempfile.mkdtemp(prefix=prefix, suffix=".part", dir=folder.parent))
-        try:
-            with clear_errors(folder):
-                yield staging
-                _finish(staging, manifest)
-                # Hours may have passed: what was put there in the meantime is not ours.
-                _check_replaceable(folder, command)
-                _swap(staging, folder)
-        finally:
-            shutil.rmtree(staging, ignore_errors=True)
+    with only_writer(folder) as alone:
+        staging = part_of_folder(folder)
+        with unfinished(staging, folder), clear_errors(folder):
+            clear_folders(folder, alone=alone)
+            staging.mkdir(0o700)
+            yield staging
+            _finish(staging, manifest)
+            # Hours may have passed: what was put there in the meantime is not ours.
+            _check_replaceable(folder, command)
+            _swap(staging, folder)
 
 
 def _finish(staging: Path, manifest: dict[str, Any]) -> None:
@@ -227,83 +290,54 @@ def _finish(staging: Path, manifest: dict[str, Any]) -> None:
 
 
 def _swap(staging: Path, folder: Path) -> None:
-    if folder.exists():
-        prefix = f".{short_name(folder.name)}."
-        old = Path(tempfile.mkdtemp(prefix=prefix, suffix=".old", dir=folder.parent))
-        folder.replace(old)
-        try:
-            staging.replace(folder)
-        except BaseException:
-            old.replace(folder)
-            raise
-        shutil.rmtree(old, ignore_errors=True)
-    else:
+    old = part_of_folder(folder, "old")
+    with unfinished(old, folder):
+        if folder.exists():
+            folder.replace(old)
         staging.replace(folder)
 
 
 @contextlib.contextmanager
-def only_writer(folder: Path) -> Iterator[None]:
+def only_writer(folder: Path) -> Iterator[bool]:
     """Hold the lock of an output folder; the kernel lets go of it when the process ends, however it ends.
+
+    Yields:
+        Whether the lock is one: not every file system knows locks.
 
     Raises:
         OutputError: Another process holds it, or the parent cannot be written.
     """
     path = folder.with_name(f".{short_name(folder.name)}.lock")
     with clear_errors(folder):
-        lock = _locked(path, folder)
+        lock, locked = _locked(path, folder)
     try:
-        yield
+        with unfinished(path, folder):
+            yield locked
     finally:
-        with contextlib.suppress(OSError):
-            path.unlink(missing_ok=True)
         os.close(lock)
 
 
-def _locked(path: Path, folder: Path) -> int:
-    """A descriptor that holds the lock of the file which now has this name."""
+def _locked(path: Path, folder: Path) -> tuple[int, bool]:
+    """A descriptor of the file which now has this name, and whether it holds the lock."""
     while True:
         lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             # The one before may have removed the file between our opening and our locking.
             if path.exists() and os.fstat(lock).st_ino == path.stat().st_ino:
-                return lock
+                return lock, True
         except OSError as error:
+            if error.errno in {errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS}:  # a file system without locks
+                return lock, False
             os.close(lock)
             if error.errno in {errno.EWOULDBLOCK, errno.EACCES}:
                 raise OutputError(f"another closedrooms writes this folder; expected to be alone: {folder}") from error
-            if error.errno in {errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS}:  # a file system without locks
-                return os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            raise
+        except BaseException:
+            os.close(lock)
+            path.unlink(missing_ok=True)
             raise
         os.close(lock)
-
-
-def _clear_unfinished(folder: Path) -> None:
-    """Remove what killed processes of ours left while they wrote ``folder``; we hold its lock, nobody writes it now."""
-    name = re.escape(short_name(folder.name))
-    unfinished = re.compile(rf"\.{name}\.[A-Za-z0-9_]{{8}}\.(part|old)")
-    for path in list(folder.parent.iterdir()):
-        if unfinished.fullmatch(path.name) and path.lstat().st_uid == os.getuid():
-            shutil.rmtree(path, ignore_errors=True)
-
-
-def _clear_parts(path: Path) -> None:
-    """Remove what processes of ours that are gone left while they wrote the file ``path``."""
-    part = re.compile(rf"\.{re.escape(short_name(path.name))}\.(\d+)\.part")
-    for other in path.parent.glob(".*.part"):
-        match = part.fullmatch(other.name)
-        if match and not _alive(int(match[1])) and other.lstat().st_uid == os.getuid():
-            other.unlink(missing_ok=True)
-
-
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:
-        return True
-    return True
 
 
 @contextlib.contextmanager

@@ -1,18 +1,21 @@
 """The same work for one process, several, or a cluster, behind the executor interface of concurrent.futures."""
 
 import contextlib
+import ctypes
+import logging
 import multiprocessing
 import os
 import signal
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
-from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.errors import ClosedroomsError, InvalidInputError
+from closedrooms.core.stopping import SIGNALS, Stop, end_in_time, handle
+from closedrooms.core.unfinished import remove_unfinished
 
 Job = TypeVar("Job")
 Outcome = TypeVar("Outcome")
@@ -21,8 +24,10 @@ Outcome = TypeVar("Outcome")
 TRIES = 3
 # How long a scheduler may take to answer [s].
 PATIENCE = 10.0
-# How often a worker looks whether its parent still lives [s].
-HEARTBEAT = 1.0
+# How long workers may take to clear away what they have under way [s]; the parent itself has 1.4 s.
+GRACE = 1.0
+SAFE_PATH = "PYTHONSAFEPATH"
+PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,15 +95,9 @@ class Crew(Generic[Job, Outcome]):
         self, function: Callable[[Job], Outcome], jobs: Sequence[Job], batch: Sequence[int], begun: set[int]
     ) -> Iterator[tuple[int, Outcome]]:
         """Hand out a batch, no more at a time than can be worked on, so that ``begun`` names what a death hits."""
-        pool = ProcessPoolExecutor(
-            min(self.workers, len(batch)),
-            mp_context=multiprocessing.get_context("spawn"),
-            initializer=_begin,
-            initargs=(os.getpid(),),
-        )
         under_way: dict[Future[Outcome], int] = {}
         left = list(reversed(batch))
-        try:
+        with hire(min(self.workers, len(batch))) as pool:
             while left or under_way:
                 while left and len(under_way) < self.workers:
                     number = left.pop()
@@ -108,12 +107,53 @@ class Crew(Generic[Job, Outcome]):
                 for future in done:
                     outcome = future.result()
                     yield under_way.pop(future), outcome
-            pool.shutdown()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for child in multiprocessing.active_children():
-                child.terminate()
-            raise
+
+
+@contextlib.contextmanager
+def hire(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Local worker processes: no part in Ctrl-C, no modules from the current directory, no life after the parent's.
+
+    On any error in the block, Ctrl-C included, they are told to clear away what they have under way, and ended.
+    """
+    before = os.environ.get(SAFE_PATH)
+    # A worker begins as `python -c`, which looks for modules in the current directory.
+    os.environ[SAFE_PATH] = "1"
+    pool = _Pool(workers, multiprocessing.get_context("spawn"), _begin, (os.getpid(),))
+    try:
+        yield pool
+        pool.shutdown()
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        _dismiss()
+        raise
+    finally:
+        if before is None:
+            del os.environ[SAFE_PATH]
+        else:
+            os.environ[SAFE_PATH] = before
+
+
+class _Pool(ProcessPoolExecutor):
+    """Workers that are not disturbed by signals while they begin, nor begun while a signal ends their parent."""
+
+    def submit(self, *work: Any, **named: Any) -> Future[Any]:
+        """Hand out a job; a worker that is begun for it inherits that SIGINT and SIGTERM wait."""
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+        try:
+            return super().submit(*work, **named)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _dismiss() -> None:
+    """End the workers, those that do not go by themselves too."""
+    children = multiprocessing.active_children()
+    for child in children:
+        child.terminate()
+    end = time.monotonic() + GRACE
+    for child in children:
+        child.join(max(0.0, end - time.monotonic()))
+        child.kill()
 
 
 def one_thread() -> None:
@@ -125,15 +165,22 @@ def one_thread() -> None:
 
 def _begin(parent: int) -> None:
     """Prepare a local worker: one thread, no part in the parent's Ctrl-C, and no life after the parent's."""
-    one_thread()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def follow() -> None:
-        while os.getppid() == parent:
-            time.sleep(HEARTBEAT)
+    end_in_time((signal.SIGTERM,), lambda _: remove_unfinished(), patience=GRACE / 2)
+    # The kernel sends the signal when the parent ends, however it ends; it may have ended already.
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    if os.getppid() != parent:
         os._exit(1)
+    one_thread()
+    # Until here the signal ends the worker by itself: it has nothing under way.
+    handle((signal.SIGTERM,), _Dismissal())
 
-    threading.Thread(target=follow, daemon=True).start()
+
+class _Dismissal(Stop):
+    """Ends a worker: multiprocessing tells any other exception in a traceback."""
+
+    error = SystemExit
 
 
 @contextlib.contextmanager
@@ -151,6 +198,9 @@ def _cluster(address: str) -> Iterator[Executor]:
         raise InvalidInputError(
             "no scheduler answers", expected="the address of a Dask scheduler, tcp://host:port", where=address
         ) from error
+    # What Dask logs of a lost scheduler are tracebacks; we tell it in a line of our own.
+    for logger in ("distributed", "distributed.client"):
+        logging.getLogger(logger).setLevel(logging.CRITICAL + 1)
     with client:
         yield client.get_executor(pure=False, retries=TRIES - 1)
 
@@ -159,6 +209,7 @@ def _outcomes(
     executor: Executor, function: Callable[[Job], Outcome], jobs: Sequence[Job]
 ) -> Iterator[tuple[Job, Outcome | Lost]]:
     from distributed import KilledWorker
+    from distributed.comm import CommClosedError
 
     waiting = {executor.submit(function, job): job for job in jobs}
     try:
@@ -170,6 +221,11 @@ def _outcomes(
                     yield job, future.result()
                 except KilledWorker as error:
                     yield job, Lost(" ".join(str(error).split()))
+    except (CancelledError, CommClosedError, ConnectionError, TimeoutError) as error:
+        # Dask cancels what its scheduler can no longer tell about.
+        raise ClosedroomsError(
+            "the Dask scheduler was lost; the same command goes on where it stopped once there is one again"
+        ) from error
     except BaseException:
         for future in waiting:
             future.cancel()

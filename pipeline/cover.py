@@ -34,7 +34,7 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Repor
         OutputError: The folder cannot be written, or holds something that is not ours.
     """
     progress, watch = progress or Silent(), Stopwatch()
-    check_output_folder(config.out, "cover")
+    check_output_folder(config.out, "cover", sources=[config.map, config.doors])
     with watch.stage("read"):
         progress.stage("read")
         read = read_ros_map(config.map, allow_outside=config.allow_outside)

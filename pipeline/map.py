@@ -40,7 +40,7 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> Report:
         OutputError: The folder cannot be written, or holds something that is not ours.
     """
     progress, watch = progress or Silent(), Stopwatch()
-    check_output_folder(config.out, "map")
+    check_output_folder(config.out, "map", sources=[config.log])
     with watch.stage("read"):
         progress.stage("read")
         run = read_run(

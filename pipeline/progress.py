@@ -1,10 +1,11 @@
 """What people see while a command works: progress on standard error, results on standard output."""
 
+import contextlib
 import sys
 import time
 from collections.abc import Iterable, Sequence
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Any, Protocol, Self
 
 from closedrooms.core.names import shown
 
@@ -91,7 +92,6 @@ class Terminal:
         console = Console(file=sys.stderr)
         self._live = console.is_terminal and not quiet and not verbose
         self._quiet, self._every = quiet, 0.0 if verbose else EVERY
-        self._error = console
         self._progress = Progress(
             SpinnerColumn(),
             TextColumn("{task.description:<12}"),
@@ -139,8 +139,11 @@ class Terminal:
 
     def tell(self, line: str) -> None:
         """Print one line to standard error, above the bar where there is one."""
+        # That nobody reads how far it is does not stop the work. Not by rich, which ends the program then.
         if not self._quiet:
-            self._error.print(line, highlight=False, markup=False, soft_wrap=True)
+            with contextlib.suppress(OSError, ValueError):
+                sys.stderr.write(line + "\n")
+                sys.stderr.flush()
 
     def table(self, title: str, rows: Iterable[Sequence[str]]) -> None:
         """Print a table; the first row is its head."""
@@ -154,8 +157,14 @@ class Terminal:
         for row in body:
             # As text: rich reads brackets in a plain string as its markup.
             table.add_row(*(Text(shown(cell, longest=LONGEST_CELL)) for cell in row))
-        self._out.print(table)
+        self._print(table)
 
     def say(self, line: str) -> None:
         """Print one plain line."""
-        self._out.print(shown(line, longest=LONGEST_CELL), markup=False, highlight=False, soft_wrap=True)
+        self._print(shown(line, longest=LONGEST_CELL), markup=False, highlight=False, soft_wrap=True)
+
+    def _print(self, what: Any, **how: Any) -> None:
+        try:
+            self._out.print(what, **how)
+        except SystemExit as stop:  # what rich makes of it
+            raise BrokenPipeError("nobody reads") from stop

@@ -7,7 +7,7 @@ import numpy as np
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import check_new_files
+from closedrooms.core.files import new_files
 from closedrooms.core.geojson import Feature, write_features
 from closedrooms.core.report import Report
 from closedrooms.core.rosmap import RosMap, read_ros_map
@@ -30,7 +30,11 @@ def doors_map(config: DoorsConfig, *, progress: Progress | None = None) -> Repor
     """
     progress, watch = progress or Silent(), Stopwatch()
     outputs = [config.out] if config.picture is None else [config.out, config.picture]
-    check_new_files(outputs, force=config.force, sources=[config.map])
+    with new_files(outputs, force=config.force, sources=[config.map]):
+        return _doors_map(config, progress, watch)
+
+
+def _doors_map(config: DoorsConfig, progress: Progress, watch: Stopwatch) -> Report:
     with watch.stage("read"):
         progress.stage("read")
         read = read_ros_map(config.map, allow_outside=config.allow_outside)

@@ -105,7 +105,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
         plan = load_world(config.world, level=config.level)
         closed = choose_closed(plan, config)
         folder = config.out or Path("runs") / f"{file_name(plan.name)}-{config.seed}"
-        check_output_folder(folder, "run")
+        check_output_folder(folder, "run", sources=[Path(config.world)])
         check_width(plan, config.sim.robot)
         if config.bag:
             check_bags()

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import check_new_files
+from closedrooms.core.files import new_files
 from closedrooms.core.names import shown
 from closedrooms.worlds.library import DEFAULT_WORLD, PLANS, bundled_names, load_world, read_world
 from closedrooms.worlds.plan import FloorPlan
@@ -82,12 +82,12 @@ def show_world(world: str, out_png: str | Path, *, level: str | None = None, for
     """
     from closedrooms.visualization.floor_plan import draw_plan
 
-    check_new_files([Path(out_png)], force=force, sources=[Path(world)])
-    plan = load_world(world, level=level)
-    try:
-        draw_plan(plan, Path(out_png))
-    except InvalidInputError as error:
-        raise InvalidInputError(str(error), where=world) from error
+    with new_files([Path(out_png)], force=force, sources=[Path(world)]):
+        plan = load_world(world, level=level)
+        try:
+            draw_plan(plan, Path(out_png))
+        except InvalidInputError as error:
+            raise InvalidInputError(str(error), where=world) from error
     return plan
 
 
@@ -103,9 +103,9 @@ def generate_world(
     from closedrooms.worlds.formats.native import write_plan
     from closedrooms.worlds.generation.generator import generate
 
-    check_new_files([Path(out_json)], force=force)
-    plan = generate(kind, seed, furniture=furniture)
-    write_plan(Path(out_json), plan)
+    with new_files([Path(out_json)], force=force):
+        plan = generate(kind, seed, furniture=furniture)
+        write_plan(Path(out_json), plan)
     return plan
 
 
@@ -119,9 +119,9 @@ def convert_world(src: str, dst: str | Path, to: str, *, level: str | None = Non
     formats = exporters()
     if to not in formats:
         raise InvalidInputError(f"unknown format {to!r}", expected=f"one of {', '.join(formats)}")
-    check_new_files([Path(dst), *beside(Path(dst), to)], force=force, sources=[Path(src)])
-    plan = read_world(src, level=level)
-    formats[to](Path(dst), plan)
+    with new_files([Path(dst), *beside(Path(dst), to)], force=force, sources=[Path(src)]):
+        plan = read_world(src, level=level)
+        formats[to](Path(dst), plan)
     return plan
 
 

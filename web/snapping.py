@@ -10,7 +10,8 @@ from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.door import ClosedDoor, Point, Segment
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.structure.doorways import Doorway, FacingDoor, find_doorways
-from closedrooms.predictor.structure.wall_faces import face_directions, find_faces
+from closedrooms.predictor.structure.wall_directions import find_wall_directions
+from closedrooms.predictor.structure.wall_faces import find_faces
 
 # A wall further from the pointer than this is not meant [m]: half of a narrow corridor.
 REACH = 0.60
@@ -44,7 +45,10 @@ class WallSnapper:
         self._grid = grid
         faces = find_faces(grid)
         self._points, self._angles = faces.points, faces.angles
-        self._directions = face_directions(faces, grid.frame.resolution) if len(faces.points) else []
+        directions = find_wall_directions(grid)
+        found = [] if directions is None else directions.angles.tolist()
+        # Across walls, in [0, pi): walls run along each direction and across it.
+        self._directions = [(angle + turn) % math.pi for angle in found for turn in (0.0, math.pi / 2)]
         self._tree = cKDTree(faces.points) if len(faces.points) else None
 
     def snap(self, point: Point, *, width: float, reach: float = REACH) -> Snapped | None:

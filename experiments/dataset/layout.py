@@ -25,7 +25,7 @@ METADATA = "metadata.parquet"
 LOCK = ".lock"
 OURS = {DATASET_MANIFEST, CARD, SUMS, SURVEYS, LOCK, *SPLITS}
 # Names of what is being written: folders by tempfile, files by process number.
-UNFINISHED = re.compile(r"\..+\.([A-Za-z0-9_]{8}\.(part|old)|\d+\.part|lock)")
+UNFINISHED = re.compile(r"\..+\.([A-Za-z0-9_]{8}\.(part|old)|([0-9a-f]{8}-)?\d+\.part|lock)")
 
 
 def claim(config: DatasetConfig, worlds: Sequence[World]) -> None:
@@ -75,9 +75,11 @@ def alone(folder: Path) -> Iterator[None]:
             except BlockingIOError as error:
                 raise OutputError(f"another closedrooms works on this dataset: {folder}") from error
             _clear_unfinished(folder)
-            yield
-            # A worker whose parent was killed may have lived on for a moment and have written since.
-            _clear_unfinished(folder)
+            try:
+                yield
+            finally:
+                # What workers that were ended, or lost their parent, had under way.
+                _clear_unfinished(folder)
     except OSError as error:
         raise OutputError(f"cannot write ({error.strerror}): {error.filename or folder}") from error
 

@@ -3,11 +3,10 @@
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, wait
+from concurrent.futures import Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict
 from functools import lru_cache
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from closedrooms.experiments.evaluation.tours import code_digest
 from closedrooms.experiments.robustness.config import FACTORS, RobustnessConfig
 from closedrooms.experiments.robustness.levels import Case, Setting, cases
 from closedrooms.experiments.robustness.onset import Onset
-from closedrooms.experiments.workers import one_thread
+from closedrooms.experiments.workers import hire
 from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.worlds.library import bundled_names, distinct_names, load_world
@@ -132,20 +131,17 @@ def _work(worlds: dict[str, str], config: RobustnessConfig) -> Iterator[tuple[in
             except Exception as error:
                 yield done(), {world: reason(error)}
         return
-    with ProcessPoolExecutor(config.workers, mp_context=get_context("spawn"), initializer=one_thread) as pool:
-        waiting: dict[Future[str], str] = {
-            pool.submit(sweep_world, text, world, config): world for text, world in worlds.items()
-        }
-        try:
+    try:
+        with hire(config.workers) as pool:
+            waiting: dict[Future[str], str] = {
+                pool.submit(sweep_world, text, world, config): world for text, world in worlds.items()
+            }
             while waiting:
                 finished, _ = wait(waiting, timeout=LOOK)
                 problems = {waiting.pop(future): future.result() for future in finished}
                 yield done(), {world: why for world, why in problems.items() if why}
-        except BrokenProcessPool as error:
-            raise ClosedroomsError("a worker process was killed; the same command goes on where it stopped") from error
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    except BrokenProcessPool as error:
+        raise ClosedroomsError("a worker process was killed; the same command goes on where it stopped") from error
 
 
 def sweep_world(text: str, world: str, config: RobustnessConfig) -> str:

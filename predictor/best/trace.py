@@ -108,7 +108,7 @@ def _weigh(scene: Scene, proposals: Proposals, choices: Sequence[Choice]) -> tup
         for other, (theirs, at) in enumerate(zip(candidates, taken, strict=True)):
             if other == number:
                 continue
-            for name, term in weigh_pairs(own, _only(theirs, at), scene.walls.usual).items():
+            for name, term in weigh_pairs(own, _only(theirs, at), in_cells(scene.walls.usual)).items():
                 label = f"neighbours: {name}"
                 terms[label] = terms.get(label, np.zeros(len(own.scores))) + term[:, 0]
         joint = np.asarray(sum(terms.values(), start=np.zeros(len(own.scores))))
@@ -136,7 +136,9 @@ def _find_chosen(own: Hypotheses, choice: Choice) -> int:
 def _only(own: Hypotheses, at: int) -> Hypotheses:
     """One rectangle of several."""
     one = slice(at, at + 1)
-    return Hypotheses(own.boxes[one], own.corners[one], own.scores[one], own.angle, own.quarter, own.u, own.v)
+    return Hypotheses(
+        own.boxes[one], own.corners[one], own.scores[one], own.angle, own.quarter, own.u, own.v, own.measured[one]
+    )
 
 
 def _weigh_alone(
@@ -150,7 +152,7 @@ def _weigh_alone(
     if key not in frames:
         turned = scene.turned[own.angle]
         twin = mirror(turned) if scene.config.symmetry else None
-        thickness = scene.walls.usual
+        thickness = in_cells(scene.walls.usual)
         mirrored = None if twin is None else door_frame(twin, own.quarter, thickness)
         frames[key] = door_frame(turned, own.quarter, thickness), mirrored
     frame, mirrored = frames[key]

@@ -9,7 +9,14 @@ from pathlib import Path
 import pytest
 
 from closedrooms.core.errors import OutputError
-from closedrooms.core.files import check_new_files, is_ours, output_folder, write_bytes
+from closedrooms.core.files import (
+    check_new_files,
+    check_output_folder,
+    is_ours,
+    new_files,
+    output_folder,
+    write_bytes,
+)
 
 
 def test_an_output_folder_appears_whole_and_lists_its_files(tmp_path: Path) -> None:
@@ -287,3 +294,66 @@ def test_single_files_are_new_unless_told_and_never_the_source(tmp_path: Path) -
         check_new_files([tmp_path], force=True)
     with pytest.raises(OutputError, match="cannot write"):
         check_new_files([tmp_path / "no" / "where"], force=True)
+
+
+def write_after(path: Path, text: str, *, force: bool) -> None:
+    """Somebody else writes the file while ours is computed."""
+    with new_files([path], force=force):
+        path.write_text(text)
+        write_bytes(path, b"ours")
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_a_file_that_appears_while_it_is_computed_is_not_replaced(tmp_path: Path, force: bool) -> None:
+    path = tmp_path / "a"
+    with pytest.raises(OutputError, match="appeared"):
+        write_after(path, "of somebody else", force=force)
+    assert tree(tmp_path) == {"a": b"of somebody else"}
+
+
+def test_a_file_that_is_changed_while_its_successor_is_computed_is_not_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.write_text("before")
+    with pytest.raises(OutputError, match="changed meanwhile"):
+        write_after(path, "edited meanwhile", force=True)
+    assert tree(tmp_path) == {"a": b"edited meanwhile"}
+    with new_files([path], force=True):
+        write_bytes(path, b"ours")
+    assert tree(tmp_path) == {"a": b"ours"}
+
+
+def test_a_file_of_a_claim_is_written_and_others_as_ever(tmp_path: Path) -> None:
+    (tmp_path / "other").write_text("before")
+    with new_files([tmp_path / "a"]):
+        write_bytes(tmp_path / "a", b"1")
+        write_bytes(tmp_path / "other", b"2")
+        # Once written it is ours.
+        write_bytes(tmp_path / "a", b"3")
+    assert tree(tmp_path) == {"a": b"3", "other": b"2"}
+
+
+@pytest.mark.parametrize("source", ["out/a", "out", "link"])
+def test_a_folder_that_is_read_is_not_replaced(tmp_path: Path, source: str) -> None:
+    make(tmp_path / "out")
+    (tmp_path / "link").symlink_to(tmp_path / "out" / "a")
+    with pytest.raises(OutputError, match="holds what is read"):
+        check_output_folder(tmp_path / "out", "predict", sources=[None, tmp_path / source])
+    check_output_folder(tmp_path / "out", "predict", sources=[tmp_path, tmp_path / "missing"])
+
+
+def test_an_interrupted_swap_puts_the_old_folder_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    make(tmp_path / "out", a=b"old")
+    replace, calls = Path.replace, []
+
+    def stop_between(self: Path, target: Path) -> Path:
+        if self.is_dir():
+            calls.append(self)
+            if len(calls) == 2:
+                raise KeyboardInterrupt
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", stop_between)
+    with pytest.raises(KeyboardInterrupt):
+        make(tmp_path / "out", a=b"new")
+    assert tree(tmp_path)["out/a"] == b"old"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]

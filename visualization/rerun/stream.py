@@ -20,6 +20,8 @@ CHUNK_BYTES = 1_000_000
 NEVER_SECONDS = 1e6
 # How long those who watch wait for what has happened [s].
 LIVE_SECONDS = 0.2
+# On a full disk the writer has been seen to wait for ever; an honest flush takes milliseconds.
+FLUSH_SECONDS = 60.0
 
 
 class Stage(IntEnum):
@@ -97,7 +99,7 @@ class RecordingStream:
         rr.set_thread_local_data_recording(self._previous)
         try:
             with self._clear_errors():
-                self._rec.flush()
+                self._rec.flush(timeout_sec=FLUSH_SECONDS)
         finally:
             self._rec.disconnect()
 

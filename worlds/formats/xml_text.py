@@ -5,7 +5,7 @@ from typing import Any
 from xml.etree.ElementTree import ParseError
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.incoming import read_text
+from closedrooms.core.incoming import MAX_DEPTH, read_text
 
 MAX_BYTES = 100_000_000
 
@@ -14,20 +14,27 @@ def parse_xml(path: Path, *, what: str) -> Any:
     """Parse the root element of an XML file.
 
     Raises:
-        InvalidInputError: Missing, too large, no XML, or XML with entities.
+        InvalidInputError: Missing, too large, no XML, XML with entities, or nested deeper than any plan is.
     """
     from defusedxml import DefusedXmlException, ElementTree
 
     content = read_text(path, what=what, max_bytes=MAX_BYTES)
     try:
         # As bytes: ElementTree refuses text with an encoding declaration.
-        return ElementTree.fromstring(content.encode())
+        root = ElementTree.fromstring(content.encode())
     except ParseError as error:
         raise InvalidInputError(f"broken XML ({error})", expected=what, where=path) from error
     except DefusedXmlException as error:
         raise InvalidInputError("XML with entities", expected=f"{what} without them", where=path) from error
     except (ValueError, LookupError) as error:
         raise InvalidInputError(f"broken XML ({error})", expected=what, where=path) from error
+    level, depth = [root], 0
+    while level:
+        depth += 1
+        if depth > MAX_DEPTH:
+            raise InvalidInputError(f"nested {MAX_DEPTH} levels deep", expected=what, where=path)
+        level = [inner for element in level for inner in element]
+    return root
 
 
 def child(element: Any, name: str) -> Any:

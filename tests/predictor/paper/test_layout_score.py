@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from closedrooms.predictor.config import Weights
 from closedrooms.predictor.paper.arrangement import arrange
-from closedrooms.predictor.paper.layout_score import Terms, evaluate, face_set
+from closedrooms.predictor.paper.layout_score import FaceSet, Terms, evaluate, face_set
 from closedrooms.predictor.paper.lines import Line
 from closedrooms.predictor.paper.subsets import best_subset
 
@@ -121,3 +121,32 @@ def test_a_search_that_is_cut_says_so():
     cut = best_subset(pool, fixed, W, "as-run", dependent=False, door=np.zeros(2), exact=0, max_nodes=1)
     assert cut.bounded
     assert cut.chosen[fixed].all()
+
+
+@settings(max_examples=40)
+@given(
+    sides=st.tuples(st.floats(0.5, 9.0), st.floats(0.5, 9.0), st.floats(0.5, 9.0)),
+    angle=st.floats(0.0, math.pi),
+    both=st.booleans(),
+)
+def test_terms_of_two_rectangles_in_a_row_are_those_of_the_rectangle_they_make(sides, angle, both):
+    first, second, height = sides
+    along = np.array([math.cos(angle), math.sin(angle)])
+    axes = np.stack((along, (-along[1], along[0])))
+    boxes = np.array([[0.0, first, 0.0, height], [first, first + second, 0.0, height]])
+    corners = tuple(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]) @ axes for x0, x1, y0, y1 in boxes)
+    apart = np.array([[0.0, 1.0], [1.0, 0.0]])
+    faces = FaceSet(
+        faces=np.arange(2), areas=np.array([first, second]) * height,
+        perimeters=2 * (np.array([first, second]) + height), outer_free=np.zeros(2), outer_length=np.zeros(2),
+        inner=apart, inner_length=apart * height, returnable=np.array([False, True]), boxes=boxes, corners=corners,
+    )  # fmt: skip
+    width = first + second if both else first
+    terms = faces.terms(np.array([[True, both]]))
+    assert terms.area[0] == pytest.approx(width * height)
+    assert terms.hull[0] == pytest.approx(width * height)
+    assert terms.contour[0] == pytest.approx(2 * (width + height))
+    assert terms.proportion[0] == pytest.approx(max(width, height) / min(width, height))
+    # The face that is left out is free, behind one edge as long as the rectangles are high.
+    assert terms.free_edges[0] == (0 if both else 1)
+    assert terms.free_length[0] == pytest.approx(0 if both else height)

@@ -44,3 +44,11 @@ def test_damaged_files_are_read_or_refused_in_one_line(kind: str, places: list[t
             problems = [plan.name]
             assert plan.rooms
     assert len(problems) == 1
+
+
+@pytest.mark.parametrize("levels", [65, 100_000])
+def test_an_xml_that_is_nested_deeply_is_refused(tmp_path: Path, levels: int) -> None:
+    path = tmp_path / "deep.xml"
+    path.write_text("<building>" + "<floor>" * levels + "</floor>" * levels + "</building>")
+    with pytest.raises(InvalidInputError, match="levels deep"):
+        load_world(str(path))
