@@ -7,6 +7,7 @@ from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files import MANIFEST, read_json, write_bytes, write_json
+from closedrooms.core.packages import require
 from closedrooms.core.report import Report
 from closedrooms.experiments.dataset.card import card
 from closedrooms.experiments.dataset.checksums import check
@@ -39,14 +40,16 @@ def dataset(config: DatasetConfig, *, progress: Progress | None = None) -> Repor
         InvalidInputError: A world that cannot be used, another dataset in the folder, a sample there that was changed,
             no scheduler at the address.
         OutputError: The folder cannot be written, or holds something that is not ours.
+        MissingPackageError: A package that the work needs, here or on a worker.
     """
     progress = progress or Silent()
+    require("pyarrow", by="closedrooms dataset")
     config = replace(config, out=config.out.resolve())
     progress.stage("worlds")
     worlds = find_worlds(config)
     variants = [variant for world in worlds for variant in find_variants(world, config)]
     claim(config, worlds)
-    crew: Crew[Task, Outcome] = Crew(config.workers, config.scheduler)
+    crew: Crew[Task, Outcome] = Crew(config.workers, config.scheduler, _needs(config), "closedrooms dataset")
     with alone(config.out):
         failures = _surveys(config, worlds, crew, progress) if config.maps == "erased" else {}
         tasks = [Task(config, v.world, v) for v in variants if v.world.name not in failures]
@@ -54,6 +57,11 @@ def dataset(config: DatasetConfig, *, progress: Progress | None = None) -> Repor
         failed |= {task.variant.id: reason for task, reason in _make(tasks, crew, progress, "samples") if task.variant}
         progress.stage("tables")
         return _finish(config, worlds, variants, failed)
+
+
+def _needs(config: DatasetConfig) -> tuple[str, ...]:
+    """Packages without which no worker makes a sample."""
+    return ("pybullet", "mapbox_earcut", "skimage", *(("rerun",) if config.record else ()))
 
 
 def _surveys(

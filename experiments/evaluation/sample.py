@@ -92,6 +92,8 @@ def evaluate_sample(sample: SamplePath, methods: Sequence[str], out: Path, *, to
             read = read_sample(sample)
             hidden = _hidden(read)
             starts = Starts(read)
+        except ModuleNotFoundError:
+            raise
         except Exception as error:
             outcome.problems[sample.name] = reason(error)
             return outcome
@@ -103,7 +105,7 @@ def evaluate_sample(sample: SamplePath, methods: Sequence[str], out: Path, *, to
             head = _head(read, sample.name, method, keys[method], hidden)
             try:
                 scores = head | _score(read, method, folder, hidden, out, starts, tours=tours)
-            except OutputError:
+            except (OutputError, ModuleNotFoundError):
                 raise
             except Exception as error:
                 outcome.problems[f"{method} {sample.name}"] = reason(error)
@@ -242,7 +244,7 @@ def _score(
     if tours and _has_tour(method) and sample.rooms_seen is not None:
         try:
             scores["tour"] = _tours(sample, prediction.grid, sample.rooms_seen, out)
-        except OutputError:
+        except (OutputError, ModuleNotFoundError):
             raise
         except Exception as error:
             scores["no_tour"] = f"no tour: {reason(error)}"

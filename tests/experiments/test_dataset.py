@@ -94,6 +94,7 @@ def wait_for(condition: object, seconds: float = 120.0) -> None:
         time.sleep(0.02)
 
 
+@pytest.mark.simulation
 def test_holds_every_order_and_number_of_closed_doors(made: Path) -> None:
     assert samples(made) == {
         f"{split}/{world}/r{r:02d}-c{c:02d}"
@@ -112,6 +113,7 @@ def test_holds_every_order_and_number_of_closed_doors(made: Path) -> None:
     }  # fmt: skip
 
 
+@pytest.mark.simulation
 def test_a_sample_is_a_map_with_the_truth_on_one_frame(made: Path) -> None:
     for name in samples(made):
         folder = made / name
@@ -166,6 +168,7 @@ def test_the_order_of_closing_does_not_depend_on_how_many_are_wanted(tmp_path: P
     assert {variant.id: variant.closed for variant in few}.items() <= {v.id: v.closed for v in many}.items()
 
 
+@pytest.mark.simulation
 def test_the_same_command_finds_nothing_to_do(made: Path, worlds: list[str]) -> None:
     before = content(made)
     stamps = {path: path.stat().st_mtime_ns for path in made.glob("*/*/*/map.png")}
@@ -174,11 +177,13 @@ def test_the_same_command_finds_nothing_to_do(made: Path, worlds: list[str]) -> 
     assert {path: path.stat().st_mtime_ns for path in made.glob("*/*/*/map.png")} == stamps
 
 
+@pytest.mark.simulation
 def test_sums_are_those_of_the_files(made: Path) -> None:
     sums = dict(reversed(line.split("  ")) for line in (made / "SHA256SUMS").read_text().splitlines())
     assert sums == {name: value for name, value in content(made).items() if name != "SHA256SUMS"}
 
 
+@pytest.mark.simulation
 def test_a_missing_sample_comes_back_with_the_same_bytes(made: Path, worlds: list[str]) -> None:
     before = content(made)
     victim = made / sorted(samples(made))[3]
@@ -190,6 +195,7 @@ def test_a_missing_sample_comes_back_with_the_same_bytes(made: Path, worlds: lis
     assert content(made) == before
 
 
+@pytest.mark.simulation
 def test_a_sample_that_was_edited_is_named_and_left_alone(
     made: Path, worlds: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -206,6 +212,7 @@ def test_a_sample_that_was_edited_is_named_and_left_alone(
         path.write_bytes(original)
 
 
+@pytest.mark.simulation
 def test_another_configuration_or_folder_is_refused_and_untouched(
     made: Path, worlds: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -220,6 +227,7 @@ def test_another_configuration_or_folder_is_refused_and_untouched(
     assert (tmp_path / "thesis.tex").read_text() == "mine"
 
 
+@pytest.mark.simulation
 def test_a_dataset_of_another_version_is_refused(
     worlds: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -247,6 +255,7 @@ def test_impossible_options_are_one_line(
     assert not (tmp_path / "d").exists()
 
 
+@pytest.mark.simulation
 def test_an_unreachable_scheduler_is_one_line(
     worlds: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -257,12 +266,14 @@ def test_an_unreachable_scheduler_is_one_line(
     assert "no scheduler answers" in capsys.readouterr().err.splitlines()[-1]
 
 
+@pytest.mark.simulation
 def test_two_worlds_of_one_name_are_refused(worlds: list[str], tmp_path: Path) -> None:
     other = write_world(tmp_path, "a", 5.0)
     with pytest.raises(InvalidInputError, match="two worlds named 'a'"):
         find_worlds(DatasetConfig(worlds=(worlds[0], str(other)), out=tmp_path))
 
 
+@pytest.mark.simulation
 def test_a_sample_that_fails_is_recorded_and_the_others_are_made(
     worlds: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -287,6 +298,7 @@ def test_a_sample_that_fails_is_recorded_and_the_others_are_made(
     assert len(samples(tmp_path / "d")) == 4
 
 
+@pytest.mark.simulation
 def test_a_full_disk_is_a_clear_error(
     worlds: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -378,6 +390,7 @@ def test_a_cluster_that_loses_a_worker_makes_the_same_bytes(
     assert content(out) == content(made)
 
 
+@pytest.mark.simulation
 def test_hugging_face_loads_three_splits_offline(made: Path, tmp_path: Path) -> None:
     code = (
         "import sys, datasets\n"
