@@ -4,6 +4,8 @@ Needs no screen and no GPU (Debian: ``mesa-vulkan-drivers libvulkan1``). Unlike 
 the recording to be loaded, and it can go through all tabs and to any time.
 """
 
+import os
+import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,6 +41,8 @@ def take(config: ScreenshotConfig) -> list[Path]:
     """Start a viewer, open the recording, take one picture a tab."""
     config.out.mkdir(parents=True, exist_ok=True)
     pictures = []
+    # The viewer is looked for by its name, beside this Python where the environment is not activated.
+    os.environ["PATH"] = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)))
     with ViewerClient.spawn(headless=True, port=config.port) as viewer:
         viewer.open(str(config.recording.resolve()))
         time.sleep(config.settle)

@@ -49,9 +49,11 @@ def call(source: Path, words: tuple[str, ...], out: Path) -> float:
     module = "closedrooms." + entry.removesuffix(".py").replace("/", ".")
     line = [sys.executable, "-m", module, *(str(out) if word == "OUT" else word for word in words)]
     # Older versions know one body only, and no option for it.
-    if source != HERE and "--sim.body" in line:
-        at = line.index("--sim.body")
-        del line[at : at + 2]
+    if entry != ENTRIES[0]:
+        line = ["--preset" if word == "--method" else word for word in line]
+        if "--sim.body" in line:
+            at = line.index("--sim.body")
+            del line[at : at + 2]
     environment = {**os.environ, "PYTHONPATH": str(source / ".typing"), "OMP_NUM_THREADS": "1"}
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(line, capture_output=True, text=True, check=False, env=environment, cwd=out.parent)

@@ -16,7 +16,7 @@ from closedrooms.cli.usage import Place, UsageError, explain
 from closedrooms.core.errors import InvalidInputError
 
 TOURS = ("networkx", "ortools", "skimage")
-SIMULATION = ("pybullet", "trimesh", "mapbox_earcut", "skimage")
+SIMULATION = ("pybullet", "mapbox_earcut", "skimage")
 TABLES = ("pyarrow", "matplotlib")
 COMMANDS = (
     Command(

@@ -16,7 +16,7 @@ import stat
 import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.incoming import read_json as read_json  # noqa: PLC0414 (callers know it from here)
@@ -38,13 +38,24 @@ def write_bytes(path: Path, data: bytes) -> None:
     Raises:
         OutputError: The folder is missing, read-only or full.
     """
+    with new_file(path) as file:
+        file.write(data)
+
+
+@contextlib.contextmanager
+def new_file(path: Path) -> Iterator[BinaryIO]:
+    """A file to write bit by bit under a temporary name, that takes the place of ``path`` when the block ends well.
+
+    Raises:
+        OutputError: The folder is missing, read-only or full.
+    """
     _check_name(path)
     with clear_errors(path):
         _clear_parts(path)
         temporary = path.with_name(f".{short_name(path.name)}.{os.getpid()}.part")
         try:
             with temporary.open("wb") as file:
-                file.write(data)
+                yield file
                 file.flush()
                 os.fsync(file.fileno())
             temporary.replace(path)

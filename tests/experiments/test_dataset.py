@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 from shapely.geometry import box
 
@@ -19,7 +20,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.geojson import read_doors, read_rooms
 from closedrooms.core.rosmap import read_map
 from closedrooms.experiments.dataset.config import DatasetConfig
-from closedrooms.experiments.dataset.layout import alone
+from closedrooms.experiments.dataset.layout import alone, write_metadata, write_sums
 from closedrooms.experiments.dataset.variants import (
     World,
     find_variants,
@@ -266,11 +267,33 @@ def test_an_unreachable_scheduler_is_one_line(
     assert "no scheduler answers" in capsys.readouterr().err.splitlines()[-1]
 
 
-@pytest.mark.simulation
-def test_two_worlds_of_one_name_are_refused(worlds: list[str], tmp_path: Path) -> None:
-    other = write_world(tmp_path, "a", 5.0)
-    with pytest.raises(InvalidInputError, match="two worlds named 'a'"):
-        find_worlds(DatasetConfig(worlds=(worlds[0], str(other)), out=tmp_path))
+def test_two_worlds_whose_names_make_one_folder_are_refused(tmp_path: Path) -> None:
+    sources = [str(write_world(tmp_path, name, 5.0)) for name in ("a b", "a-b")]
+    with pytest.raises(InvalidInputError, match="two worlds named 'a-b'"):
+        find_worlds(DatasetConfig(worlds=tuple(sources), out=tmp_path))
+
+
+def test_a_table_written_in_batches_is_the_one_written_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = [{"id": f"{number}", "closed": ["d"] * (number % 3), "ate_m": number / 7} for number in range(10)]
+    for name, most in (("at once", 100), ("in batches", 3)):
+        (tmp_path / name).mkdir()
+        monkeypatch.setattr("closedrooms.experiments.dataset.layout.ROWS", most)
+        write_metadata(tmp_path / name, iter(rows))
+    one, other = (pq.read_table(tmp_path / name / "metadata.parquet") for name in ("at once", "in batches"))
+    assert one.equals(other)
+    assert one.to_pylist() == rows
+    assert pq.ParquetFile(tmp_path / "in batches" / "metadata.parquet").num_row_groups == 4
+
+
+def test_sums_stand_in_order_of_the_paths_the_root_files_among_them(tmp_path: Path) -> None:
+    (tmp_path / "train").mkdir()
+    for name in ("README.md", "manifest.json", "train/metadata.parquet"):
+        (tmp_path / name).write_text(name)
+    names = ["surveys/a-b/s", "surveys/a/s", "train/a/r00-c01/map.png", "train/zoo/r00-c01/map.png"]
+    write_sums(tmp_path, ((name, "0" * 64) for name in names))
+    lines = (tmp_path / "SHA256SUMS").read_text().splitlines()
+    found = [line.split("  ")[1] for line in lines]
+    assert found == sorted([*names, "README.md", "manifest.json", "train/metadata.parquet"])
 
 
 @pytest.mark.simulation
