@@ -133,7 +133,8 @@ def _finish(
         size += sum(bytes_ for _, _, bytes_ in counts.values())
         _write_root(config, worlds, variants, made, failed, size)
         sums.seek(0)
-        write_sums(out, (tuple(line.rstrip("\n").split("  ", 1)[::-1]) for line in sums))
+        parts = (line.rstrip("\n").partition("  ") for line in sums)
+        write_sums(out, ((name, value) for value, _, name in parts))
     splits = {split: counts[split] for split in SPLITS}
     return Report(
         folder=out,

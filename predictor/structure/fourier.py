@@ -1,5 +1,6 @@
 """Fourier transforms of pictures by scipy's compiled pocketfft, without what its package imports beside it."""
 
+import importlib
 import importlib.util
 from functools import cache
 from pathlib import Path
@@ -51,6 +52,4 @@ def _pocketfft() -> Any:
                 continue
             if hasattr(module, "c2c") and hasattr(module, "good_size"):
                 return module
-    from scipy.fft._pocketfft import pypocketfft
-
-    return pypocketfft
+    return importlib.import_module("scipy.fft._pocketfft.pypocketfft")
