@@ -2,14 +2,15 @@
 
     python benchmarks/coverage.py                      # drawn offices only
     python benchmarks/coverage.py MAP.yaml [MAP.yaml ...]   # these maps too
+    python benchmarks/coverage.py --quick              # the smallest office of each table
 
 Times are CPU seconds of this process, the best of three (of one where a run takes seconds). Tours are compared on the
 metric closure of the same graph, each solver for the whole graph at once; ``ours`` is what the default method does.
 """
 
-import sys
+import argparse
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -127,12 +128,12 @@ def length(distances: FloatArray, tour: list[int]) -> float:
     return float(distances[tour, tour[1:] + tour[:1]].sum())
 
 
-def speed() -> None:
+def speed(sizes: Sequence[tuple[float, float]]) -> None:
     print("| map [m] | cells | clean [s] | thin [s] | trace [s] | plain loop trace [s] | all to graph [s] | vertices |")
     print("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |")
     config = CoverageConfig()
     build_graph(office(20.0, 20.0))
-    for width, height in SIZES:
+    for width, height in sizes:
         grid = office(width, height)
         clean, space = measured(lambda grid=grid: clean_free_space(grid, config.graph))
         thinned, skeleton = measured(lambda space=space: thin(space.mask))
@@ -174,14 +175,20 @@ def solvers(name: str, graph: TopologicalGraph) -> None:
 
 
 def main() -> None:
-    speed()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("maps", nargs="*", type=Path)
+    parser.add_argument("--quick", action="store_true")
+    options = parser.parse_args()
+    most = 1 if options.quick else None
+    speed(SIZES[:most])
     print("\n| map | vertices | solver | CPU [s] | length [m] | above the lower bound [%] |")
     print("| --- | ---: | --- | ---: | ---: | ---: |")
     bare = CoverageConfig(graph=replace(CoverageConfig().graph, clutter_filter=False))
-    for pillars, (width, height) in ((0, (40.0, 30.0)), (60, (60.0, 45.0)), (120, (80.0, 60.0))):
+    offices = ((0, (40.0, 30.0)), (60, (60.0, 45.0)), (120, (80.0, 60.0)))
+    for pillars, (width, height) in offices[:most]:
         grid = office(width, height, pillars=pillars)
         solvers(f"office {width:.0f} x {height:.0f} m, {pillars} pillars", build_graph(grid, config=bare).graph)
-    for path in map(Path, sys.argv[1:]):
+    for path in options.maps:
         solvers(f"{path.parent.name}/{path.stem}", build_graph(read_map(path)).graph)
 
 

@@ -82,6 +82,9 @@ def fit(samples: list[Sample]) -> None:
     from sklearn.linear_model import LogisticRegression
 
     pairs = [pair for sample in samples for pair in sample.found]
+    if len({hit is not None for _, hit in pairs}) < 2:
+        print("no regression: it takes right and wrong proposals")
+        return
     features = np.array([[math.log(p.recess / math.hypot(p.rough, SMOOTH)), p.seen] for p, _ in pairs])
     model = LogisticRegression(C=10.0).fit(features, [hit is not None for _, hit in pairs])
     per_contrast, per_seen = model.coef_[0]

@@ -13,6 +13,7 @@ from typing import Any
 
 from closedrooms.cli.usage import UsageError
 from closedrooms.core.errors import ClosedroomsError, OutputError
+from closedrooms.core.packages import missing_package, require
 from closedrooms.core.stopping import SIGNALS, Stop, Terminated, end_in_time, leave_at_once, stopping
 from closedrooms.core.unfinished import remove_unfinished
 
@@ -120,9 +121,28 @@ def _main(words: Sequence[str]) -> int:
     from closedrooms.pipeline.progress import Terminal
 
     command = options.about["command"]
+    _check_packages(command, options)
     with Terminal(quiet=options.quiet, verbose=options.verbose) as terminal:
-        result = load(command.work)(configured(options), progress=terminal)
+        try:
+            result = load(command.work)(configured(options), progress=terminal)
+        except ModuleNotFoundError as error:
+            missing = missing_package(error, by=f"closedrooms {command.name}")
+            if missing is None:
+                raise
+            raise missing from error
     return _show(command.name, result, terminal, options)
+
+
+def _check_packages(command: Any, options: Any) -> None:
+    """Name every package that a command will miss before it begins.
+
+    Raises:
+        MissingPackageError: One or more are not installed.
+    """
+    by = f"closedrooms {command.name}"
+    require(*dict.fromkeys(command.needs), by=by)
+    if getattr(options, "record", False):
+        require("rerun", by=by, instead="--no-record")
 
 
 def _show(name: str, result: Any, terminal: Any, options: Any) -> int:

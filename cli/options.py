@@ -51,12 +51,14 @@ class Command:
         summary: One line for people.
         config: Its configuration class, ``module:name``.
         work: The function that does it, ``module:name``: from a configuration and ``progress`` to a report.
+        needs: Packages that not every installation has, as they are imported, and that it cannot do without.
     """
 
     name: str
     summary: str
     config: str
     work: str
+    needs: tuple[str, ...] = ()
 
 
 def load(place: str) -> Any:

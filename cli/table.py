@@ -15,12 +15,16 @@ from closedrooms.cli.options import HELP, HELP_ALL, Command, option_names, optio
 from closedrooms.cli.usage import Place, UsageError, explain
 from closedrooms.core.errors import InvalidInputError
 
+TOURS = ("networkx", "ortools", "skimage")
+SIMULATION = ("pybullet", "mapbox_earcut", "skimage")
+TABLES = ("pyarrow", "matplotlib")
 COMMANDS = (
     Command(
         "run",
         "Simulate a robot in a building with closed doors, map it, predict the closed rooms, plan a tour.",
         "pipeline.config:RunConfig",
         "pipeline.runs:run_all",
+        needs=(*SIMULATION, *TOURS),
     ),
     Command(
         "predict",
@@ -33,6 +37,7 @@ COMMANDS = (
         "Plan a coverage tour on a ROS map.",
         "pipeline.config:CoverConfig",
         "pipeline.cover:cover_map",
+        needs=TOURS,
     ),
     Command(
         "map",
@@ -64,7 +69,9 @@ COMMANDS = (
         "pipeline.config:ListWorlds",
         "cli.work:list_worlds",
     ),
-    Command("worlds show", "Draw a floor plan.", "pipeline.config:ShowWorld", "cli.work:show_world"),
+    Command(
+        "worlds show", "Draw a floor plan.", "pipeline.config:ShowWorld", "cli.work:show_world", needs=("matplotlib",)
+    ),
     Command("worlds generate", "Generate a floor plan.", "pipeline.config:GenerateWorld", "cli.work:generate_world"),
     Command(
         "worlds convert",
@@ -77,18 +84,21 @@ COMMANDS = (
         "Make maps of many buildings with closed doors, and what is really behind them.",
         "experiments.dataset.config:DatasetConfig",
         "experiments.dataset.dataset:dataset",
+        needs=(*SIMULATION, *TOURS, "pyarrow"),
     ),
     Command(
         "evaluate",
         "Compare predictions with the truth over a dataset.",
         "experiments.evaluation.config:EvaluateConfig",
         "experiments.evaluation.evaluate:evaluate",
+        needs=(*TOURS, *TABLES),
     ),
     Command(
         "robustness",
         "Find at which noise the prediction starts to suffer, and which stage gives way first.",
         "experiments.robustness.config:RobustnessConfig",
         "experiments.robustness.sweep:robustness",
+        needs=(*SIMULATION, *TOURS, *TABLES),
     ),
 )
 GROUPS = {"worlds": "List, show, generate and convert floor plans."}

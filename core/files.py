@@ -15,7 +15,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.incoming import read_json
@@ -39,13 +39,24 @@ def write_bytes(path: Path, data: bytes) -> None:
     Raises:
         OutputError: The folder is missing, read-only or full.
     """
+    with new_file(path) as file:
+        file.write(data)
+
+
+@contextlib.contextmanager
+def new_file(path: Path) -> Iterator[BinaryIO]:
+    """A file to write bit by bit under a temporary name, that takes the place of ``path`` when the block ends well.
+
+    Raises:
+        OutputError: The folder is missing, read-only or full.
+    """
     _check_name(path)
     with clear_errors(path):
         clear_files(path)
         temporary = part_of_file(path)
         with unfinished(temporary, path):
             with temporary.open("wb") as file:
-                file.write(data)
+                yield file
                 file.flush()
                 os.fsync(file.fileno())
             _put(temporary, path)

@@ -2,20 +2,28 @@
 
 import contextlib
 import ctypes
+import functools
 import logging
 import multiprocessing
 import os
 import signal
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from functools import partial
+from itertools import chain, count, islice
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
+from closedrooms.core.packages import missing_package, require
 from closedrooms.core.stopping import SIGNALS, Stop, end_in_time, handle
 from closedrooms.core.unfinished import remove_unfinished
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 Job = TypeVar("Job")
 Outcome = TypeVar("Outcome")
@@ -28,6 +36,8 @@ PATIENCE = 10.0
 GRACE = 1.0
 SAFE_PATH = "PYTHONSAFEPATH"
 PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
+# Jobs that a cluster is given for each of its threads: one to work on, one to go on with.
+AHEAD = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +54,20 @@ class Crew(Generic[Job, Outcome]):
     Attributes:
         workers: Local processes; 1 works in this process.
         scheduler: Address of a Dask scheduler, ``tcp://host:port``, or ``None`` for local processes.
+        needs: Packages that the work cannot do without, as they are imported.
+        by: Who needs them, the command.
     """
 
     workers: int = 1
     scheduler: str | None = None
+    needs: tuple[str, ...] = ()
+    by: str = "closedrooms"
 
-    def do(self, function: Callable[[Job], Outcome], jobs: Sequence[Job]) -> Iterator[tuple[Job, Outcome | Lost]]:
+    def do(self, function: Callable[[Job], Outcome], jobs: Iterable[Job]) -> Iterator[tuple[Job, Outcome | Lost]]:
         """Outcomes as they come, in no certain order.
+
+        Jobs are taken one after the other, no more of them ahead than the workers can begin: a million cost no more
+        memory than a hundred, and neighbours, which share a building, are worked on at one time.
 
         A worker that dies is replaced, and what it was doing is handed out again, at most ``TRIES`` times. On any
         error, Ctrl-C included, work that has not begun is not begun, and local workers are ended.
@@ -60,53 +77,57 @@ class Crew(Generic[Job, Outcome]):
             jobs: What to do it to; small, since they are sent.
 
         Raises:
-            InvalidInputError: The scheduler cannot be reached, or Dask is not installed.
+            InvalidInputError: The scheduler cannot be reached.
+            MissingPackageError: Here or on a worker a package is not installed; said once.
         """
-        if not jobs:
-            return
-        if self.scheduler is not None:
-            with _cluster(self.scheduler) as executor:
-                yield from _outcomes(executor, function, jobs)
-        elif self.workers == 1:
-            for job in jobs:
-                yield job, function(job)
-        else:
-            yield from self._locally(function, jobs)
+        source = iter(jobs)
+        for first in source:
+            work = partial(_prepared, function, self.needs, self.by)
+            jobs = chain((first,), source)
+            if self.scheduler is not None:
+                yield from _on_cluster(self.scheduler, work, jobs)
+            elif self.workers == 1:
+                for job in jobs:
+                    yield job, work(job)
+            else:
+                yield from self._locally(work, jobs)
 
-    def _locally(self, function: Callable[[Job], Outcome], jobs: Sequence[Job]) -> Iterator[tuple[Job, Outcome | Lost]]:
-        tries = dict.fromkeys(range(len(jobs)), 0)
-        while tries:
-            # Jobs that were under way when a worker died are tried one at a time, so that the guilty one is known.
-            suspects = [number for number, count in tries.items() if count > 0]
-            batch = suspects[:1] or list(tries)
-            begun: set[int] = set()
+    def _locally(self, work: Callable[[Job], Outcome], jobs: Iterator[Job]) -> Iterator[tuple[Job, Outcome | Lost]]:
+        # Jobs that were under way when a worker died are tried one at a time, so that the guilty one is known.
+        suspects: deque[tuple[Job, int]] = deque()
+        while True:
+            begun: dict[int, Job] = {}
+            job, tries = suspects.popleft() if suspects else (None, 0)
+            batch = jobs if tries == 0 else iter((cast(Job, job),))
             try:
-                for number, outcome in self._batch(function, jobs, batch, begun):
-                    del tries[number]
-                    yield jobs[number], outcome
+                yield from self._batch(work, batch, begun, 1 if tries else self.workers)
             except BrokenProcessPool:
-                for number in begun & tries.keys():
-                    tries[number] += 1
-                    if tries[number] >= TRIES:
-                        del tries[number]
-                        yield jobs[number], Lost(f"{TRIES} workers died while they worked on it")
+                if tries + 1 >= TRIES:
+                    yield from ((job, Lost(f"{TRIES} workers died while they worked on it")) for job in begun.values())
+                else:
+                    suspects.extend((job, tries + 1) for job in begun.values())
+                continue
+            if tries == 0:
+                return
 
     def _batch(
-        self, function: Callable[[Job], Outcome], jobs: Sequence[Job], batch: Sequence[int], begun: set[int]
-    ) -> Iterator[tuple[int, Outcome]]:
-        """Hand out a batch, no more at a time than can be worked on, so that ``begun`` names what a death hits."""
+        self, work: Callable[[Job], Outcome], jobs: Iterator[Job], begun: dict[int, Job], workers: int
+    ) -> Iterator[tuple[Job, Outcome]]:
+        """Hand out jobs, no more at a time than can be worked on, so that ``begun`` names what a death hits."""
         under_way: dict[Future[Outcome], int] = {}
-        left = list(reversed(batch))
-        with hire(min(self.workers, len(batch))) as pool:
-            while left or under_way:
-                while left and len(under_way) < self.workers:
-                    number = left.pop()
-                    begun.add(number)
-                    under_way[pool.submit(function, jobs[number])] = number
+        numbers = count()
+        with hire(workers) as pool:
+            while True:
+                for job in islice(jobs, workers - len(under_way)):
+                    number = next(numbers)
+                    begun[number] = job
+                    under_way[pool.submit(work, job)] = number
+                if not under_way:
+                    break
                 done, _ = wait(under_way, return_when=FIRST_COMPLETED)
                 for future in done:
                     outcome = future.result()
-                    yield under_way.pop(future), outcome
+                    yield begun.pop(under_way.pop(future)), outcome
 
 
 @contextlib.contextmanager
@@ -156,10 +177,38 @@ def _dismiss() -> None:
         child.kill()
 
 
-def one_thread() -> None:
-    """Begin a worker: workers share the processors, and OpenCV's own threads would only get in each other's way."""
-    import cv2
+def _prepared(function: Callable[[Job], Outcome], needs: tuple[str, ...], by: str, job: Job) -> Outcome:
+    """Do one job on a worker of any kind, which is made ready once."""
+    _make_ready(needs, by)
+    try:
+        return function(job)
+    except ModuleNotFoundError as error:
+        missing = missing_package(error, by=by)
+        if missing is None:
+            raise
+        raise missing from error
 
+
+@functools.cache
+def _make_ready(needs: tuple[str, ...], by: str) -> None:
+    require(*needs, by=by)
+    one_thread()
+
+
+# What the numeric libraries ask when they are loaded.
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def one_thread() -> None:
+    """Begin a worker: workers share the processors, and a library's own threads would only get in each other's way.
+
+    Holds for OpenCV and BLAS, those that are loaded and those that will be.
+    """
+    import cv2
+    from threadpoolctl import threadpool_limits
+
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    threadpool_limits(1)
     cv2.setNumThreads(1)
 
 
@@ -184,14 +233,11 @@ class _Dismissal(Stop):
 
 
 @contextlib.contextmanager
-def _cluster(address: str) -> Iterator[Executor]:
-    """The executor of a Dask cluster."""
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise InvalidInputError(
-            "Dask is not installed", expected="pip install 'closedrooms[cluster]'", where=address
-        ) from error
+def _cluster(address: str) -> Iterator["Client"]:
+    """A client of a Dask cluster."""
+    require("distributed", by="--scheduler")
+    from distributed import Client
+
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError, RuntimeError) as error:
@@ -202,31 +248,44 @@ def _cluster(address: str) -> Iterator[Executor]:
     for logger in ("distributed", "distributed.client"):
         logging.getLogger(logger).setLevel(logging.CRITICAL + 1)
     with client:
-        yield client.get_executor(pure=False, retries=TRIES - 1)
+        yield client
 
 
-def _outcomes(
-    executor: Executor, function: Callable[[Job], Outcome], jobs: Sequence[Job]
+def _on_cluster(
+    address: str, work: Callable[[Job], Outcome], jobs: Iterator[Job]
 ) -> Iterator[tuple[Job, Outcome | Lost]]:
-    from distributed import KilledWorker
-    from distributed.comm import CommClosedError
+    """Hand out jobs to a cluster, ``AHEAD`` times as many as it has threads at a time."""
+    with _cluster(address) as client:
+        from distributed import KilledWorker, as_completed
+        from distributed.comm import CommClosedError
 
-    waiting = {executor.submit(function, job): job for job in jobs}
-    try:
-        while waiting:
-            done, _ = wait(waiting, return_when=FIRST_COMPLETED)
-            for future in done:
-                job = waiting.pop(future)
+        begun: dict[str, Job] = {}
+        completed = as_completed(loop=client.loop)
+
+        def fill() -> None:
+            most = max(AHEAD * sum(client.nthreads().values()), 1)
+            for job in islice(jobs, most - len(begun)):
+                # No key of our own: equal jobs are done as often as they are asked for.
+                future = client.submit(work, job, pure=False, retries=TRIES - 1)
+                begun[future.key] = job
+                completed.add(future)
+
+        try:
+            fill()
+            for future in completed:
+                job = begun.pop(future.key)
                 try:
-                    yield job, future.result()
+                    outcome: Outcome | Lost = future.result()
                 except KilledWorker as error:
-                    yield job, Lost(" ".join(str(error).split()))
-    except (CancelledError, CommClosedError, ConnectionError, TimeoutError) as error:
-        # Dask cancels what its scheduler can no longer tell about.
-        raise ClosedroomsError(
-            "the Dask scheduler was lost; the same command goes on where it stopped once there is one again"
-        ) from error
-    except BaseException:
-        for future in waiting:
-            future.cancel()
-        raise
+                    outcome = Lost(" ".join(str(error).split()))
+                future.release()
+                yield job, outcome
+                fill()
+        except (CancelledError, CommClosedError, ConnectionError, TimeoutError) as error:
+            # Dask cancels what its scheduler can no longer tell about.
+            raise ClosedroomsError(
+                "the Dask scheduler was lost; the same command goes on where it stopped once there is one again"
+            ) from error
+        except BaseException:
+            client.cancel(list(completed.futures))
+            raise

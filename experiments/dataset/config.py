@@ -1,6 +1,5 @@
 """Options of ``closedrooms dataset``."""
 
-import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -9,6 +8,7 @@ import tyro
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.options import check_least
+from closedrooms.experiments.scheduler_address import check_scheduler
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.pipeline.config import NoiseName, named_sim
@@ -70,5 +70,4 @@ class DatasetConfig:
         if self.sim is None:
             object.__setattr__(self, "sim", named_sim(self.noise))
         check_least(self, repetitions=1, max_closed=1, workers=1, seed=0)
-        if self.scheduler is not None and not re.fullmatch(r"(tcp|tls|ws|ucx)://\S+:\d+", self.scheduler):
-            raise InvalidInputError(f"--scheduler {self.scheduler}", expected="tcp://host:port")
+        check_scheduler(self.scheduler)

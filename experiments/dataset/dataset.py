@@ -1,13 +1,15 @@
 """``closedrooms dataset``: maps of many buildings with closed doors, and what is really behind them."""
 
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files import MANIFEST, write_bytes, write_json
 from closedrooms.core.incoming import read_json
+from closedrooms.core.packages import require
 from closedrooms.core.report import Report
 from closedrooms.experiments.dataset.card import card
 from closedrooms.experiments.dataset.checksums import check
@@ -18,6 +20,7 @@ from closedrooms.experiments.dataset.layout import (
     alone,
     claim,
     description,
+    file_sums,
     fingerprint,
     row,
     write_metadata,
@@ -40,14 +43,16 @@ def dataset(config: DatasetConfig, *, progress: Progress | None = None) -> Repor
         InvalidInputError: A world that cannot be used, another dataset in the folder, a sample there that was changed,
             no scheduler at the address.
         OutputError: The folder cannot be written, or holds something that is not ours.
+        MissingPackageError: A package that the work needs, here or on a worker.
     """
     progress = progress or Silent()
+    require("pyarrow", by="closedrooms dataset")
     config = replace(config, out=config.out.resolve())
     progress.stage("worlds")
     worlds = find_worlds(config)
     variants = [variant for world in worlds for variant in find_variants(world, config)]
     claim(config, worlds)
-    crew: Crew[Task, Outcome] = Crew(config.workers, config.scheduler)
+    crew: Crew[Task, Outcome] = Crew(config.workers, config.scheduler, _needs(config), "closedrooms dataset")
     with alone(config.out):
         failures = _surveys(config, worlds, crew, progress) if config.maps == "erased" else {}
         tasks = [Task(config, v.world, v) for v in variants if v.world.name not in failures]
@@ -55,6 +60,11 @@ def dataset(config: DatasetConfig, *, progress: Progress | None = None) -> Repor
         failed |= {task.variant.id: reason for task, reason in _make(tasks, crew, progress, "samples") if task.variant}
         progress.stage("tables")
         return _finish(config, worlds, variants, failed)
+
+
+def _needs(config: DatasetConfig) -> tuple[str, ...]:
+    """Packages without which no worker makes a sample."""
+    return ("pybullet", "mapbox_earcut", "skimage", *(("rerun",) if config.record else ()))
 
 
 def _surveys(
@@ -111,22 +121,72 @@ def _finish(
             f"no sample could be made ({next(iter(failed.values()), 'none was wanted')})",
             expected="at least one", where=out,
         )  # fmt: skip
-    folders = [Task(config, world).folder for world in worlds if config.maps == "erased"]
-    folders += [out / variant.id for variant in made]
-    abouts: dict[str, Any] = {
-        folder.relative_to(out).as_posix(): read_json(folder / MANIFEST, what="run.json")
-        for folder in folders
-        if folder.exists()
-    }
-    sizes = {name: sum(p.stat().st_size for p in (out / name).iterdir()) for name in abouts}
     counts: dict[str, tuple[int, int, int]] = {}
-    for split in SPLITS:
-        own = [variant for variant in made if variant.world.split == split]
-        if own:
-            write_metadata(out / split, [row(variant, abouts[variant.id]) for variant in own])
-        buildings = len({variant.world.name for variant in own})
-        counts[split] = (buildings, len(own), sum(sizes[variant.id] for variant in own))
-    write_bytes(out / CARD, card(config, worlds, made, failed, sum(sizes.values())).encode())
+    # One run.json is in memory at a time: a million of them have 21 GB. What the tables and sums need goes to disk.
+    with tempfile.TemporaryFile("w+", dir=out, prefix=".sums.") as sums:
+        surveys = [Task(config, world).folder for world in worlds if config.maps == "erased"]
+        size = sum(
+            _read(folder, out, sums)[1] for folder in sorted(surveys, key=lambda path: f"{path}/") if folder.exists()
+        )
+        for split in sorted(SPLITS):
+            own = [variant for variant in made if variant.world.split == split]
+            counts[split] = (len({v.world.name for v in own}), len(own), _write_table(out, split, own, sums))
+        size += sum(bytes_ for _, _, bytes_ in counts.values())
+        _write_root(config, worlds, variants, made, failed, size)
+        sums.seek(0)
+        parts = (line.rstrip("\n").partition("  ") for line in sums)
+        write_sums(out, ((name, value) for value, _, name in parts))
+    splits = {split: counts[split] for split in SPLITS}
+    return Report(
+        folder=out,
+        title=f"{len(made)} of {len(variants)} samples, {len(worlds)} worlds, {config.maps}, noise {config.noise}",
+        rows=[
+            ("split", "buildings", "samples", "MB"),
+            *((split, str(b), str(s), f"{size / 1e6:.1f}") for split, (b, s, size) in splits.items()),
+        ],
+        failures=dict(sorted(failed.items())),
+        figures={
+            "fingerprint": fingerprint(out),
+            "splits": {split: {"buildings": b, "samples": s, "bytes": size} for split, (b, s, size) in splits.items()},
+        },
+    )
+
+
+def _read(folder: Path, out: Path, sums: TextIO) -> tuple[dict[str, Any], int]:
+    """``run.json`` of a survey or sample and the bytes of its files; their checksums are put down in ``sums``."""
+    about = read_json(folder / MANIFEST, what="run.json")
+    for name, value in file_sums(out, folder.relative_to(out).as_posix(), about):
+        sums.write(f"{value}  {name}\n")
+    return about, sum(path.stat().st_size for path in folder.iterdir())
+
+
+def _write_table(out: Path, split: str, made: Sequence[Variant], sums: TextIO) -> int:
+    """The table of a split; the bytes of its samples."""
+    sizes = 0
+
+    def rows() -> Iterator[dict[str, Any]]:
+        nonlocal sizes
+        for variant in made:
+            about, size = _read(out / variant.id, out, sums)
+            sizes += size
+            yield row(variant, about)
+
+    if made:
+        write_metadata(out / split, rows())
+    return sizes
+
+
+def _write_root(
+    config: DatasetConfig,
+    worlds: Sequence[World],
+    variants: Sequence[Variant],
+    made: Sequence[Variant],
+    failed: dict[str, str],
+    size: int,
+) -> None:
+    """The card and the manifest."""
+    out = config.out
+    write_bytes(out / CARD, card(config, worlds, made, failed, size).encode())
     samples = [
         {
             "id": variant.id,
@@ -141,17 +201,3 @@ def _finish(
     ]
     manifest = {"command": "dataset", **description(config, worlds), "complete": True, "samples": samples}
     write_json(out / DATASET_MANIFEST, manifest)
-    write_sums(out, abouts)
-    return Report(
-        folder=out,
-        title=f"{len(made)} of {len(variants)} samples, {len(worlds)} worlds, {config.maps}, noise {config.noise}",
-        rows=[
-            ("split", "buildings", "samples", "MB"),
-            *((split, str(b), str(s), f"{size / 1e6:.1f}") for split, (b, s, size) in counts.items()),
-        ],
-        failures=dict(sorted(failed.items())),
-        figures={
-            "fingerprint": fingerprint(out),
-            "splits": {split: {"buildings": b, "samples": s, "bytes": size} for split, (b, s, size) in counts.items()},
-        },
-    )

@@ -1,16 +1,17 @@
 """What stands at the root of a dataset, and the table in front of each split."""
 
 import contextlib
-import io
+import heapq
 import json
 import re
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError
-from closedrooms.core.files import MANIFEST, PROGRAM, write_bytes, write_json
+from closedrooms.core.files import MANIFEST, PROGRAM, new_file, write_json
 from closedrooms.core.incoming import read_json
 from closedrooms.experiments.dataset.checksums import digest
 from closedrooms.experiments.dataset.config import DatasetConfig
@@ -23,6 +24,8 @@ CARD = "README.md"
 SUMS = "SHA256SUMS"
 METADATA = "metadata.parquet"
 LOCK = ".lock"
+# Rows of a split's table held and written at a time.
+ROWS = 10_000
 OURS = {DATASET_MANIFEST, CARD, SUMS, SURVEYS, LOCK, *SPLITS}
 # Names of what is being written: folders by tempfile, files by process number.
 UNFINISHED = re.compile(r"\..+\.([A-Za-z0-9_]{8}\.(part|old)|([0-9a-f]{8}-)?\d+\.part|lock)")
@@ -168,8 +171,14 @@ def row(variant: Variant, about: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def write_metadata(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+def write_metadata(folder: Path, rows: Iterable[Mapping[str, Any]]) -> None:
     """The table of one split, ``metadata.parquet``: a Hugging Face image folder reads it beside the pictures.
+
+    No more than ``ROWS`` rows are held at a time.
+
+    Args:
+        folder: Of the split.
+        rows: See :func:`row`; at least one.
 
     Raises:
         OutputError: It cannot be written.
@@ -177,27 +186,42 @@ def write_metadata(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    buffer = io.BytesIO()
-    pq.write_table(pa.Table.from_pylist([dict(entry) for entry in rows]), buffer)
-    write_bytes(folder / METADATA, buffer.getvalue())
+    source = iter(rows)
+    with new_file(folder / METADATA) as file, contextlib.ExitStack() as stack:
+        writer = None
+        while batch := [dict(entry) for entry in islice(source, ROWS)]:
+            table = pa.Table.from_pylist(batch, schema=writer.schema if writer else None)
+            writer = writer or stack.enter_context(pq.ParquetWriter(file, table.schema))
+            writer.write_table(table)
 
 
-def write_sums(folder: Path, abouts: Mapping[str, Mapping[str, Any]]) -> None:
+def write_sums(folder: Path, sums: Iterable[tuple[str, str]]) -> None:
     """``SHA256SUMS`` as ``sha256sum -c`` reads it, over every repeatable file of the dataset but itself.
 
     Args:
         folder: The dataset.
-        abouts: ``run.json`` of each survey and sample, by folder relative to the dataset.
+        sums: Path relative to the dataset and SHA-256 of each file of the surveys and samples, in order of the paths.
 
     Raises:
         OutputError: It cannot be written.
     """
-    lines = [f"{value}  {name}/{file}" for name, about in abouts.items() for file, value in about["checksums"].items()]
-    lines += [f"{digest(folder / name / MANIFEST)}  {name}/{MANIFEST}" for name in abouts]
     others = [folder / DATASET_MANIFEST, folder / CARD, *(folder / split / METADATA for split in SPLITS)]
-    lines += [f"{digest(path)}  {path.relative_to(folder).as_posix()}" for path in others if path.is_file()]
-    text = "".join(f"{line}\n" for line in sorted(lines, key=lambda line: line.split("  ", 1)[1]))
-    write_bytes(folder / SUMS, text.encode())
+    own = sorted((path.relative_to(folder).as_posix(), digest(path)) for path in others if path.is_file())
+    with new_file(folder / SUMS) as file:
+        for name, value in heapq.merge(sums, own):
+            file.write(f"{value}  {name}\n".encode())
+
+
+def file_sums(folder: Path, name: str, about: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Path relative to the dataset and SHA-256 of each file of one survey or sample, in order.
+
+    Args:
+        folder: The dataset.
+        name: The survey's or sample's folder, relative to it.
+        about: Its ``run.json``.
+    """
+    sums = {**about["checksums"], MANIFEST: digest(folder / name / MANIFEST)}
+    return sorted((f"{name}/{file}", value) for file, value in sums.items())
 
 
 def fingerprint(folder: Path) -> str:

@@ -93,7 +93,7 @@ class Observed:
 
 
 def make(task: Task) -> Outcome:
-    """Make one survey or sample and write it; nothing that goes wrong is raised, it is told."""
+    """Make one survey or sample and write it; what goes wrong is told, a missing package raised."""
     try:
         plan = _plan(task.world.source)
         if task.variant is None:
@@ -105,6 +105,8 @@ def make(task: Task) -> Outcome:
             _make_sample(task, task.variant, plan)
     except OutputError as error:
         return Outcome(trouble=str(error))
+    except ModuleNotFoundError:
+        raise
     except Exception as error:
         return Outcome(failure=reason(error))
     return Outcome()

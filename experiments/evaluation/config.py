@@ -8,6 +8,7 @@ import tyro
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.options import check_least
+from closedrooms.experiments.scheduler_address import check_scheduler
 from closedrooms.predictor.methods import find_method
 
 COMPARED = ("paper", "best", "rose", "line-of-sight", "geometric")
@@ -33,7 +34,10 @@ class EvaluateConfig:
     """What to compare."""
 
     workers: int = 2
-    """Processes."""
+    """Local processes."""
+
+    scheduler: str | None = None
+    """A Dask scheduler, ``tcp://host:port``, that does the work instead; its workers must see the same folders."""
 
     tours: bool = True
     """Plan coverage tours too (paper, section 5), on every sample whose run.json says how many rooms the robot saw."""
@@ -61,3 +65,4 @@ class EvaluateConfig:
         for name in self.methods:
             find_method(name)
         check_least(self, workers=1, resamples=1, subset_worlds=1, subset_repetitions=1)
+        check_scheduler(self.scheduler)

@@ -2,11 +2,13 @@
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from statistics import median
 from typing import Any
 
 from closedrooms.core.files import MANIFEST, PROGRAM, only_writer, write_json
+from closedrooms.core.packages import require
 from closedrooms.core.report import Report
 from closedrooms.experiments.evaluation.claimed_folder import claim
 from closedrooms.experiments.evaluation.config import EvaluateConfig
@@ -29,9 +31,12 @@ def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Rep
     Raises:
         InvalidInputError: No samples, or two with one name.
         OutputError: The folder cannot be written, holds something that is not ours, or another process writes it.
+        MissingPackageError: A package that the tables or the pictures need, here or on a worker.
     """
     progress = progress or Silent()
-    samples = find_samples(config.datasets)
+    require("pyarrow", "matplotlib", by="closedrooms evaluate")
+    # Workers of a cluster stand in other folders.
+    samples = [replace(sample, folder=sample.folder.resolve()) for sample in find_samples(config.datasets)]
     claim(config.out, "evaluate")
     with only_writer(config.out):
         return _evaluate(samples, config, progress)
@@ -56,7 +61,7 @@ def _evaluate(samples: Sequence[SamplePath], config: EvaluateConfig, progress: P
     manifest = {
         "program": PROGRAM,
         "command": "evaluate",
-        "configuration": resolved(config, leave_out=("datasets", "out", "workers")),
+        "configuration": resolved(config, leave_out=("datasets", "out", "workers", "scheduler")),
         "paths": {"datasets": [input_path(folder) for folder in config.datasets]},
         "versions": versions(),
         "samples": len(samples),
@@ -98,8 +103,14 @@ def _seconds(scores: Sequence[Scores]) -> dict[str, float]:
 def _work(samples: Sequence[SamplePath], config: EvaluateConfig) -> Iterator[Outcome]:
     """What comes of the samples, as they are finished."""
     job = partial(
-        evaluate_sample, methods=config.methods, out=config.out, tours=config.tours, probability=config.probability
+        evaluate_sample,
+        methods=config.methods,
+        out=config.out.resolve(),
+        tours=config.tours,
+        probability=config.probability,
     )
-    crew: Crew[SamplePath, Outcome] = Crew(min(config.workers, len(samples)))
+    workers = min(config.workers, len(samples))
+    needs = ("skimage", *(("networkx", "ortools") if config.tours else ()))
+    crew: Crew[SamplePath, Outcome] = Crew(workers, config.scheduler, needs, "closedrooms evaluate")
     for sample, outcome in crew.do(job, samples):
         yield Outcome([], {sample.name: outcome.reason}) if isinstance(outcome, Lost) else outcome

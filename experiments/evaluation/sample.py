@@ -97,6 +97,8 @@ def evaluate_sample(
             read = read_sample(sample)
             hidden = _hidden(read)
             starts = Starts(read)
+        except ModuleNotFoundError:
+            raise
         except Exception as error:
             outcome.problems[sample.name] = reason(error)
             return outcome
@@ -108,7 +110,7 @@ def evaluate_sample(
             head = _head(read, sample.name, method, keys[method], hidden)
             try:
                 scores = head | _score(read, method, folder, hidden, out, starts, tours=tours, probability=probability)
-            except OutputError:
+            except (OutputError, ModuleNotFoundError):
                 raise
             except Exception as error:
                 outcome.problems[f"{method} {sample.name}"] = reason(error)
@@ -264,7 +266,7 @@ def _score(
     if tours and _has_tour(method) and sample.rooms_seen is not None:
         try:
             scores["tour"] = _tours(sample, prediction.grid, sample.rooms_seen, out)
-        except OutputError:
+        except (OutputError, ModuleNotFoundError):
             raise
         except Exception as error:
             scores["no_tour"] = f"no tour: {reason(error)}"

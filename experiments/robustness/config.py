@@ -9,6 +9,7 @@ import tyro
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.options import check_least
+from closedrooms.experiments.scheduler_address import check_scheduler
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.predictor.methods import DEFAULT_METHOD, find_method
@@ -105,7 +106,10 @@ class RobustnessConfig:
     """The one seed: closed doors, furniture and every source of noise."""
 
     workers: int = 2
-    """Processes; each takes one world after the other."""
+    """Local processes; each takes one world after the other."""
+
+    scheduler: str | None = None
+    """A Dask scheduler, ``tcp://host:port``, that does the work instead; its workers must see the same folders."""
 
     resamples: int = 2000
     """Resamples of the bootstrap intervals."""
@@ -126,6 +130,7 @@ class RobustnessConfig:
             raise InvalidInputError(f"factors {self.factors}", expected=f"each once, of {', '.join(FACTORS)}")
         find_method(self.method)
         check_least(self, repetitions=1, closed=1, workers=1, resamples=1, seed=0)
+        check_scheduler(self.scheduler)
         for factor in FACTORS[:-1]:
             levels: tuple[float, ...] = getattr(self, factor)
             share = factor in SHARES

@@ -1,26 +1,27 @@
 """``closedrooms robustness``: what noise does to map, prediction and coverage, one source at a time and together."""
 
+import contextlib
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, wait
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict
-from functools import lru_cache
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, replace
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError, reason
+from closedrooms.core.errors import InvalidInputError, OutputError, reason
 from closedrooms.core.files import MANIFEST, PROGRAM, only_writer, write_json
 from closedrooms.core.incoming import read_json
 from closedrooms.core.names import file_name
+from closedrooms.core.packages import require
 from closedrooms.core.report import Report
 from closedrooms.experiments.evaluation.claimed_folder import claim
 from closedrooms.experiments.evaluation.tours import code_digest
 from closedrooms.experiments.robustness.config import FACTORS, RobustnessConfig
 from closedrooms.experiments.robustness.levels import Case, Setting, cases
 from closedrooms.experiments.robustness.onset import Onset
-from closedrooms.experiments.workers import hire
+from closedrooms.experiments.workers import Crew, Lost
 from closedrooms.pipeline.manifest import input_path, resolved, versions
 from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.worlds.library import bundled_names, distinct_names, load_world
@@ -31,7 +32,7 @@ CELLS, RESULT = "cells", "rows.json"
 # How often it is looked how far the workers are [s].
 LOOK = 1.0
 # What says nothing about the result of one level in one world.
-NOT_CONTENT = ("out", "worlds", "workers", "resamples", "factors")
+NOT_CONTENT = ("out", "worlds", "workers", "scheduler", "resamples", "factors")
 
 
 def robustness(config: RobustnessConfig, *, progress: Progress | None = None) -> Report:
@@ -48,6 +49,7 @@ def robustness(config: RobustnessConfig, *, progress: Progress | None = None) ->
         OutputError: The folder cannot be written, holds something that is not ours, or another process writes it.
     """
     progress = progress or Silent()
+    require("pyarrow", "matplotlib", by="closedrooms robustness")
     worlds = _worlds(config.worlds)
     claim(config.out, "robustness")
     with only_writer(config.out):
@@ -59,10 +61,7 @@ def _sweep(worlds: dict[str, str], config: RobustnessConfig, progress: Progress)
     wanted = cases(config)
     total = len(worlds) * len({case.name for case in wanted})
     progress.stage("sweep", total)
-    failures: dict[str, str] = {}
-    for done, problems in _work(worlds, config):
-        failures |= problems
-        progress.advance(done, f"{done} of {total}")
+    failures = _work(worlds, config, progress, total)
     rows = [row for name in worlds.values() if name not in failures for row in _finished(config, name, wanted)]
     if not rows:
         why = next(iter(failures.values()), "nothing was asked for")
@@ -74,7 +73,7 @@ def _sweep(worlds: dict[str, str], config: RobustnessConfig, progress: Progress)
     manifest = {
         "program": PROGRAM,
         "command": "robustness",
-        "configuration": resolved(config, leave_out=("worlds", "out", "workers")),
+        "configuration": resolved(config, leave_out=("worlds", "out", "workers", "scheduler")),
         "paths": {"worlds": [input_path(world) for world in config.worlds]},
         "versions": versions(),
         "onsets": [asdict(onset) for onset in found],
@@ -114,58 +113,67 @@ def _worlds(given: Sequence[str]) -> dict[str, str]:
     return {text: file_name(name) for text, name in zip(given, names, strict=True)}
 
 
-def _work(worlds: dict[str, str], config: RobustnessConfig) -> Iterator[tuple[int, dict[str, str]]]:
-    """How many levels are finished, and which worlds failed."""
+@contextlib.contextmanager
+def _watch(done: Callable[[], int], total: int, progress: Progress) -> Iterator[None]:
+    """Tell every few moments how far the workers are, wherever they are: a world takes them minutes."""
+    over = threading.Event()
+
+    def look() -> None:
+        while not over.wait(LOOK):
+            number = done()
+            progress.advance(number, f"{number} of {total}")
+
+    watcher = threading.Thread(target=look, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        over.set()
+        watcher.join()
+
+
+def _work(worlds: dict[str, str], config: RobustnessConfig, progress: Progress, total: int) -> dict[str, str]:
+    """Do every world; why some failed."""
     names = {case.name for case in cases(config)}
 
     def done() -> int:
         return sum((_folder(config, world, name) / RESULT).is_file() for world in worlds.values() for name in names)
 
-    if config.workers == 1 or len(worlds) == 1:
-        for text, world in worlds.items():
-            try:
-                for _ in _levels(text, world, config):
-                    yield done(), {}
-            except OutputError:
-                raise
-            except Exception as error:
-                yield done(), {world: reason(error)}
-        return
-    try:
-        with hire(config.workers) as pool:
-            waiting: dict[Future[str], str] = {
-                pool.submit(sweep_world, text, world, config): world for text, world in worlds.items()
-            }
-            while waiting:
-                finished, _ = wait(waiting, timeout=LOOK)
-                problems = {waiting.pop(future): future.result() for future in finished}
-                yield done(), {world: why for world, why in problems.items() if why}
-    except BrokenProcessPool as error:
-        raise ClosedroomsError("a worker process was killed; the same command goes on where it stopped") from error
+    given = {str(Path(text).resolve()) if Path(text).exists() else text: world for text, world in worlds.items()}
+    tours = ("networkx", "ortools") if config.tours else ()
+    needs = ("pybullet", "mapbox_earcut", "skimage", *tours)
+    workers = min(config.workers, len(worlds))
+    crew: Crew[tuple[str, str], str] = Crew(workers, config.scheduler, needs, "closedrooms robustness")
+    problems: dict[str, str] = {}
+    job = partial(sweep_world, config=replace(config, out=config.out.resolve()))
+    with _watch(done, total, progress):
+        for (_, world), outcome in crew.do(job, given.items()):
+            if outcome:
+                problems[world] = outcome.reason if isinstance(outcome, Lost) else outcome
+    progress.advance(done(), f"{done()} of {total}")
+    return problems
 
 
-def sweep_world(text: str, world: str, config: RobustnessConfig) -> str:
+def sweep_world(world: tuple[str, str], config: RobustnessConfig) -> str:
     """Every level in one world; the reason when it failed, else nothing.
 
     Args:
-        text: The world as it was given.
-        world: Its name.
+        world: The world as it was given, and its name.
         config: Options.
 
     Raises:
         OutputError: A result cannot be written.
     """
     try:
-        for _ in _levels(text, world, config):
-            pass
-    except OutputError:
+        _do_levels(*world, config)
+    except (OutputError, ModuleNotFoundError):
         raise
     except Exception as error:
         return reason(error)
     return ""
 
 
-def _levels(text: str, world: str, config: RobustnessConfig) -> Iterator[None]:
+def _do_levels(text: str, world: str, config: RobustnessConfig) -> None:
     """Do one level after the other of what is not there yet."""
     from closedrooms.experiments.robustness.trial import Building
 
@@ -184,7 +192,6 @@ def _levels(text: str, world: str, config: RobustnessConfig) -> Iterator[None]:
         rows = building.rows(setting, folder)
         write_json(folder / RESULT, {"key": key, "setting": asdict(setting), "rows": rows})
         building.forget(setting)
-        yield
 
 
 def _folder(config: RobustnessConfig, world: str, name: str) -> Path:

@@ -11,9 +11,9 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.config import LinesConfig
 from closedrooms.predictor.paper.directions import Directions, angle_between
 from closedrooms.predictor.paper.segments import angles_of, lengths_of
+from closedrooms.predictor.structure.fourier import Spectrum, quick_size, transform, transform_back
 from closedrooms.predictor.structure.peaks import find_circular_peaks
 
-Spectrum = npt.NDArray[np.complex64]
 # As published: a peak's prominence in the range of the profile; how far from pi apart a pair of opposite peaks may
 # be [rad]; half width of the spectral band [bins]; the share of the largest response that makes a cell structural.
 PROMINENCE, PAIR_TOLERANCE, BAND, STRUCTURAL = 0.2, 0.1, 2.5, 0.18
@@ -48,20 +48,18 @@ def find_rose(grid: OccupancyGrid) -> RoseStructure | None:
     Returns:
         ``None`` where fewer than two directions stand out: nothing can then be told from clutter.
     """
-    from scipy import fft
-
     occupied = grid.occupied
-    size = fft.next_fast_len(max(max(occupied.shape) + 1, 64), real=False)
+    size = quick_size(max(max(occupied.shape) + 1, 64))
     size += size % 2
     padded = np.zeros((size, size), dtype=np.float32)
     padded[: occupied.shape[0], : occupied.shape[1]] = occupied
-    spectrum = fft.fft2(padded)
+    spectrum = transform(padded)
     del padded
     normals = _dominant(spectrum)
     if normals.size < 2:
         return None
     _keep_bands(spectrum, normals)
-    kept = fft.ifft2(spectrum, overwrite_x=True)
+    kept = transform_back(spectrum)
     del spectrum
     response = np.abs(kept[: occupied.shape[0], : occupied.shape[1]][occupied])
     structural = occupied.copy()

@@ -207,6 +207,7 @@ def test_an_output_folder_with_other_files_is_refused_and_kept(
         (("evaluate", "x", "--subset-worlds", "0", "--out", "x"), "--subset-worlds 0; expected a whole number of at"),
     ],
 )
+@pytest.mark.simulation
 def test_a_wrong_world_or_door_is_one_line_and_status_1(
     tmp_path: Path,
     words: tuple[str, ...],

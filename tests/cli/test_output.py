@@ -108,6 +108,7 @@ def test_an_interruption_is_one_line_and_its_status(error, status, corridor, cal
 
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+@pytest.mark.simulation
 def test_a_signal_leaves_nothing_half_written(number, status, tmp_path):
     out = tmp_path / "out"
     words = [sys.executable, "-m", "closedrooms.cli", "run", "office-07", "--no-record", "--out", str(out)]

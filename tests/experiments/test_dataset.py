@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 from shapely.geometry import box
 
@@ -19,7 +20,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.geojson import read_doors, read_rooms
 from closedrooms.core.rosmap import read_map
 from closedrooms.experiments.dataset.config import DatasetConfig
-from closedrooms.experiments.dataset.layout import alone
+from closedrooms.experiments.dataset.layout import alone, write_metadata, write_sums
 from closedrooms.experiments.dataset.variants import (
     World,
     find_variants,
@@ -94,6 +95,7 @@ def wait_for(condition: object, seconds: float = 120.0) -> None:
         time.sleep(0.02)
 
 
+@pytest.mark.simulation
 def test_holds_every_order_and_number_of_closed_doors(made: Path) -> None:
     assert samples(made) == {
         f"{split}/{world}/r{r:02d}-c{c:02d}"
@@ -112,6 +114,7 @@ def test_holds_every_order_and_number_of_closed_doors(made: Path) -> None:
     }  # fmt: skip
 
 
+@pytest.mark.simulation
 def test_a_sample_is_a_map_with_the_truth_on_one_frame(made: Path) -> None:
     for name in samples(made):
         folder = made / name
@@ -166,6 +169,7 @@ def test_the_order_of_closing_does_not_depend_on_how_many_are_wanted(tmp_path: P
     assert {variant.id: variant.closed for variant in few}.items() <= {v.id: v.closed for v in many}.items()
 
 
+@pytest.mark.simulation
 def test_the_same_command_finds_nothing_to_do(made: Path, worlds: list[str]) -> None:
     before = content(made)
     stamps = {path: path.stat().st_mtime_ns for path in made.glob("*/*/*/map.png")}
@@ -174,11 +178,13 @@ def test_the_same_command_finds_nothing_to_do(made: Path, worlds: list[str]) -> 
     assert {path: path.stat().st_mtime_ns for path in made.glob("*/*/*/map.png")} == stamps
 
 
+@pytest.mark.simulation
 def test_sums_are_those_of_the_files(made: Path) -> None:
     sums = dict(reversed(line.split("  ")) for line in (made / "SHA256SUMS").read_text().splitlines())
     assert sums == {name: value for name, value in content(made).items() if name != "SHA256SUMS"}
 
 
+@pytest.mark.simulation
 def test_a_missing_sample_comes_back_with_the_same_bytes(made: Path, worlds: list[str]) -> None:
     before = content(made)
     victim = made / sorted(samples(made))[3]
@@ -190,6 +196,7 @@ def test_a_missing_sample_comes_back_with_the_same_bytes(made: Path, worlds: lis
     assert content(made) == before
 
 
+@pytest.mark.simulation
 def test_a_sample_that_was_edited_is_named_and_left_alone(
     made: Path, worlds: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -206,6 +213,7 @@ def test_a_sample_that_was_edited_is_named_and_left_alone(
         path.write_bytes(original)
 
 
+@pytest.mark.simulation
 def test_another_configuration_or_folder_is_refused_and_untouched(
     made: Path, worlds: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -220,6 +228,7 @@ def test_another_configuration_or_folder_is_refused_and_untouched(
     assert (tmp_path / "thesis.tex").read_text() == "mine"
 
 
+@pytest.mark.simulation
 def test_a_dataset_of_another_version_is_refused(
     worlds: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -247,6 +256,7 @@ def test_impossible_options_are_one_line(
     assert not (tmp_path / "d").exists()
 
 
+@pytest.mark.simulation
 def test_an_unreachable_scheduler_is_one_line(
     worlds: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -266,6 +276,36 @@ def test_two_worlds_of_one_name_are_told_apart_by_their_folders(worlds: list[str
     assert all(name.endswith("-a") for name in names)
 
 
+def test_two_worlds_whose_names_make_one_folder_are_refused(tmp_path: Path) -> None:
+    sources = [str(write_world(tmp_path, name, 5.0)) for name in ("a b", "a-b")]
+    with pytest.raises(InvalidInputError, match="two worlds named 'a-b'"):
+        find_worlds(DatasetConfig(worlds=tuple(sources), out=tmp_path))
+
+
+def test_a_table_written_in_batches_is_the_one_written_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = [{"id": f"{number}", "closed": ["d"] * (number % 3), "ate_m": number / 7} for number in range(10)]
+    for name, most in (("at once", 100), ("in batches", 3)):
+        (tmp_path / name).mkdir()
+        monkeypatch.setattr("closedrooms.experiments.dataset.layout.ROWS", most)
+        write_metadata(tmp_path / name, iter(rows))
+    one, other = (pq.read_table(tmp_path / name / "metadata.parquet") for name in ("at once", "in batches"))
+    assert one.equals(other)
+    assert one.to_pylist() == rows
+    assert pq.ParquetFile(tmp_path / "in batches" / "metadata.parquet").num_row_groups == 4
+
+
+def test_sums_stand_in_order_of_the_paths_the_root_files_among_them(tmp_path: Path) -> None:
+    (tmp_path / "train").mkdir()
+    for name in ("README.md", "manifest.json", "train/metadata.parquet"):
+        (tmp_path / name).write_text(name)
+    names = ["surveys/a-b/s", "surveys/a/s", "train/a/r00-c01/map.png", "train/zoo/r00-c01/map.png"]
+    write_sums(tmp_path, ((name, "0" * 64) for name in names))
+    lines = (tmp_path / "SHA256SUMS").read_text().splitlines()
+    found = [line.split("  ")[1] for line in lines]
+    assert found == sorted([*names, "README.md", "manifest.json", "train/metadata.parquet"])
+
+
+@pytest.mark.simulation
 def test_a_sample_that_fails_is_recorded_and_the_others_are_made(
     worlds: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -290,6 +330,7 @@ def test_a_sample_that_fails_is_recorded_and_the_others_are_made(
     assert len(samples(tmp_path / "d")) == 4
 
 
+@pytest.mark.simulation
 def test_a_full_disk_is_a_clear_error(
     worlds: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -381,6 +422,7 @@ def test_a_cluster_that_loses_a_worker_makes_the_same_bytes(
     assert content(out) == content(made)
 
 
+@pytest.mark.simulation
 def test_hugging_face_loads_three_splits_offline(made: Path, tmp_path: Path) -> None:
     code = (
         "import sys, datasets\n"

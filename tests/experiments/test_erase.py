@@ -47,6 +47,7 @@ def surveyed(noise: str) -> OpenSurvey:
 
 
 @pytest.mark.parametrize("closed", [("into-room",), ("into-corridor",), ("into-corridor", "into-room")])
+@pytest.mark.simulation
 def test_every_ray_ends_where_it_does_when_the_doors_are_really_closed(closed: tuple[str, ...]) -> None:
     survey = surveyed("none")
     erased = erase(survey, closed)
@@ -61,6 +62,7 @@ def test_every_ray_ends_where_it_does_when_the_doors_are_really_closed(closed: t
     assert changed > 100
 
 
+@pytest.mark.simulation
 def test_the_map_knows_nothing_of_a_closed_room_and_everything_else() -> None:
     survey = surveyed("medium")
     erased = erase(survey, ("into-room",))
@@ -78,6 +80,7 @@ def test_the_map_knows_nothing_of_a_closed_room_and_everything_else() -> None:
     assert known_share(0.3, 0.3, 7.7, 1.7) > 0.97
 
 
+@pytest.mark.simulation
 def test_a_cut_ray_shows_the_door_where_it_is() -> None:
     survey = surveyed("medium")
     erased = erase(survey, ("into-room", "into-corridor"))
@@ -89,6 +92,7 @@ def test_a_cut_ray_shows_the_door_where_it_is() -> None:
         assert door.width == pytest.approx(0.9, abs=0.02)
 
 
+@pytest.mark.simulation
 def test_cut_rays_carry_the_noise_of_the_sensor() -> None:
     survey = surveyed("medium")
     errors = []
@@ -104,6 +108,7 @@ def test_cut_rays_carry_the_noise_of_the_sensor() -> None:
     assert abs(np.mean(errors)) < 0.01
 
 
+@pytest.mark.simulation
 def test_no_door_closed_leaves_every_scan_as_it_was() -> None:
     survey = surveyed("medium")
     erased = erase(survey, ())
@@ -112,6 +117,7 @@ def test_no_door_closed_leaves_every_scan_as_it_was() -> None:
     assert erased.doors == []
 
 
+@pytest.mark.simulation
 def test_a_map_does_not_depend_on_what_was_erased_before() -> None:
     eraser = Eraser(surveyed("medium"))
     eraser.erase(("into-corridor",))
@@ -121,6 +127,7 @@ def test_a_map_does_not_depend_on_what_was_erased_before() -> None:
     assert again.doors == fresh.doors
 
 
+@pytest.mark.simulation
 def test_refuses_a_door_that_does_not_exist() -> None:
     with pytest.raises(InvalidInputError, match="unknown door 'attic'"):
         erase(surveyed("medium"), ("attic",))

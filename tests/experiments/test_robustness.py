@@ -251,7 +251,7 @@ def test_a_defect_in_one_world_is_told_in_one_line(tmp_path: Path, monkeypatch: 
         raise ZeroDivisionError("two\nlines")
 
     monkeypatch.setattr("closedrooms.experiments.robustness.trial.Building", broken)
-    why = sweep_world("office-01", "office-01", replace(CONFIG, out=tmp_path))
+    why = sweep_world(("office-01", "office-01"), replace(CONFIG, out=tmp_path))
     assert why.startswith("internal error, please report it: ZeroDivisionError: two lines (test_robustness.py:")
 
 

@@ -5,14 +5,14 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from closedrooms.core.errors import ClosedroomsError, InvalidInputError
-from closedrooms.experiments.workers import TRIES, Crew, Lost, _outcomes
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.packages import MissingPackageError
+from closedrooms.experiments.workers import AHEAD, TRIES, Crew, Lost
 
 DEADLY = "__import__('os')._exit(1)"
 # `eval` is a function that any worker can find by name.
@@ -59,21 +59,6 @@ def test_a_scheduler_that_does_not_answer_is_bad_input(monkeypatch: pytest.Monke
         list(crew.do(math.sqrt, [1.0]))
 
 
-def test_a_scheduler_that_is_lost_is_one_line() -> None:
-    pytest.importorskip("distributed", reason="needs closedrooms[cluster]")
-
-    class Lossy(ThreadPoolExecutor):
-        """Cancels what it is given, as Dask's client does when its scheduler is gone."""
-
-        def submit(self, *_: object, **__: object) -> Future[object]:  # type: ignore[override]
-            future: Future[object] = Future()
-            future.set_exception(CancelledError("lost"))
-            return future
-
-    with pytest.raises(ClosedroomsError, match="scheduler was lost"):
-        list(_outcomes(Lossy(), DO, ["1 + 1"]))
-
-
 def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
     code = (
         "from closedrooms.experiments.workers import Crew\n"
@@ -94,3 +79,74 @@ def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
     while any(Path(f"/proc/{worker}").exists() for worker in workers) and time.monotonic() < end:
         time.sleep(0.02)
     assert not [worker for worker in workers if Path(f"/proc/{worker}").exists()]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_missing_package_is_said_once_with_what_brings_it(workers: int) -> None:
+    crew: Crew[str, object] = Crew(workers, by="closedrooms dataset")
+    absent = "(_ for _ in ()).throw(ModuleNotFoundError('gone', name='pybullet.inside'))"
+    with pytest.raises(MissingPackageError, match=r"closedrooms dataset needs pybullet, .*pip install"):
+        list(crew.do(DO, [absent] * 4))
+
+
+def test_what_the_work_needs_is_looked_for_before_the_first_job(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("closedrooms.core.packages.find_spec", lambda _name: None)
+    crew: Crew[str, object] = Crew(1, needs=("gtsam",), by="a test")
+    with pytest.raises(MissingPackageError, match="a test needs gtsam"):
+        list(crew.do(DO, ["1 / 0"]))
+
+
+def test_no_more_jobs_are_taken_ahead_than_the_workers_can_begin() -> None:
+    taken: list[str] = []
+
+    def endless() -> Iterator[str]:
+        while True:
+            taken.append("1 + 1")
+            yield "1 + 1"
+
+    crew: Crew[str, object] = Crew(2)
+    outcomes = crew.do(DO, endless())
+    for _ in range(5):
+        assert next(outcomes) == ("1 + 1", 2)
+    outcomes.close()
+    assert len(taken) <= 5 + 2
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_workers_use_one_thread(workers: int) -> None:
+    threads = "[pool['num_threads'] for pool in __import__('threadpoolctl').threadpool_info()]"
+    loaded = f"__import__('scipy.linalg') and __import__('cv2').getNumThreads(), {threads}"
+    crew: Crew[str, object] = Crew(workers)
+    for _, (opencv, pools) in crew.do(DO, [loaded] * 2):  # type: ignore[misc]
+        assert opencv == 1
+        assert set(pools) == {1}
+
+
+@pytest.fixture
+def scheduler() -> Iterator[str]:
+    """The address of a scheduler in this process, with one worker of two threads in a process of its own."""
+    distributed = pytest.importorskip("distributed", reason="needs closedrooms[cluster]")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, dashboard_address=None, host="127.0.0.1"
+    ) as cluster:
+        yield cluster.scheduler_address
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_cluster_does_the_same_a_few_jobs_ahead_with_one_thread(scheduler: str) -> None:
+    taken: list[str] = []
+
+    def jobs() -> Iterator[str]:
+        for number in range(40):
+            taken.append(f"{number} * __import__('cv2').getNumThreads()")
+            yield taken[-1]
+
+    crew: Crew[str, object] = Crew(1, scheduler)
+    found = []
+    for number, (_, outcome) in enumerate(crew.do(DO, jobs()), start=1):
+        assert len(taken) <= number + 2 * AHEAD
+        found.append(outcome)
+    assert sorted(found) == list(range(40))
+    absent = "(_ for _ in ()).throw(ModuleNotFoundError('gone', name='pybullet'))"
+    with pytest.raises(MissingPackageError, match="closedrooms dataset needs pybullet"):
+        list(Crew(1, scheduler, by="closedrooms dataset").do(DO, [absent] * 4))

@@ -49,6 +49,7 @@ def test_gaps_between_scans_stand_in_run_json(tmp_path: Path) -> None:
     assert ("gaps between scans", "1, up to 21.0 s") in result.table()
 
 
+@pytest.mark.simulation
 def test_a_run_without_odometry_is_mapped_by_its_scans_alone(tmp_path: Path, office: Any) -> None:
     drive = office.drive([(1.0, 1.0), (2.4, 1.0), (2.4, 4.5), (2.4, 1.0), (7.4, 1.0)], noise=0.02)
     still = np.zeros_like(drive.odometry)
@@ -62,6 +63,7 @@ def test_a_run_without_odometry_is_mapped_by_its_scans_alone(tmp_path: Path, off
     assert [remark["what"] for remark in manifest["remarks"]] == ["motion"]
 
 
+@pytest.mark.simulation
 def test_scans_that_fit_nowhere_without_odometry_are_counted(office: Any) -> None:
     drive = office.drive([(1.0, 1.0), (2.4, 1.0)], noise=0.02)
     rng = np.random.default_rng(0)

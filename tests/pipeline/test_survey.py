@@ -16,6 +16,8 @@ from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.plan import FloorPlan
 
+pytestmark = pytest.mark.simulation
+
 
 def survey_of(plan: FloorPlan, **limits: float) -> Survey:
     config = SimConfig(noise=noise_level("none"))

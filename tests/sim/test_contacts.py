@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -123,11 +124,13 @@ def assert_contacts_exact(sim: Simulation, solids: shapely.Geometry, steps: int)
     return touched
 
 
+@pytest.mark.simulation
 def test_contacts_agree_with_exact_geometry_on_a_bundled_plan(exact_config: SimConfig, solids_now: Solids) -> None:
     with Simulation(load_world(bundled_names()[0]), [], exact_config, 0) as sim:
         assert assert_contacts_exact(sim, solids_now(sim), 1500) > 20
 
 
+@pytest.mark.simulation
 def test_contacts_agree_with_exact_geometry_on_an_imported_plan(
     shared_plans: Path, exact_config: SimConfig, solids_now: Solids
 ) -> None:
@@ -136,6 +139,7 @@ def test_contacts_agree_with_exact_geometry_on_an_imported_plan(
         assert assert_contacts_exact(sim, solids_now(sim), 1500) > 20
 
 
+@pytest.mark.simulation
 def test_rays_and_contacts_mean_the_same_wall(plan: FloorPlan, exact_config: SimConfig) -> None:
     with Simulation(plan, ["hinged", "double", "sliding"], exact_config, 0) as sim:
         for _ in range(200):
@@ -145,6 +149,7 @@ def test_rays_and_contacts_mean_the_same_wall(plan: FloorPlan, exact_config: Sim
     assert abs(np.nanmin(ranges) - sim.config.robot.radius) < 2e-3
 
 
+@pytest.mark.simulation
 def test_a_closed_door_stops_the_robot_and_an_open_one_lets_it_through(plan: FloorPlan) -> None:
     config = SimConfig(noise=noise_level("none"), heading=math.pi / 2)
     for closed, passes in (([], True), (["hinged"], False)):
@@ -157,6 +162,7 @@ def test_a_closed_door_stops_the_robot_and_an_open_one_lets_it_through(plan: Flo
                 assert abs(4.0 - 0.025 - 0.2 - sim.world_T_robot.y) < 2e-3
 
 
+@pytest.mark.simulation
 def test_the_entrance_of_the_building_is_shut(plan: FloorPlan) -> None:
     config = SimConfig(noise=noise_level("none"), heading=0.0)
     with Simulation(plan, [], config, 0) as sim:

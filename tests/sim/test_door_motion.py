@@ -28,6 +28,7 @@ def leaves_of(plan: FloorPlan, name: str, *, furniture: Polygon | None = None) -
 
 
 @pytest.mark.parametrize("name", DOORS)
+@pytest.mark.simulation
 def test_a_closed_door_fills_its_gap(plan: FloorPlan, exact_config: SimConfig, name: str) -> None:
     door = next(door for door in plan.doors if door.id == name)
     with Simulation(plan, [name], exact_config, 0) as sim:
@@ -87,6 +88,7 @@ def test_a_leaf_that_could_not_open_hangs_on_the_other_jamb(plan: FloorPlan) -> 
     assert math.degrees(blocked.travel) >= 60.0
 
 
+@pytest.mark.simulation
 def test_a_door_opens_while_time_passes_and_rays_go_through(plan: FloorPlan, exact_config: SimConfig) -> None:
     front = Pose2(1.95, 3.0, math.pi / 2)
     with Simulation(plan, ["hinged"], exact_config, 0) as sim:
@@ -104,6 +106,7 @@ def test_a_door_opens_while_time_passes_and_rays_go_through(plan: FloorPlan, exa
         assert sim.true_ranges(front)[ahead] == pytest.approx(9.0 - 0.08 - 3.0, abs=1e-6)
 
 
+@pytest.mark.simulation
 def test_a_half_open_leaf_is_where_geometry_says(plan: FloorPlan, exact_config: SimConfig) -> None:
     with Simulation(plan, ["hinged"], exact_config, 0) as sim:
         sim.open_door("hinged")
@@ -115,6 +118,7 @@ def test_a_half_open_leaf_is_where_geometry_says(plan: FloorPlan, exact_config: 
         assert sim.true_ranges(pose)[exact_config.lidar.beams // 2] == pytest.approx(exact, abs=1e-3)
 
 
+@pytest.mark.simulation
 def test_an_opening_door_waits_for_the_robot_in_its_way(plan: FloorPlan) -> None:
     into_corridor = dataclasses.replace(plan.doors[0], opens_into="corridor")
     world = dataclasses.replace(plan, doors=(into_corridor,), start=(1.95, 3.4, math.pi))
@@ -131,6 +135,7 @@ def test_an_opening_door_waits_for_the_robot_in_its_way(plan: FloorPlan) -> None
         assert sim.door_states()["hinged"] == 1.0
 
 
+@pytest.mark.simulation
 def test_only_closed_doors_that_a_ray_hits_within_range_are_sighted(plan: FloorPlan) -> None:
     near = SimConfig(lidar=LidarConfig(range_max=3.0), noise=noise_level("none"))
     far = SimConfig(noise=noise_level("none"))
@@ -142,6 +147,7 @@ def test_only_closed_doors_that_a_ray_hits_within_range_are_sighted(plan: FloorP
         assert sim.observe().sightings == ()
 
 
+@pytest.mark.simulation
 def test_a_sighting_gives_the_jambs_in_the_robot_frame(plan: FloorPlan) -> None:
     config = SimConfig(noise=noise_level("none"), heading=math.pi / 2)
     with Simulation(plan, ["hinged"], config, 0) as sim:
@@ -151,6 +157,7 @@ def test_a_sighting_gives_the_jambs_in_the_robot_frame(plan: FloorPlan) -> None:
     np.testing.assert_allclose(sighting.segment_robot, [(2.0, 0.5), (2.0, -0.4)], atol=1e-9)
 
 
+@pytest.mark.simulation
 def test_a_door_that_opens_is_sighted_no_more(plan: FloorPlan, exact_config: SimConfig) -> None:
     with Simulation(plan, ["hinged"], exact_config, 0) as sim:
         assert sim.observe().sightings
@@ -159,12 +166,14 @@ def test_a_door_that_opens_is_sighted_no_more(plan: FloorPlan, exact_config: Sim
         assert not sim.observe().sightings
 
 
+@pytest.mark.simulation
 def test_a_lidar_that_measures_nothing_sees_no_door(plan: FloorPlan) -> None:
     for noise in (NoiseConfig(dropouts=1.0), NoiseConfig(outliers=1.0, dropouts=0.0)):
         with Simulation(plan, ["hinged"], SimConfig(noise=noise), 0) as sim:
             assert sim.observe().sightings == ()
 
 
+@pytest.mark.simulation
 def test_an_unknown_door_and_an_entrance_are_refused(plan: FloorPlan) -> None:
     for name in ("d99", "entrance"):
         with (
@@ -176,6 +185,7 @@ def test_an_unknown_door_and_an_entrance_are_refused(plan: FloorPlan) -> None:
         sim.open_door("d99")
 
 
+@pytest.mark.simulation
 def test_furniture_blocks_rays_but_is_below_no_scan_plane(plan: FloorPlan, exact_config: SimConfig) -> None:
     bare = dataclasses.replace(plan, furniture=())
     pose = Pose2(1.0, 6.0, math.pi / 2)

@@ -58,6 +58,7 @@ def assert_rays_exact(sim: Simulation, solids: shapely.Geometry, poses: int) -> 
     assert wrong <= 1e-4 * total
 
 
+@pytest.mark.simulation
 def test_rays_agree_with_exact_geometry_on_a_plan_made_by_hand(
     plan: FloorPlan, exact_config: SimConfig, solids_now: Solids
 ) -> None:
@@ -65,6 +66,7 @@ def test_rays_agree_with_exact_geometry_on_a_plan_made_by_hand(
         assert_rays_exact(sim, solids_now(sim), 25)
 
 
+@pytest.mark.simulation
 def test_rays_agree_with_exact_geometry_on_a_bundled_plan(exact_config: SimConfig, solids_now: Solids) -> None:
     world = load_world(bundled_names()[0])
     with Simulation(world, draw_closed(world, 3, np.random.default_rng(0)), exact_config, 0) as sim:
@@ -72,6 +74,7 @@ def test_rays_agree_with_exact_geometry_on_a_bundled_plan(exact_config: SimConfi
 
 
 @pytest.mark.parametrize("name", ["luperto/school/Sabadell1_updated.xml", "luperto/office/AtlanticSuites.xml"])
+@pytest.mark.simulation
 def test_rays_agree_with_exact_geometry_on_an_imported_plan(
     name: str, shared_plans: Path, exact_config: SimConfig, solids_now: Solids
 ) -> None:
@@ -80,6 +83,7 @@ def test_rays_agree_with_exact_geometry_on_an_imported_plan(
         assert_rays_exact(sim, solids_now(sim), 10)
 
 
+@pytest.mark.simulation
 def test_rays_cast_short_first_are_the_rays_cast_whole(plan: FloorPlan, exact_config: SimConfig) -> None:
     rng = np.random.default_rng(3)
     with Simulation(plan, ["hinged"], exact_config, 0) as sim:
@@ -92,6 +96,7 @@ def test_rays_cast_short_first_are_the_rays_cast_whole(plan: FloorPlan, exact_co
             assert np.mean(short[1] != whole[1]) < 0.005
 
 
+@pytest.mark.simulation
 def test_more_rays_than_pybullet_takes_at_once_are_cast_in_chunks(plan: FloorPlan, solids_now: Solids) -> None:
     config = SimConfig(lidar=LidarConfig(beams=2 * 16_384 + 1), noise=noise_level("none"))
     pose = Pose2(6.0, 2.0, 0.1)
@@ -103,6 +108,7 @@ def test_more_rays_than_pybullet_takes_at_once_are_cast_in_chunks(plan: FloorPla
     assert np.mean(np.abs(ranges - exact) < 1e-3) > 0.9999
 
 
+@pytest.mark.simulation
 def test_nothing_within_range_is_infinity(plan: FloorPlan) -> None:
     config = SimConfig(lidar=LidarConfig(range_max=1.0), noise=noise_level("none"))
     with Simulation(plan, [], config, 0) as sim:
@@ -110,6 +116,7 @@ def test_nothing_within_range_is_infinity(plan: FloorPlan) -> None:
     assert np.isposinf(scan.ranges).all()
 
 
+@pytest.mark.simulation
 def test_a_sensor_off_the_centre_measures_from_where_it_sits(plan: FloorPlan) -> None:
     lidar = LidarConfig(beams=4, mount=(0.15, 0.0, math.pi / 2))
     with Simulation(plan, [], SimConfig(lidar=lidar, noise=noise_level("none"), heading=0.0), 0) as sim:
@@ -119,6 +126,7 @@ def test_a_sensor_off_the_centre_measures_from_where_it_sits(plan: FloorPlan) ->
     np.testing.assert_allclose(scan.ranges[[0, 3]], [2.0 - 0.08, 2.15 - 0.08], atol=1e-6)
 
 
+@pytest.mark.simulation
 def test_a_physics_world_without_bodies_returns_misses() -> None:
     with PhysicsWorld() as physics:
         fractions, bodies = physics.cast(np.array([0.0, 0.0, 0.3]), np.array([[5.0, 0.0, 0.3], [0.0, 5.0, 0.3]]))
@@ -126,6 +134,7 @@ def test_a_physics_world_without_bodies_returns_misses() -> None:
     assert (bodies == -1).all()
 
 
+@pytest.mark.simulation
 def test_rays_and_the_rasterised_truth_mean_the_same_walls(exact_config: SimConfig) -> None:
     world = dataclasses.replace(load_world(bundled_names()[0]), furniture=())
     cell = 0.02

@@ -45,12 +45,14 @@ def as_bytes(seen: list[tuple[Observation, Pose2]]) -> bytes:
     )
 
 
+@pytest.mark.simulation
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not(plan: FloorPlan) -> None:
     config = SimConfig(noise=noise_level("high"))
     assert as_bytes(drive_around(plan, config, 4)) == as_bytes(drive_around(plan, config, 4))
     assert as_bytes(drive_around(plan, config, 4)) != as_bytes(drive_around(plan, config, 5))
 
 
+@pytest.mark.simulation
 def test_noise_of_one_source_leaves_the_others_alone(plan: FloorPlan) -> None:
     base = noise_level("high")
     first, _ = drive_around(plan, SimConfig(noise=base), 4, 5)[-1]
@@ -64,12 +66,14 @@ def test_noise_of_one_source_leaves_the_others_alone(plan: FloorPlan) -> None:
     assert first.odometry == dropouts.odometry
 
 
+@pytest.mark.simulation
 def test_noise_does_not_change_where_the_robot_is(plan: FloorPlan) -> None:
     quiet = drive_around(plan, SimConfig(noise=noise_level("none")), 0)
     loud = drive_around(plan, SimConfig(noise=noise_level("high")), 0)
     assert [true for _, true in quiet] == [true for _, true in loud]
 
 
+@pytest.mark.simulation
 def test_the_range_noise_is_as_large_as_set(plan: FloorPlan) -> None:
     config = SimConfig(noise=NoiseConfig(range_sd=0.05, dropouts=0.02, outliers=0.01))
     with Simulation(plan, [], config, 0) as sim:
@@ -88,6 +92,7 @@ def test_the_range_noise_is_as_large_as_set(plan: FloorPlan) -> None:
     assert np.mean(outliers) == pytest.approx(10.0, rel=0.1)
 
 
+@pytest.mark.simulation
 def test_what_is_too_near_gives_no_measurement(plan: FloorPlan) -> None:
     config = SimConfig(lidar=LidarConfig(range_min=3.0), noise=noise_level("none"))
     with Simulation(plan, ["hinged"], config, 0) as sim:
@@ -97,6 +102,7 @@ def test_what_is_too_near_gives_no_measurement(plan: FloorPlan) -> None:
     assert seen.sightings == ()
 
 
+@pytest.mark.simulation
 def test_without_noise_the_odometry_is_the_pose_in_the_map_even_when_it_slides(plan: FloorPlan) -> None:
     with Simulation(plan, ["hinged"], SimConfig(noise=noise_level("none")), 0) as sim:
         touched = False
@@ -109,6 +115,7 @@ def test_without_noise_the_odometry_is_the_pose_in_the_map_even_when_it_slides(p
     assert seen.odometry.theta == pytest.approx(true.theta, abs=1e-9)
 
 
+@pytest.mark.simulation
 def test_the_map_frame_is_the_start_pose_with_the_heading_that_was_set(plan: FloorPlan) -> None:
     for heading, expected in ((None, 0.3), (1.0, 1.0)):
         with Simulation(plan, [], SimConfig(heading=heading), 0) as sim:
@@ -119,6 +126,7 @@ def test_the_map_frame_is_the_start_pose_with_the_heading_that_was_set(plan: Flo
             assert again.distance(sim.world_T_robot) < 1e-12
 
 
+@pytest.mark.simulation
 def test_time_passes_as_told(plan: FloorPlan) -> None:
     with Simulation(plan, [], SimConfig(), 0) as sim:
         assert sim.time == 0.0
@@ -135,6 +143,7 @@ def clients() -> int:
     return sum(pybullet.isConnected(physicsClientId=i) for i in range(64))
 
 
+@pytest.mark.simulation
 def test_every_client_is_disconnected_whatever_happens(plan: FloorPlan) -> None:
     with Simulation(plan, [], SimConfig(), 0):
         before = clients() - 1
@@ -148,6 +157,7 @@ def test_every_client_is_disconnected_whatever_happens(plan: FloorPlan) -> None:
     assert clients() == before
 
 
+@pytest.mark.simulation
 def test_a_start_where_the_robot_does_not_fit_is_refused(plan: FloorPlan) -> None:
     inside, beside = (6.0, 4.0, 0.0), (6.0, 3.8, 0.0)
     for start in (inside, beside):
@@ -158,6 +168,7 @@ def test_a_start_where_the_robot_does_not_fit_is_refused(plan: FloorPlan) -> Non
             pass
 
 
+@pytest.mark.simulation
 def test_a_command_that_is_no_number_is_refused(plan: FloorPlan) -> None:
     with Simulation(plan, [], SimConfig(), 0) as sim:
         for v, w, duration in ((math.nan, 0.0, 0.1), (0.0, math.nan, 0.1), (0.0, 0.0, 0.0), (0.0, 0.0, math.inf)):
@@ -185,6 +196,7 @@ def test_settings_that_make_no_sense_are_refused() -> None:
 
 
 @pytest.mark.parametrize("name", list(LIDAR_PRESETS))
+@pytest.mark.simulation
 def test_every_lidar_preset_scans(plan: FloorPlan, name: str) -> None:
     lidar = lidar_preset(name)
     with Simulation(plan, [], SimConfig(lidar=lidar), 0) as sim:
@@ -201,6 +213,7 @@ def test_the_configuration_imports_nothing_heavy() -> None:
     assert not {"numpy", "shapely", "pybullet", "trimesh"} & set(loaded)
 
 
+@pytest.mark.simulation
 def test_pybullet_keeps_quiet_when_it_is_imported() -> None:
     code = "from closedrooms.sim.physics_world import PhysicsWorld\nwith PhysicsWorld(): pass"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

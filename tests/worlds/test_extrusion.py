@@ -18,6 +18,17 @@ def test_the_mesh_of_a_world_is_closed_and_holds_its_walls_volume(name: str) -> 
     assert set(np.unique(vertices[:, 2]).round(9)) == {0.0, 2.5}
 
 
+def test_the_mesh_of_a_ring_is_the_one_that_trimesh_makes() -> None:
+    area = box(0, 0, 4, 4).union(box(3, 3, 6, 5)) - box(1, 1, 3, 3)
+    ours = trimesh.Trimesh(*extrude(area, height=2.0))
+    theirs = trimesh.creation.extrude_polygon(area, 2.0, engine="earcut")
+    assert ours.is_watertight
+    assert ours.is_winding_consistent
+    assert ours.volume == pytest.approx(theirs.volume)
+    assert ours.area == pytest.approx(theirs.area)
+    assert len(ours.faces) == len(theirs.faces)
+
+
 def test_holes_stay_open() -> None:
     vertices, triangles = extrude(box(0, 0, 4, 4) - box(1, 1, 3, 3), height=1.0)
     assert trimesh.Trimesh(vertices, triangles).volume == pytest.approx(12.0)

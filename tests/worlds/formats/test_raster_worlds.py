@@ -70,6 +70,7 @@ def centre(frame: GridFrame, row: int, col: int) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("upright_wall", [True, False])
+@pytest.mark.simulation
 def test_a_partition_of_one_cell_blocks_rays_and_robot(tmp_path: Path, upright_wall: bool) -> None:
     cells = hall()
     if upright_wall:
@@ -92,6 +93,7 @@ def test_a_partition_of_one_cell_blocks_rays_and_robot(tmp_path: Path, upright_w
 
 @settings(max_examples=8, deadline=None)
 @given(pillars=PILLARS, seed=st.integers(0, 1000))
+@pytest.mark.simulation
 def test_truth_rays_and_map_agree_cell_by_cell(
     tmp_path_factory: pytest.TempPathFactory, pillars: list[tuple[int, int, int, int]], seed: int
 ) -> None:
@@ -107,6 +109,7 @@ def test_truth_rays_and_map_agree_cell_by_cell(
     assert not leaks(plan)
 
 
+@pytest.mark.simulation
 def test_a_slanted_wall_of_cells_that_touch_at_corners_parts_two_rooms(tmp_path: Path) -> None:
     cells = hall()
     for k in range(54):

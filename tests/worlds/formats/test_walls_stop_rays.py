@@ -15,6 +15,8 @@ from closedrooms.worlds.geometry import WallLines
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan
 
+pytestmark = pytest.mark.simulation
+
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 WORLDS = [
     "office-04", "school-04", "kth_small.xml", "luperto_small.xml", "rmf_small.building.yaml:L1",
