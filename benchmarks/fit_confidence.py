@@ -2,9 +2,9 @@
 
     python benchmarks/fit_confidence.py FIT [FIT ...] [--methods best paper ...] [--every 1]
 
-FIT are folders of samples, as ``drawn_maps.py`` writes them; a building of another use is refused. Confidence and the
-probability of cells are fitted on what other buildings gave (five folds over groups of buildings), so that a regression
-that knows its own buildings too well does not pass for sure; the numbers shipped are those of all buildings.
+FIT are folders of samples, as ``drawn_maps.py`` writes them; a building of another use is refused. The curve of
+confidence is fitted on what other buildings gave (five folds over groups of buildings), so that a regression that knows
+its own buildings too well does not pass for sure; the curve of cells is fitted on the buildings themselves.
 """
 
 import argparse

@@ -50,7 +50,7 @@ class Metric:
 def measure_paths(graph: TopologicalGraph, members: list[int]) -> Metric:
     """Shortest paths between ``members`` that stay among them.
 
-    networkx takes 12 ms for a block of 105 vertices, where scipy takes 1 ms and 220 ms to be imported.
+    For all pairs of 304 vertices networkx takes 0.10 s where scipy takes 0.005 s, and 0.22 s to be imported.
     """
     within = graph.subgraph(members).copy(as_view=False) if len(members) < len(graph) else graph
     position = {vertex: place for place, vertex in enumerate(members)}

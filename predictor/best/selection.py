@@ -17,8 +17,9 @@ from closedrooms.predictor.best.shared_rooms import merge
 ROUNDS = 20
 # Scores apart by this are e times as likely as each other: the weights were found as those of a log-linear model.
 TEMPERATURE = 1.0
-# What the scores of all rectangles of a door say together is that much vaguer: found on ``fit``, for the likelihood of
-# the rectangles near the true rooms. Rounds in which the rooms of a map settle on each other's places.
+# What the scores of all rectangles of a door say together is that much vaguer: found on ``fit`` for the likelihood of
+# the rectangles near the true rooms, then set with the best of three on ``choose`` in view. Rounds in which the rooms
+# of a map settle on each other's places.
 VAGUE, SETTLING = 3.0, 3
 # A safer rectangle may overlap its neighbours by this share more.
 CROWDING = 0.02
