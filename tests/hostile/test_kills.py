@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 SERVED = [sys.executable, "-m", "closedrooms.cli"]
-MOMENTS = int(os.environ.get("CLOSEDROOMS_MOMENTS", "20"))
+MOMENTS = int(os.environ.get("CLOSEDROOMS_MOMENTS", "3"))
 # What the command itself may take is 2 s; on a machine that does ten other things it is given more [s].
 PATIENCE = float(os.environ.get("CLOSEDROOMS_PATIENCE", "10"))
 HANG_UP = 1 << (signal.SIGHUP - 1)

@@ -7,7 +7,7 @@ from scipy.ndimage import map_coordinates
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MatcherConfig
 from closedrooms.mapping.matching.gauss_newton_matcher import MEMORY, refine
-from closedrooms.mapping.likelihood_field import LikelihoodField
+from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 
 STEP = 1e-6
 
