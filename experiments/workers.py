@@ -264,7 +264,7 @@ def _on_cluster(
 
         def fill() -> None:
             most = max(AHEAD * sum(client.nthreads().values()), 1)
-            for job in islice(jobs, most - len(begun)):
+            for job in islice(jobs, max(most - len(begun), 0)):
                 # No key of our own: equal jobs are done as often as they are asked for.
                 future = client.submit(work, job, pure=False, retries=TRIES - 1)
                 begun[future.key] = job
