@@ -53,7 +53,7 @@ def predict_map(
         OutputError: The folder cannot be written, or holds something that is not ours.
     """
     progress, watch = progress or Silent(), Stopwatch()
-    check_output_folder(config.out, "predict", sources=[config.map, config.doors])
+    check_output_folder(config.out, "predict", sources=[config.map, *([config.doors] if given is None else [])])
     with watch.stage("read"):
         progress.stage("read")
         read = read_ros_map(config.map, allow_outside=config.allow_outside)

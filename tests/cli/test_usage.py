@@ -71,7 +71,7 @@ def test_a_missing_package_is_one_line_with_the_command_that_brings_it(call, one
     def missing(*_: object, **__: object) -> None:
         raise ModuleNotFoundError("No module named 'ortools'", name="ortools")
 
-    monkeypatch.setattr("closedrooms.cli.options.load", missing)
+    monkeypatch.setattr("closedrooms.pipeline.cover.cover_map", missing)
     assert call("cover", "map.yaml", "--out", "o") == 1
     assert (
         one_line() == "closedrooms: closedrooms cover needs ortools, which is not installed here: pip install ortools"

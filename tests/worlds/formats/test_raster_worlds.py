@@ -60,7 +60,7 @@ def check_cells(plan: FloorPlan, grid: OccupancyGrid) -> None:
         for row, col in np.argwhere(true.free).tolist():
             around = [(row + 1, col), (row - 1, col), (row, col + 1), (row, col - 1)]
             ends = [(*centre(grid.frame, r, c), 0.3) for r, c in around]
-            shares, _ = physics.cast((*centre(grid.frame, row, col), 0.3), np.array(ends))
+            shares, _ = physics.cast(np.array([*centre(grid.frame, row, col), 0.3]), np.array(ends))
             expected = [0.5 if true.occupied[r, c] else 1.0 for r, c in around]
             assert shares == pytest.approx(expected, abs=1e-3), (row, col)
 

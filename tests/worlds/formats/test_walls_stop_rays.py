@@ -42,7 +42,7 @@ def physics(plan: FloorPlan) -> Iterator[PhysicsWorld]:
 
 def cast(physics: PhysicsWorld, start: np.ndarray, end: np.ndarray) -> float:
     """How far a ray gets [m]."""
-    shares, _ = physics.cast((*start.tolist(), HEIGHT), np.array([[*end.tolist(), HEIGHT]]))
+    shares, _ = physics.cast(np.array([*start.tolist(), HEIGHT]), np.array([[*end.tolist(), HEIGHT]]))
     return float(shares[0]) * math.dist(start, end)
 
 
