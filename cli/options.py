@@ -62,7 +62,7 @@ class Command:
 
 
 def load(place: str) -> Any:
-    """What stands at ``module:name``; the module is imported, so that every command imports no more than it needs."""
+    """Load what stands at ``module:name``; the module is imported, so that every command imports no more than it needs."""
     module, name = place.split(":")
     return getattr(importlib.import_module(f"closedrooms.{module}"), name)
 
@@ -129,13 +129,13 @@ def _same(value: Any) -> Any:
 
 
 def configured(options: Any) -> Any:
-    """The configuration in the options of a command."""
+    """Return the configuration in the options of a command."""
     config = load(options.about["command"].config)
     return config(**{item.name: getattr(options, item.name) for item in fields(config) if item.init})
 
 
 def option_names(options: type[Any]) -> list[str]:
-    """Every option of a class of options, as it is typed."""
+    """Return every option of a class of options, as it is typed."""
     names = []
     hints = get_type_hints(options)
     for item in fields(options):

@@ -84,7 +84,7 @@ class TruncatedError(InvalidInputError):
 
 
 def log_lines(path: Path, *, gzipped: bool, what: str, longest: int, max_bytes: int = MAX_UNPACKED) -> Iterator[bytes]:
-    """The lines of a text log, unpacked on the way.
+    """Return the lines of a text log, unpacked on the way.
 
     Args:
         path: The file.

@@ -12,7 +12,7 @@ CellArray: TypeAlias = npt.NDArray[np.int8]
 
 
 def handed_over(cells: CellArray) -> CellArray:
-    """The cells themselves, read-only: :func:`frozen` then takes them as they are, and no copy of a large map is made.
+    """Hand over cells read-only: :func:`frozen` then takes them as they are, without a copy of a large map.
 
     Args:
         cells: That nobody else holds.
@@ -22,7 +22,7 @@ def handed_over(cells: CellArray) -> CellArray:
 
 
 def frozen(values: npt.ArrayLike, dtype: npt.DTypeLike = np.float64) -> npt.NDArray[Any]:
-    """A read-only, C-contiguous array of ``dtype``; copies only when the input is writable or of another type."""
+    """Make a read-only, C-contiguous array of ``dtype``; copies only a writable input or one of another type."""
     array = np.asarray(values, dtype=dtype, order="C")
     if array.flags.writeable:
         array = array.copy() if array is values or array.base is not None else array

@@ -45,7 +45,7 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def new_file(path: Path) -> Iterator[BinaryIO]:
-    """A file to write bit by bit under a temporary name, that takes the place of ``path`` when the block ends well.
+    """Open a file under a temporary name, that takes the place of ``path`` when the block ends well.
 
     Raises:
         OutputError: The folder is missing, read-only or full.
@@ -154,7 +154,7 @@ def new_files(paths: Iterable[Path], *, force: bool = False, sources: Iterable[P
 
 
 def is_ours(folder: Path, command: object = None) -> bool:
-    """Whether every file in ``folder``, at every depth, was written by ``command`` and has not changed since.
+    """Tell whether every file in ``folder``, at every depth, was written by ``command`` and has not changed since.
 
     Args:
         folder: With a manifest.
@@ -257,7 +257,7 @@ def _real(folder: Path) -> Path:
 
 @contextlib.contextmanager
 def output_folder(folder: Path, manifest: dict[str, Any]) -> Iterator[Path]:
-    """A fresh folder to write into, that takes the place of ``folder`` when the block ends well.
+    """Return a fresh folder to write into, that takes the place of ``folder`` when the block ends well.
 
     The manifest ``run.json`` is completed on leaving with ``program``, ``files`` and checksums; the caller may still
     add to the dictionary inside the block. A folder of the same ``manifest["command"]`` is replaced whole. On any

@@ -77,7 +77,7 @@ class GridFrame:
         return corners
 
     def contains(self, cells: IntArray) -> BoolArray:
-        """Which cells ``(row, col)``, shape (..., 2), lie in the grid."""
+        """Tell which cells ``(row, col)``, shape (..., 2), lie in the grid."""
         cells = np.asarray(cells)
         inside: BoolArray = (
             (cells[..., 0] >= 0) & (cells[..., 0] < self.rows) & (cells[..., 1] >= 0) & (cells[..., 1] < self.cols)
@@ -85,7 +85,7 @@ class GridFrame:
         return inside
 
     def cropped(self, row: int, col: int, rows: int, cols: int) -> "GridFrame":
-        """The frame of a window whose lower-left cell is ``(row, col)``; may reach outside (negative, or larger)."""
+        """Cut out the frame whose lower-left cell is ``(row, col)``; may reach outside (negative, or larger)."""
         return GridFrame(
             self.resolution,
             self.origin_x + col * self.resolution,
@@ -103,13 +103,13 @@ class GridFrame:
 
 
 def is_free(cells: CellArray) -> BoolArray:
-    """Which of some cells of a map, int8 of any shape, are known to be free."""
+    """Tell which of some cells of a map, int8 of any shape, are known to be free."""
     # Without a sign unknown is 255: one comparison of bytes, six times as quick as two of numbers.
     return np.less(cells.view(np.uint8), math.ceil(FREE_BELOW))
 
 
 def is_occupied(cells: CellArray) -> BoolArray:
-    """Which of some cells of a map, int8 of any shape, are known to be occupied."""
+    """Tell which of some cells of a map, int8 of any shape, are known to be occupied."""
     return np.greater(cells, OCCUPIED_ABOVE)
 
 
@@ -162,7 +162,7 @@ class OccupancyGrid:
         return (int(rows[0]), int(cols[0]), int(rows[-1] - rows[0] + 1), int(cols[-1] - cols[0] + 1))
 
     def on(self, frame: GridFrame) -> "OccupancyGrid":
-        """The same cells in a window ``frame`` of the same lattice; what lies outside this grid is unknown.
+        """Return the same cells in a window ``frame`` of the same lattice; what lies outside this grid is unknown.
 
         Raises:
             InvalidInputError: ``frame`` has another resolution or is not shifted by whole cells.
@@ -170,7 +170,7 @@ class OccupancyGrid:
         return self if frame == self.frame else OccupancyGrid(frame, handed_over(self.cells_on(frame)))
 
     def cells_on(self, frame: GridFrame) -> CellArray:
-        """A copy to draw in of the cells that :meth:`on` gives, int8, shape ``frame.shape``."""
+        """Return a copy to draw in of the cells that :meth:`on` gives, int8, shape ``frame.shape``."""
         shift = np.array([self.frame.origin_x - frame.origin_x, self.frame.origin_y - frame.origin_y])
         cells_shift = shift / frame.resolution
         if (

@@ -64,7 +64,7 @@ def reading(path: Path | str, what: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def opened(path: Path, what: str) -> Iterator[io.BufferedReader]:
-    """A regular file, open for reading bytes; never waits.
+    """Return a regular file, open for reading bytes; never waits.
 
     Args:
         path: The file; symbolic links are followed.
@@ -100,7 +100,7 @@ def check_regular(path: Path, what: str) -> None:
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is such a regular file; none has a name that the system refuses."""
+    """Tell whether there is such a regular file; none has a name that the system refuses."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -108,7 +108,7 @@ def is_file(path: Path) -> bool:
 
 
 def is_there(path: Path) -> bool:
-    """Whether there is anything of this name; nothing has a name that the system refuses."""
+    """Tell whether there is anything of this name; nothing has a name that the system refuses."""
     try:
         return path.exists()
     except (OSError, ValueError):
@@ -116,7 +116,7 @@ def is_there(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether there is such a folder; none has a name that the system refuses."""
+    """Tell whether there is such a folder; none has a name that the system refuses."""
     try:
         return path.is_dir()
     except (OSError, ValueError):

@@ -24,7 +24,7 @@ SCHEME = re.compile(r"(?i)(file|package|model|https?)://")
 
 
 def picture_path(image: str, path: Path, *, allow_outside: bool = False) -> tuple[Path, bool]:
-    """The picture that a map's YAML names, in any form that people write.
+    """Return the picture that a map's YAML names, in any form that people write.
 
     Sub-folders, ``~``, ``..``, ``file://``, ``package://`` and backslashes are understood. What the path leads to is
     opened when it lies in the YAML's folder; otherwise the file of the same name beside the YAML is taken.

@@ -19,12 +19,12 @@ MAX_ROOMS = 100_000
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
-    """Whether a value is a finite number (no bool) that a float holds, whatever its number of digits."""
+    """Tell whether a value is a finite number (no bool) that a float holds, whatever its number of digits."""
     return isinstance(value, int | float) and not isinstance(value, bool) and -1e308 < value < 1e308
 
 
 def bounded(value: object, low: float, high: float, *, name: str, unit: str = "", where: str | Path = "") -> float:
-    """A number between two bounds, both included.
+    """Return a number between two bounds, both included.
 
     Args:
         value: Anything.

@@ -10,7 +10,7 @@ from closedrooms.core.errors import InvalidInputError
 
 
 def wrap_angle(angle: float) -> float:
-    """The same angle [rad] in [-pi, pi)."""
+    """Return the same angle [rad] in [-pi, pi)."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
@@ -53,7 +53,7 @@ class Pose2:
         return moved
 
     def matrix(self) -> FloatArray:
-        """The homogeneous 3 x 3 matrix."""
+        """Return the homogeneous 3 x 3 matrix."""
         c, s = math.cos(self.theta), math.sin(self.theta)
         return np.array([[c, -s, self.x], [s, c, self.y], [0.0, 0.0, 1.0]])
 

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def stream(seed: int, *names: str) -> np.random.Generator:
-    """A generator that depends on the run's seed and on the name of what it is for, and on nothing else.
+    """Return a generator that depends on the run's seed and on the name of what it is for, and on nothing else.
 
     Changing how often one source draws leaves the others' draws alone.
     """

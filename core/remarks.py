@@ -43,7 +43,7 @@ class Remark:
         return f"{self.action} {number}{self.what}{f' ({named})' if named else ''}: {self.why}"
 
     def as_json(self) -> dict[str, Any]:
-        """The entry of ``run.json`` (key ``remarks``)."""
+        """Return the entry of ``run.json`` (key ``remarks``)."""
         return {
             "action": self.action,
             "what": self.what,

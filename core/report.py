@@ -40,7 +40,7 @@ class Report:
         return [(*row, *[""] * (width - len(row))) for row in rows]
 
     def as_json(self) -> dict[str, Any]:
-        """The object that ``--json`` prints."""
+        """Return the object that ``--json`` prints."""
         return {
             "title": self.title,
             "written": str(self.folder),

@@ -79,7 +79,7 @@ class RosMap:
         ]
 
     def on_map(self, geometry: BaseGeometry) -> Any:
-        """A geometry of the grid's frame in the map frame."""
+        """Return a geometry of the grid's frame in the map frame."""
         return shapely.transform(geometry, self.map_T_grid.transform) if self.turned else geometry
 
 

@@ -23,12 +23,12 @@ _OPEN: dict[Path, Path] = {}
 
 
 def part_of_file(path: Path) -> Path:
-    """The hidden name under which this process writes a file."""
+    """Return the hidden name under which this process writes a file."""
     return path.with_name(f".{short_name(path.name)}.{_machine()}-{os.getpid()}.part")
 
 
 def part_of_folder(folder: Path, suffix: str = "part") -> Path:
-    """A new hidden name beside a folder, nothing is made."""
+    """Return a new hidden name beside a folder, nothing is made."""
     return folder.with_name(f".{short_name(folder.name)}.{secrets.token_hex(4)}.{suffix}")
 
 

@@ -74,7 +74,7 @@ class _Scan:
         return InvalidInputError(found, expected=self.what, where=self.path)
 
     def begin(self, anchor: str | None, *, mapping: bool) -> None:
-        """A list or mapping begins."""
+        """Enter a list or mapping."""
         if anchor:
             self.sizes[anchor] = None
         self.open.append(_Open(anchor, mapping))
@@ -90,7 +90,7 @@ class _Scan:
             self.open[-1].size += size
 
     def alias(self, anchor: str) -> int:
-        """How many values an alias stands for."""
+        """Tell how many values an alias stands for."""
         size = self.sizes.get(anchor, 1)
         if size is None:
             raise self.refuse(f"a YAML alias *{anchor} inside itself")

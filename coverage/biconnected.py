@@ -32,7 +32,7 @@ class Metric:
     before: IntArray
 
     def walk(self, tour: list[int]) -> list[int]:
-        """The closed walk over vertices of the graph that visits the positions of ``tour`` in turn and returns."""
+        """Walk over vertices of the graph that visits the positions of ``tour`` in turn and returns."""
         return self.trace([*tour, tour[0]])
 
     def trace(self, stops: list[int]) -> list[int]:
@@ -73,7 +73,7 @@ def find_blocks(graph: TopologicalGraph, members: list[int]) -> list[list[int]]:
 
 
 def join_walks(walks: list[list[int]], start: int) -> list[int]:
-    """One closed walk from ``start`` that takes every step of the given closed walks (Hierholzer)."""
+    """Return one closed walk from ``start`` that takes every step of the given closed walks (Hierholzer)."""
     steps: dict[int, list[tuple[int, int]]] = {start: []}
     number = 0
     for walk in walks:

@@ -47,7 +47,7 @@ class GraphDraft:
         return vertex
 
     def nearest_reachable(self, cell: IntArray) -> IntArray:
-        """The nearest cell where the robot can be: of those that the clean map shows in free sight, if there are any.
+        """Find the nearest cell where the robot can be: of those that the clean map shows in free sight, if there are any.
 
         A vertex in the middle of a table moves beside it.
         """
@@ -122,7 +122,7 @@ class GraphDraft:
         return vertex
 
     def finish(self, map_name: str | None = None) -> TopologicalGraph:
-        """The graph in the map frame."""
+        """Return the graph in the map frame."""
         frame = self.space.frame
         origin, resolution = np.array([frame.origin_x, frame.origin_y]), frame.resolution
         return make_graph(

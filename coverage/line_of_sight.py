@@ -31,7 +31,7 @@ def find_cells_between(a: FloatArray, b: FloatArray) -> IntArray:
 
 
 def is_clear(passable: BoolArray, a: npt.ArrayLike, b: npt.ArrayLike) -> bool:
-    """Whether all cells between two points (row, col; continuous cells) are passable and inside the grid."""
+    """Tell whether all cells between two points (row, col; continuous cells) are passable and inside the grid."""
     cells = find_cells_between(np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64))
     rows, cols = cells[:, 0], cells[:, 1]
     if (cells < 0).any() or (rows >= passable.shape[0]).any() or (cols >= passable.shape[1]).any():

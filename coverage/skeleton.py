@@ -32,7 +32,7 @@ class VoronoiGraph:
 
 
 def thin(mask: BoolArray) -> BoolArray:
-    """The skeleton of ``mask``, whose border is empty: one cell wide, same connectivity.
+    """Return the skeleton of ``mask``, whose border is empty: one cell wide, same connectivity.
 
     scikit-image's ``skeletonize``, as the paper. A part that thinning takes away whole keeps one cell.
     """

@@ -233,7 +233,7 @@ def thin(points: FloatArray, spacing: float, most: int) -> FloatArray:
 
 
 def spaced(points: FloatArray, counts: IntArray, spacing: float, most: int) -> BoolArray:
-    """Which points of each scan :func:`thin` keeps, shape (..., n).
+    """Tell which points of each scan :func:`thin` keeps, shape (..., n).
 
     Args:
         points: In beam order, shape (..., n, 2) [m]; what stands after the first ``counts`` of a scan does not count.

@@ -71,7 +71,7 @@ class EvidenceGrid:
             self._count(*drawn, sign)
 
     def imprint(self, beams: Beams, map_T_robot: Pose2) -> Imprint | None:
-        """What :meth:`add` would count, to be counted by :meth:`stamp`; ``None`` for a scan that crossed nothing."""
+        """Find what :meth:`add` would count, for :meth:`stamp`; ``None`` for a scan that crossed nothing."""
         for (row, col, rows, cols), mask, hits in self._draw([(beams, map_T_robot)]):
             lattice = self._lattice
             return Imprint(row + lattice.row0, col + lattice.col0, (rows, cols), np.packbits(mask), np.unique(hits))
@@ -142,7 +142,7 @@ class EvidenceGrid:
             self._dirty = (row + padding[0][0], col + padding[1][0], rows, cols)
 
     def grid(self) -> OccupancyGrid:
-        """The map: probability in percent where anything was observed, else unknown."""
+        """Return the map: probability in percent where anything was observed, else unknown."""
         if self._dirty is None and self._grid is not None:
             return self._grid
         if self._dirty is not None:

@@ -301,7 +301,7 @@ class Mapper:
         self._drawn = 0
 
     def grid(self) -> OccupancyGrid:
-        """The map so far, from the keyframes' present poses."""
+        """Return the map so far, from the keyframes' present poses."""
         moved = [keyframe for keyframe in self.keyframes[self._drawn :] if _outdated(keyframe)]
         self._evidence.add_all([(k.beams, k.drawn) for k in moved if k.drawn is not None], sign=-1)
         self._evidence.add_all([(k.beams, k.pose) for k in moved])

@@ -30,7 +30,7 @@ class Sweep:
 
 
 def sweeps(scans: Iterable[LaserScan], config: MapperConfig) -> Iterator[Sweep]:
-    """What the mapper takes from each scan, in their order: the same as from one alone, in a fraction of the time."""
+    """Take what the mapper needs from each scan: the same as from one alone, in a fraction of the time."""
     for _, alike in itertools.groupby(scans, key=_sensor):
         while some := list(itertools.islice(alike, TOGETHER)):
             points = _thin_alike(some, config)

@@ -25,7 +25,7 @@ class SweepMotion:
 
     @classmethod
     def between(cls, before: Pose2, after: Pose2, seconds: float) -> "SweepMotion":
-        """The constant motion that leads from one pose to another in ``seconds`` [s]: the logarithm of their step."""
+        """Find the constant motion that leads from one pose to another in ``seconds`` [s]: the logarithm of their step."""
         step = before.inverse() @ after
         half = step.theta / 2.0
         # How much longer the arc is than its chord, turned back by half of the turn.
@@ -60,6 +60,6 @@ class SweepMotion:
 
 
 def beam_ages(scan: LaserScan) -> FloatArray:
-    """How long before the last one each beam was measured, shape (beams,) [s]."""
+    """Tell how long before the last one each beam was measured, shape (beams,) [s]."""
     share = np.linspace(0.0, 1.0, scan.ranges.size)
     return abs(scan.sweep) * (1.0 - share if scan.sweep >= 0.0 else share)

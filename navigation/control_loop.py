@@ -30,7 +30,7 @@ class Robot(Protocol):
         """Time from one sweep to the next [s]."""
 
     def observe(self) -> Observation:
-        """What the robot senses now."""
+        """Sense what is around the robot now."""
 
     def step(self, v: float, w: float, duration: float) -> None:
         """Let time pass under a velocity command."""
@@ -43,7 +43,7 @@ class MapMaker(Protocol):
         """Take in one scan; returns ``map_T_robot``."""
 
     def grid(self) -> OccupancyGrid:
-        """The map so far."""
+        """Return the map so far."""
 
 
 class Decider(Protocol):
@@ -192,13 +192,13 @@ class Limits:
         self._begun = process_time()
 
     def grid(self) -> OccupancyGrid:
-        """The map so far, and note of its size."""
+        """Return the map so far, and note its size."""
         grid = self._mapper.grid()
         self._cells = grid.frame.rows * grid.frame.cols
         return grid
 
     def check(self, step: Step) -> Stop | None:
-        """Whether a limit is met by now."""
+        """Tell whether a limit is met by now."""
         config = self._config
         self._begun_at = step.stamp if self._begun_at is None else self._begun_at
         seconds = step.stamp - self._begun_at

@@ -39,7 +39,7 @@ class Costmap:
     factor: int
 
     def anchors(self, cells: IntArray) -> FloatArray:
-        """The roomiest place inside each coarse cell ``(row, col)``, shape (n, 2), as map points (n, 2) [m]."""
+        """Return the roomiest place inside each coarse cell ``(row, col)``, shape (n, 2), as map points (n, 2) [m]."""
         f = self.factor
         rows = cells[:, 0, None] * f + np.repeat(np.arange(f), f)
         cols = cells[:, 1, None] * f + np.tile(np.arange(f), f)
@@ -173,7 +173,7 @@ def clearance_field(free: Image, blocked: Image, resolution: float) -> Field:
 
 
 def pooled(values: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:
-    """The largest value of each ``factor`` x ``factor`` block; the shape must be a multiple of ``factor``."""
+    """Return the largest value of each ``factor`` x ``factor`` block; the shape must be a multiple of ``factor``."""
     by_row = values[::factor]
     for i in range(1, factor):
         by_row = np.maximum(by_row, values[i::factor])

@@ -122,7 +122,7 @@ def _edge(free: Image, blocked: Image, resolution: float) -> tuple[npt.NDArray[n
 
 
 def seen_from(navigation: NavigationMap, place: tuple[float, float], points: FloatArray, reach: float) -> FloatArray:
-    """The frontier points within ``reach`` [m] of a place that connect with it through free space close by.
+    """Return the frontier points within ``reach`` [m] of a place that connect with it through free space close by.
 
     Args:
         navigation: The map, as of its last update.
@@ -149,7 +149,7 @@ def seen_from(navigation: NavigationMap, place: tuple[float, float], points: Flo
 
 
 def still_unknown(grid: OccupancyGrid, points: FloatArray, config: NavigationConfig) -> float:
-    """How much of a frontier is still one [m]: cells of ``points`` that have unknown map cells around them.
+    """Tell how much of a frontier is still one [m]: cells of ``points`` that have unknown map cells around them.
 
     Looks at the window around the points only, so that it costs the same on any map.
 

@@ -55,7 +55,7 @@ class Track:
 
     @classmethod
     def of(cls, points: FloatArray) -> "Track":
-        """The track over path corners, shape (n, 2) [m]."""
+        """Return the track over path corners, shape (n, 2) [m]."""
         along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
         return cls(tuple(points[:, 0].tolist()), tuple(points[:, 1].tolist()), tuple(along.tolist()))
 
@@ -65,7 +65,7 @@ class Track:
         return self.along[-1]
 
     def at(self, distance: float) -> tuple[float, float]:
-        """The point at a distance along the path [m]."""
+        """Return the point at a distance along the path [m]."""
         i = min(max(bisect.bisect_right(self.along, distance) - 1, 0), len(self.along) - 1)
         if i == len(self.along) - 1 or self.along[i + 1] <= self.along[i]:
             return (self.xs[i], self.ys[i])
@@ -128,12 +128,12 @@ def turn_rate(error: float, config: RobotNavigation) -> float:
 
 
 def horizon(config: RobotNavigation) -> float:
-    """How far off obstacles are looked at [m]."""
+    """Tell how far off obstacles are looked at [m]."""
     return max(HORIZON, config.required_clearance + HORIZON_AHEAD)
 
 
 def near_points(scan: LaserScan, config: RobotNavigation) -> FloatArray:
-    """What the scan shows close to the robot, robot frame, shape (n, 2) [m].
+    """Tell what the scan shows close to the robot, robot frame, shape (n, 2) [m].
 
     A median over five beams leaves out lone outliers and halves the noise: the nearest of a hundred noisy points would
     otherwise always lie too close.
@@ -150,7 +150,7 @@ def near_points(scan: LaserScan, config: RobotNavigation) -> FloatArray:
 
 
 def free_distance(points_robot: FloatArray, v: float, w: float, config: RobotNavigation) -> float:
-    """How far the robot can drive along the arc of a command before it touches a scan point [m].
+    """Tell how far the robot can drive along the arc of a command before it touches a scan point [m].
 
     Args:
         points_robot: Obstacles in the robot frame, shape (n, 2) [m].
@@ -181,7 +181,7 @@ def free_distance(points_robot: FloatArray, v: float, w: float, config: RobotNav
 
 
 def limit_speed(command: Steering, points_robot: FloatArray, config: RobotNavigation) -> Steering:
-    """The same arc, slow enough to stop before what the scan shows; turning in place is always possible."""
+    """Return the same arc, slow enough to stop before what the scan shows; turning in place is always possible."""
     if command.v <= 0.0:
         return command
     distance = free_distance(points_robot, command.v, command.w, config)

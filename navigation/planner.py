@@ -49,7 +49,7 @@ def reachable_cells(costmap: Costmap, start: Point, config: RobotNavigation) -> 
 
 
 def start_cell(costmap: Costmap, fits: BoolArray, start: Point) -> tuple[int, int] | None:
-    """The coarse cell nearest to ``start`` where the robot fits, ``None`` when there is none close by."""
+    """Return the coarse cell nearest to ``start`` where the robot fits, ``None`` when there is none close by."""
     reach = math.ceil(START_RADIUS / costmap.frame.resolution)
     row, col = (int(v) for v in costmap.frame.to_cells(np.array(start)))
     r0, c0 = max(row - reach, 0), max(col - reach, 0)
@@ -98,7 +98,7 @@ class Search:
 
     @classmethod
     def begin(cls, costmap: Costmap, start: Point, config: RobotNavigation) -> "Search | None":
-        """A search from ``start`` (map frame), ``None`` when the robot does not fit anywhere near."""
+        """Return a search from ``start`` (map frame), ``None`` when the robot does not fit anywhere near."""
         first = start_cell(costmap, traversable(costmap, config), start)
         return None if first is None else cls(costmap, start, first, config)
 
@@ -132,7 +132,7 @@ class Search:
         self._costs = costs * self._costmap.frame.resolution
 
     def nearest(self, goals: BoolArray) -> tuple[IntArray | None, float]:
-        """The cheapest of some coarse cells that the search has reached, and its cost [m]."""
+        """Return the cheapest of some coarse cells that the search has reached, and its cost [m]."""
         cells = nonzero_cells(goals[self._window])
         costs = self._costs[cells[:, 0], cells[:, 1]]
         if len(cells) == 0 or not np.isfinite(costs.min()):
@@ -141,7 +141,7 @@ class Search:
         return cells[best] + self._corner, float(costs[best])
 
     def path(self, cell: IntArray) -> Path:
-        """The path to a coarse cell that the search has reached."""
+        """Return the path to a coarse cell that the search has reached."""
         row, col = (int(v) for v in cell - self._corner)
         cells = np.array(self._search.traceback((row, col)), dtype=np.int64) + self._corner
         points = np.vstack((np.array(self._start), self._costmap.anchors(cells)))

@@ -53,7 +53,7 @@ class RemainingTour:
         return len(self._stops)
 
     def begin_at(self, place: FloatArray) -> None:
-        """A closed tour may begin and end anywhere: at the stop that is nearest to a place, shape (2,) [m]."""
+        """Begin the closed tour, which may begin anywhere, at the stop nearest to a place, shape (2,) [m]."""
         first = int(np.argmin(np.hypot(*(self.left - place).T)))
         self._stops = np.roll(self._stops, -first)
         self._last = int(self._stops[0])
@@ -69,7 +69,7 @@ class RemainingTour:
         return bool(past[0])
 
     def reach(self) -> None:
-        """The next stop is visited, as nearly as it can be."""
+        """Count the next stop as visited, as nearly as it can be."""
         self._stops, self.visited = self._stops[1:], self.visited + 1
 
     def skip(self) -> Point:
@@ -79,7 +79,7 @@ class RemainingTour:
         return place
 
     def path(self) -> FloatArray:
-        """The path over all stops and home along the edges of the graph, shape (k, 2) [m]."""
+        """Return the path over all stops and home along the edges of the graph, shape (k, 2) [m]."""
         at = {int(vertex): position for position, vertex in enumerate(self._metric.vertices)}
         stops = [at[int(vertex)] for vertex in (*self._stops, self._last)]
         path: FloatArray = self._places[self._metric.trace(stops)]

@@ -69,7 +69,7 @@ class RevisedPrediction:
         return OccupancyGrid(completed.frame, np.where(doorways, FREE, completed.cells))
 
     def is_wrong(self, grid: OccupancyGrid) -> bool:
-        """Whether the map as known now differs from the prediction by more than a detail."""
+        """Tell whether the map as known now differs from the prediction by more than a detail."""
         return difference(self.now.grid, self.completed(grid)) >= SURPRISE
 
     def compare(self, grid: OccupancyGrid, stamp: float, *, was_at: Callable[[str], bool]) -> tuple[str, ...] | None:

@@ -116,15 +116,15 @@ class TourFollower:
         return self._prediction.now
 
     def is_waiting(self, stamp: float) -> bool:
-        """Whether the robot waits for its doors at ``stamp`` [s]."""
+        """Tell whether the robot waits for its doors at ``stamp`` [s]."""
         return self._started_at is None or stamp - self._started_at < DOOR_WAIT
 
     def path_left(self) -> FloatArray:
-        """What is left to drive: the path ahead, then along the graph's edges, shape (k, 2) [m]."""
+        """Tell what is left to drive: the path ahead, then along the graph's edges, shape (k, 2) [m]."""
         return np.vstack((self._driver.ahead(math.inf), self._stops.path()))
 
     def outcome(self) -> TourOutcome:
-        """What became of the tour so far."""
+        """Tell what became of the tour so far."""
         unreachable = np.array(self._unreachable).reshape(-1, 2)
         return TourOutcome(self.prediction, tuple(self.revisions), self._stops.visited, unreachable, self._replans)
 

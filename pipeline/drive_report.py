@@ -66,7 +66,7 @@ def drive_metrics(
 
 
 def drive_features(drive: DriveResult) -> list[Feature]:
-    """The path that was driven, for ``tour.geojson``, and the vertices that could not be reached."""
+    """Return the path that was driven, for ``tour.geojson``, and the vertices that could not be reached."""
     log = drive.log
     features: list[Feature] = [
         (

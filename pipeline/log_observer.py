@@ -36,7 +36,7 @@ class LogWatch:
                 self._recorder.loops(loops, scan.stamp)
 
     def finish(self, built: BuiltMap) -> None:
-        """The map is ready; the reference, where there is one, is laid over the final trajectory."""
+        """Take in the final map; the reference, where there is one, is laid over the final trajectory."""
         end = float(built.stamps[-1])
         self._recorder.loops(built.loops, end)
         self._recorder.trajectory(built.stamps, built.trajectory)

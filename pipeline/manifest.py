@@ -30,13 +30,13 @@ def _versions() -> dict[str, str]:
 
 
 def resolved(config: Any, *, leave_out: tuple[str, ...] = ("out",)) -> dict[str, Any]:
-    """A configuration as plain JSON values; fields that hold paths of this run (``leave_out``) are not in it."""
+    """Return a configuration as plain JSON values; fields that hold paths of this run (``leave_out``) are not in it."""
     values = dataclasses.asdict(config)
     return {name: _plain(value) for name, value in values.items() if name not in leave_out}
 
 
 def input_path(given: str | Path) -> str:
-    """An input as a run elsewhere finds it again: the whole path of a file, a name as it is."""
+    """Return an input as a run elsewhere finds it again: the whole path of a file, a name as it is."""
     return str(Path(given).resolve()) if isinstance(given, Path) or Path(given).exists() else given
 
 

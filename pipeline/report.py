@@ -21,7 +21,7 @@ def run_report(
     stopped: Mapping[str, str] | None = None,
     remarks: Sequence[Remark] = (),
 ) -> Report:
-    """The report of a finished run.
+    """Return the report of a finished run.
 
     Args:
         folder: The run directory.
@@ -78,7 +78,7 @@ def _count(metrics: Mapping[str, Any]) -> str:
 
 
 def figure(value: float | None, form: str, *, scale: float = 1.0) -> str:
-    """A figure in words: ``n/a`` where it could not be computed."""
+    """Return a figure in words: ``n/a`` where it could not be computed."""
     return NOT_AVAILABLE if value is None else form.format(value * scale)
 
 
@@ -92,7 +92,7 @@ def tour_rows(tour: Mapping[str, Any]) -> Rows:
 
 
 def drive_rows(drive: Mapping[str, Any] | None) -> Rows:
-    """How the driven tour went."""
+    """Tell how the driven tour went."""
     if drive is None:
         return []
     rows: Rows = [
@@ -110,7 +110,7 @@ def drive_rows(drive: Mapping[str, Any] | None) -> Rows:
 
 
 def markdown(report: Report) -> str:
-    """The table of results for a recording; times differ from run to run, recordings of equal runs must not."""
+    """Return the table of results for a recording; times differ from run to run, recordings of equal runs must not."""
     head, *rows = report.table()
     lines = [f"| {' | '.join(row)} |" for row in rows if not row[0].startswith("time")]
     return "\n".join([f"# {report.title}", "", f"| {' | '.join(head)} |", "| --- | ---: |", *lines])

@@ -37,7 +37,7 @@ class RunLog:
         return self.sim.period
 
     def observe(self) -> Observation:
-        """What the robot senses now; noted."""
+        """Sense what is around the robot now, and note it."""
         observation = self.sim.observe()
         self.map_T_robot = self.sim.map_T_robot
         self._stamps.append(observation.stamp)
@@ -58,5 +58,5 @@ class RunLog:
         return np.array(self._truth).reshape(-1, 3)
 
     def recorded(self) -> RecordedRun:
-        """Every scan with odometry and true pose, for ``scans.npz``; needs ``keep_scans``."""
+        """Return every scan with odometry and true pose, for ``scans.npz``; needs ``keep_scans``."""
         return RecordedRun(tuple(self._scans), np.array(self._odometry), self.truth)

@@ -53,7 +53,7 @@ def polygon_iou(a: BaseGeometry, b: BaseGeometry) -> float:
 
 
 def rounded(value: float | None) -> float | None:
-    """A figure as it stands in ``run.json``; ``None`` for one that cannot be computed."""
+    """Return a figure as it stands in ``run.json``; ``None`` for one that cannot be computed."""
     return None if value is None else round(value, 5)
 
 
@@ -63,7 +63,7 @@ def mean(figures: Mapping[str, float]) -> float | None:
 
 
 def rooms_seen(plan: FloorPlan, grid: OccupancyGrid, map_T_world: Pose2) -> int:
-    """How many true rooms the robot saw: |R| of section 5.2. A room counts when half of it is known in ``grid``."""
+    """Count the true rooms that the robot saw: |R| of section 5.2. A room counts when half of it is known in ``grid``."""
     return count_seen(room_points(plan), grid, map_T_world)
 
 

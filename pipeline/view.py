@@ -78,7 +78,7 @@ def find_recording(folder: Path) -> Path:
 
 
 def find_viewer() -> str:
-    """The program ``rerun`` of this environment.
+    """Return the program ``rerun`` of this environment.
 
     Raises:
         ViewerError: It is not there.

@@ -14,7 +14,7 @@ MAP_RESOLUTION = 0.05
 
 
 def list_worlds(*, verbose: bool = False) -> list[str]:
-    """One line a bundled world, its name first; with ``verbose`` more lines on each."""
+    """Return one line a bundled world, its name first; with ``verbose`` more lines on each."""
     import shapely
 
     from closedrooms.worlds.closing import closable_rooms
@@ -50,7 +50,7 @@ def _details(plan: FloorPlan) -> list[str]:
 
 
 def describe_world(plan: FloorPlan) -> list[str]:
-    """A plan in words: its rooms with area and doors, its doors with place, width and rooms."""
+    """Return a plan in words: its rooms with area and doors, its doors with place, width and rooms."""
     from closedrooms.worlds.closing import closable_rooms
 
     closable = closable_rooms(plan)
@@ -126,7 +126,7 @@ def convert_world(src: str, dst: str | Path, to: str, *, level: str | None = Non
 
 
 def beside(path: Path, to: str) -> list[Path]:
-    """The files that a format of several files writes; :data:`exporters` are given the first one's name."""
+    """Return the files that a format of several files writes; :data:`exporters` are given the first one's name."""
     match to:
         case "rosmap":
             stem = map_stem(path)
@@ -139,7 +139,7 @@ def beside(path: Path, to: str) -> list[Path]:
 
 
 def map_stem(path: Path) -> Path:
-    """The name that the files of a ROS map share."""
+    """Return the name that the files of a ROS map share."""
     return path.with_suffix("") if path.suffix in {".yaml", ".yml", ".png", ".pgm"} else path
 
 

@@ -146,7 +146,7 @@ METHODS: Mapping[str, Method] = _Methods()
 
 
 def find_method(name: str) -> Method:
-    """The method of a name.
+    """Return the method of a name.
 
     Raises:
         InvalidInputError: There is none; the message lists all. A package that brings it cannot be loaded.

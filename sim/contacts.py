@@ -33,13 +33,13 @@ class Moved(NamedTuple):
 
 
 def edges_of(area: BaseGeometry) -> FloatArray:
-    """Every edge of every ring of polygons, shape (n, 4): ``x0 y0 x1 y1`` [m]."""
+    """Return every edge of every ring of polygons, shape (n, 4): ``x0 y0 x1 y1`` [m]."""
     pieces = [shapely.get_coordinates(ring) for ring in shapely.get_rings(shapely.get_parts(area))]
     return np.concatenate([np.zeros((0, 4)), *(np.hstack((c[:-1], c[1:])) for c in pieces)])
 
 
 def leaf_edges(corners: FloatArray) -> list[Edge]:
-    """The four edges of a leaf with ``corners`` of shape (4, 2)."""
+    """Return the four edges of a leaf with ``corners`` of shape (4, 2)."""
     points = corners.tolist()
     return [(*a, *b) for a, b in zip(points, points[1:] + points[:1], strict=True)]
 
@@ -78,7 +78,7 @@ class Obstacles:
         self._leaves[name] = edges
 
     def near(self, x: float, y: float) -> Sequence[Edge]:
-        """Every edge within ``reach`` of a place [m], and a few more."""
+        """Return every edge within ``reach`` of a place [m], and a few more."""
         cell = (math.floor(x / CELL), math.floor(y / CELL))
         fixed = self._cells.get(cell, ())
         leaves = self._leaf_cells.get(cell)
@@ -110,7 +110,7 @@ def distance(x: float, y: float, edges: Sequence[Edge]) -> float:
 
 
 def offset(x: float, y: float, edge: Edge) -> tuple[float, float]:
-    """The vector from the nearest point of an edge to ``(x, y)`` [m]."""
+    """Return the vector from the nearest point of an edge to ``(x, y)`` [m]."""
     ax, ay, bx, by = edge
     dx, dy = bx - ax, by - ay
     squared = dx * dx + dy * dy

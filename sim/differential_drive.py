@@ -61,7 +61,7 @@ class Drive:
 
     @staticmethod
     def reach(config: RobotConfig) -> float:
-        """How far from its centre the robot may meet something within one arc [m]."""
+        """Tell how far from its centre the robot may meet something within one arc [m]."""
         return config.radius + ARC_LENGTH + 2 * SKIN
 
     @property
@@ -158,7 +158,7 @@ def towards(now: float, wanted: float, change: float) -> float:
 
 
 def chord(way: float, turn: float) -> tuple[float, float]:
-    """Where an arc of length ``way`` [m] that turns by ``turn`` [rad] ends, in the frame of its start [m]."""
+    """Tell where an arc of length ``way`` [m] that turns by ``turn`` [rad] ends, in the frame of its start [m]."""
     if abs(turn) < 1e-9:
         return (way, way * turn / 2)
     radius = way / turn

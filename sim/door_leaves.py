@@ -67,7 +67,7 @@ class Leaf:
 
 
 def door_leaves(plan: FloorPlan, door: PlanDoor, solids: Solids, swing: float) -> tuple[Leaf, ...]:
-    """The leaves of a door with the travel that walls and furniture leave them.
+    """Return the leaves of a door with the travel that walls and furniture leave them.
 
     A hinged leaf swings around the corner of its jamb into ``door.opens_into`` (or the other way, see ``PASSABLE``), a
     double door has two that hang on both jambs, a sliding door slides into the wall beside it.

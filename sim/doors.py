@@ -185,7 +185,7 @@ class HungDoor:
 
 
 def door_part(leaf: Leaf) -> MovingPart:
-    """A leaf as PyBullet takes it."""
+    """Return a leaf as PyBullet takes it."""
     vertices, triangles = extrude(Polygon(leaf.corners), height=DOOR_HEIGHT)
     axis = (*leaf.direction.tolist(), 0.0) if leaf.slides else (0.0, 0.0, float(leaf.sense))
     x, y = leaf.pivot.tolist()

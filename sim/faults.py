@@ -35,7 +35,7 @@ class Faults:
         self._kept = Pose2()
 
     def odometry(self, pose: Pose2, stamp: float) -> Pose2:
-        """What is told of the odometry at ``stamp`` [s]: it may stand still for a while, or lose a piece of the way."""
+        """Tell the odometry at ``stamp`` [s]: it may stand still for a while, or lose a piece of the way."""
         config, passed = self.config, stamp - self._stamp
         self._stamp = stamp
         before, self._before = self._before, pose
@@ -50,7 +50,7 @@ class Faults:
         return self._kept
 
     def scan(self, scan: LaserScan) -> LaserScan:
-        """The scan, or one without any measurement."""
+        """Return the scan, or one without any measurement."""
         lost = self._lost.random() < self.config.lost_scans
         return dataclasses.replace(scan, ranges=np.full(scan.ranges.size, np.nan)) if lost else scan
 

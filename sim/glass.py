@@ -19,7 +19,7 @@ SEEN, UNSEEN = math.radians(10.0), math.radians(20.0)
 
 
 def glazed(plan: FloorPlan, share: float, seed: int) -> FloorPlan:
-    """The plan with a share of its walls, by length, of glass beside what is of glass already.
+    """Return the plan with a share of its walls, by length, of glass beside what is of glass already.
 
     Args:
         plan: The building.
@@ -42,7 +42,7 @@ def glazed(plan: FloorPlan, share: float, seed: int) -> FloorPlan:
 
 
 def glass_area(plan: FloorPlan, walls: shapely.Geometry) -> shapely.Polygon | shapely.MultiPolygon:
-    """The part of the solid ``walls`` that is of glass, building frame [m]; other walls that meet it stay whole."""
+    """Find the part of solid ``walls`` that is glass, building frame [m]; other walls that meet it stay whole."""
     panes = {kind: [w for w in plan.walls if (w.material == "glass") is kind] for kind in (True, False)}
     if not panes[True]:
         return shapely.MultiPolygon()
@@ -58,7 +58,7 @@ def glass_area(plan: FloorPlan, walls: shapely.Geometry) -> shapely.Polygon | sh
 
 
 def comes_back(incidence: FloatArray, draws: FloatArray) -> BoolArray:
-    """Which beams a pane returns, shape (n,).
+    """Tell which beams a pane returns, shape (n,).
 
     Args:
         incidence: Angle against the pane's normal, shape (n,) [rad].

@@ -50,7 +50,7 @@ class Lidar:
         return self._shoot(start, directions, np.full(self.config.beams, self.config.range_max))
 
     def track(self, world_T_robot: Pose2, poses: FloatArray | None = None) -> tuple[FloatArray, IntArray]:
-        """The same as :meth:`cast`, sooner, for poses that follow each other; panes return what they return.
+        """Return the same as :meth:`cast`, sooner, for poses that follow each other; panes return what they return.
 
         A ray's cost grows with its length, and most end after a few metres of the twenty they may go. So each is cast
         as far as its neighbours went in the last sweep and a little further; the few that hit nothing are cast whole.
@@ -131,7 +131,7 @@ class Lidar:
         return np.where(first, away, distances), np.where(first, panes, bodies)
 
     def sweep(self, world_T_robot: Pose2, stamp: float, poses: FloatArray | None = None) -> tuple[LaserScan, IntArray]:
-        """One scan with its errors.
+        """Return one scan with its errors.
 
         Args:
             world_T_robot: Where the robot stands.

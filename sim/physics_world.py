@@ -69,7 +69,7 @@ class MovingPart:
 
 
 def upright(vertices: FloatArray, triangles: IntArray) -> IntArray:
-    """The triangles of a mesh that stand: horizontal rays meet no others, and fewer faces make rays a third faster."""
+    """Keep the triangles that stand: horizontal rays meet no others, and fewer make rays a third faster."""
     a, b, c = (vertices[triangles[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
     standing: IntArray = triangles[np.abs(normals[:, 2]) <= UPRIGHT * np.linalg.norm(normals, axis=1)]
@@ -151,7 +151,7 @@ class PhysicsWorld:
         return self._client >= 0
 
     def add_static(self, vertices: FloatArray, triangles: IntArray, colour: Colour = WALLS) -> list[int]:
-        """A solid that never moves; returns its bodies (several only beyond PyBullet's limit on vertices).
+        """Add a solid that never moves; returns its bodies (several only beyond PyBullet's limit on vertices).
 
         Args:
             vertices: Shape (n, 3), metres, world frame.
@@ -180,7 +180,7 @@ class PhysicsWorld:
         )
 
     def add_moving(self, parts: Sequence[MovingPart]) -> int:
-        """A body whose links hang on one joint each, fixed to the world; returns the body."""
+        """Add a body whose links hang on one joint each, fixed to the world; returns the body."""
         if not 0 < len(parts) <= MAX_LINKS:
             raise ValueError(f"{len(parts)} moving parts in one body")
         shapes = [self._mesh(part.vertices - np.array(part.anchor), part.triangles) for part in parts]
@@ -206,7 +206,7 @@ class PhysicsWorld:
         return body
 
     def add_hung(self, parts: Sequence[MovingPart], limits: Sequence[float]) -> int:
-        """A body whose links hang on one joint each and move by forces between 0 and ``limits`` [rad or m].
+        """Add a body whose links hang on one joint each and move by forces between 0 and ``limits`` [rad or m].
 
         Leaves meet the robot alone: they would jam in the frame that they fill.
         """
@@ -263,12 +263,12 @@ class PhysicsWorld:
         )
 
     def wake(self, body: int) -> None:
-        """A sleeping body ignores its motors."""
+        """Wake a body: a sleeping one ignores its motors."""
         bullet = self._bullet
         bullet.changeDynamics(body, -1, activationState=bullet.ACTIVATION_STATE_WAKE_UP, physicsClientId=self._client)
 
     def joint_position(self, body: int, link: int) -> float:
-        """Where a joint is [rad or m]."""
+        """Tell where a joint is [rad or m]."""
         return float(self._bullet.getJointState(body, link, physicsClientId=self._client)[0])
 
     def move_joint(self, body: int, link: int, position: float) -> None:
@@ -276,7 +276,7 @@ class PhysicsWorld:
         self._bullet.resetJointState(body, link, position, physicsClientId=self._client)
 
     def cast(self, start: FloatArray, ends: FloatArray) -> tuple[FloatArray, IntArray]:
-        """The first thing that each ray hits, glass left out.
+        """Return the first thing that each ray hits, glass left out.
 
         Args:
             start: Where all rays start, shape (3,), or each, shape (n, 3), world frame [m].

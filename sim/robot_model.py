@@ -68,7 +68,7 @@ def robot_mass(config: RobotConfig) -> float:
 
 
 def make_model(config: RobotConfig, plane: float) -> RobotModel:
-    """The robot of the configuration: a round body on two driven wheels and two casters.
+    """Return the robot of the configuration: a round body on two driven wheels and two casters.
 
     The lidar looks over the body, so that no ray has to be told to pass it: rays that start in a body cost half as
     much again. Nothing in a building is met above the scan plane and not below it.

@@ -77,7 +77,7 @@ class Joint:
 
 
 def with_own_robot(config: SimConfig) -> SimConfig:
-    """The settings with radius, height and lidar of the URDF that they name; as they are where they name none.
+    """Return the settings with radius, height and lidar of the URDF that they name; as they are where they name none.
 
     Raises:
         InvalidInputError: The URDF cannot be used; the message says why.

@@ -189,7 +189,7 @@ class Simulation:
         self._way = way[max(first, 0) :]
 
     def true_ranges(self, world_T_robot: Pose2) -> FloatArray:
-        """What the lidar would measure without noise from anywhere, shape (beams,) [m], infinity without a return."""
+        """Measure without noise from anywhere, shape (beams,) [m], infinity without a return."""
         return self._lidar.cast(world_T_robot)[0]
 
     def step(self, v: float, w: float, duration: float) -> None:
@@ -232,11 +232,11 @@ class Simulation:
         self._building.open_door(door_id)
 
     def door_states(self) -> dict[str, float]:
-        """How far each door between rooms is open: 0 closed, 1 as far as the plan allows."""
+        """Tell how far each door between rooms is open: 0 closed, 1 as far as the plan allows."""
         return {name: door.opening for name, door in self._building.doors.items()}
 
     def door_leaves(self, door_id: str) -> list[Polygon]:
-        """Where the leaves of a door are now, building frame [m]."""
+        """Tell where the leaves of a door are now, building frame [m]."""
         door = self._building.doors[door_id]
         return [Polygon(corners) for corners in door.corners()]
 

@@ -127,7 +127,7 @@ class Canvas:
         self._texts.append((u, v, "\n".join(map(shown, text.split("\n"))), size, colour))
 
     def finished(self) -> Pixels:
-        """The panel with its texts."""
+        """Return the panel with its texts."""
         image = Image.fromarray(self.pixels)
         draw = ImageDraw.Draw(image)
         for u, v, text, size, colour in self._texts:

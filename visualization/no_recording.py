@@ -15,5 +15,5 @@ class NoRecording:
 
 
 def no_recording() -> "Recorder":
-    """A recorder to those who call it, so that their calls are checked as the real one's are."""
+    """Return a recorder to those who call it, so that their calls are checked as the real one's are."""
     return cast("Recorder", NoRecording())

@@ -69,7 +69,7 @@ class Gate:
 
 
 def read_cookies(scope: Scope) -> dict[str, str]:
-    """The cookies of a request; none where they cannot be read."""
+    """Read the cookies of a request; none where they cannot be read."""
     text = "; ".join(value.decode("latin-1") for name, value in scope["headers"] if name == b"cookie")
     try:
         return {name: morsel.value for name, morsel in SimpleCookie(text).items()}

@@ -180,7 +180,7 @@ class MapBoard:
 
 
 def css(colour: Colour) -> str:
-    """A colour as style sheets write it."""
+    """Return a colour as style sheets write it."""
     return "#{:02x}{:02x}{:02x}".format(*colour)
 
 

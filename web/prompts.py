@@ -60,5 +60,5 @@ def tell(text: str, *, bad: bool = False) -> None:
 
 
 def count(number: int, noun: str) -> str:
-    """A number with its noun."""
+    """Return a number with its noun."""
     return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -29,7 +29,7 @@ MITRE_LIMIT = 4.0
 
 
 def wall_area(plan: FloorPlan) -> Polygon | MultiPolygon:
-    """Every wall as a solid, minus the gaps of doors and openings, building frame [m].
+    """Return every wall as a solid, minus the gaps of doors and openings, building frame [m].
 
     Doors and openings to the outside of the plan (a side that is ``None``) are cut out too.
     """
@@ -120,7 +120,7 @@ class WallLines:
         return float(self._thickness[parallel].max()) if parallel.size else None
 
     def gap(self, segment: Segment) -> Polygon:
-        """The piece of wall that a passage along ``segment`` takes away, slightly deeper than the wall."""
+        """Return the piece of wall that a passage along ``segment`` takes away, slightly deeper than the wall."""
         thickness = self.thickness(segment)
         half = (thickness if thickness is not None else BARE_GAP) / 2 + GAP_MARGIN
         return Polygon(rectangles(np.array([segment], dtype=np.float64), np.array([half]))[0])
@@ -133,19 +133,19 @@ def wall_thickness_at(plan: FloorPlan, door: PlanDoor | Opening) -> float:
 
 
 def door_leaf(plan: FloorPlan, door: PlanDoor) -> Polygon:
-    """The closed leaf: from jamb to jamb on the wall's centre line, never thicker than the wall."""
+    """Return the closed leaf: from jamb to jamb on the wall's centre line, never thicker than the wall."""
     half = min(LEAF_THICKNESS, wall_thickness_at(plan, door)) / 2
     return Polygon(rectangles(np.array([door.segment], dtype=np.float64), np.array([half]))[0])
 
 
 def door_gap(plan: FloorPlan, door: PlanDoor | Opening) -> Polygon:
-    """The volume of wall that a door or opening takes away, from wall face to wall face."""
+    """Return the volume of wall that a door or opening takes away, from wall face to wall face."""
     half = wall_thickness_at(plan, door) / 2
     return Polygon(rectangles(np.array([door.segment], dtype=np.float64), np.array([half]))[0])
 
 
 def room_interior(plan: FloorPlan, room_id: str) -> Polygon:
-    """The free floor of one room, wall face to wall face, building frame [m]; doorways are not part of it.
+    """Return the free floor of one room, wall face to wall face, building frame [m]; doorways are not part of it.
 
     Raises:
         KeyError: No such room.
@@ -154,7 +154,7 @@ def room_interior(plan: FloorPlan, room_id: str) -> Polygon:
 
 
 def room_interiors(plan: FloorPlan, room_ids: Sequence[str]) -> dict[str, Polygon]:
-    """The free floors of several rooms, by id; see :func:`room_interior`."""
+    """Return the free floors of several rooms, by id; see :func:`room_interior`."""
     rooms = {room.id: room for room in plan.rooms}
     segments = np.array([wall.segment for wall in plan.walls], dtype=np.float64).reshape(-1, 2, 2)
     tree = STRtree(np.asarray(shapely.linestrings(segments)))
@@ -175,14 +175,14 @@ def _interior(room: PlanRoom, walls: Sequence[Wall]) -> Polygon:
 
 
 def areal(geometry: BaseGeometry) -> Polygon | MultiPolygon:
-    """The polygons of any geometry, without points, lines and slivers below 1e-6 square metres."""
+    """Return the polygons of any geometry, without points, lines and slivers below 1e-6 square metres."""
     found = [p for g in shapely.get_parts(geometry) for p in shapely.get_parts(g)]
     parts = [p for p in found if isinstance(p, Polygon) and p.area > 1e-6]
     return parts[0] if len(parts) == 1 else MultiPolygon(parts)
 
 
 def distance_along(line: Segment, point: Point) -> float:
-    """How far along ``line`` the foot of ``point`` lies [m], from the line's first end."""
+    """Tell how far along ``line`` the foot of ``point`` lies [m], from the line's first end."""
     (x0, y0), (x1, y1) = line
     length = math.hypot(x1 - x0, y1 - y0)
     return ((point[0] - x0) * (x1 - x0) + (point[1] - y0) * (y1 - y0)) / length

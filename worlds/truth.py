@@ -70,7 +70,7 @@ def _oriented_rings(polygon: Polygon) -> list[np.ndarray]:
 
 
 def true_rooms(plan: FloorPlan, closed: Collection[str], map_T_world: Pose2) -> list[Room]:
-    """The closed rooms' true interiors in the map frame, wall face to wall face.
+    """Return the closed rooms' true interiors in the map frame, wall face to wall face.
 
     Args:
         plan: In the building frame.

@@ -39,18 +39,18 @@ class Edge:
         return math.dist(*self.segment)
 
     def point(self, along: float) -> Point:
-        """The point at ``along`` metres from the first end."""
+        """Return the point at ``along`` metres from the first end."""
         (x0, y0), (x1, y1) = self.segment
         t = along / self.length
         return (x0 + t * (x1 - x0), y0 + t * (y1 - y0))
 
     def part(self, centre: float, width: float) -> Segment:
-        """The piece of ``width`` metres around ``centre`` metres from the first end."""
+        """Return the piece of ``width`` metres around ``centre`` metres from the first end."""
         return (self.point(centre - width / 2), self.point(centre + width / 2))
 
 
 def shared_edges(polygons: Sequence[Polygon]) -> list[Edge]:
-    """The straight edges of rooms that form a coverage (neighbours share their vertices).
+    """Return the straight edges of rooms that form a coverage (neighbours share their vertices).
 
     Returns:
         Each edge once, longest possible for its pair of rooms, in order of the pairs.
@@ -119,7 +119,7 @@ def _straight_run(points: Sequence[Point]) -> Segment | None:
 
 
 def walls_along(edges: Sequence[Edge], thickness: Callable[[Edge], float]) -> list[Wall]:
-    """One wall along each straight run of edges of one thickness; edges of thickness 0 carry no wall."""
+    """Return one wall along each straight run of edges of one thickness; edges of thickness 0 carry no wall."""
     by_thickness: defaultdict[float, list[Segment]] = defaultdict(list)
     for edge in edges:
         value = thickness(edge)

@@ -25,7 +25,7 @@ POSES = {"erased": "the scans that make the map", "simulated": "every scan"}
 def card(
     config: DatasetConfig, worlds: Sequence[World], made: Sequence[Variant], failed: Mapping[str, str], size: int
 ) -> str:
-    """The text of ``README.md``.
+    """Return the text of ``README.md``.
 
     Args:
         config: As given.

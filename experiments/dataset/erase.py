@@ -113,7 +113,7 @@ class Eraser:
         self._draw(np.arange(len(survey.poses)), self._ranges, np.full(self._ranges.shape, -1), ())
 
     def erase(self, closed: Collection[str]) -> ErasedMap:
-        """The map with ``closed`` doors closed.
+        """Return the map with ``closed`` doors closed.
 
         Args:
             closed: Ids of doors that hide whole rooms.
@@ -277,7 +277,7 @@ class Eraser:
 
 
 def erase(survey: OpenSurvey, closed: Collection[str]) -> ErasedMap:
-    """The map of a survey with ``closed`` doors closed; for many maps of one survey, keep one :class:`Eraser`.
+    """Return the map of a survey with ``closed`` doors closed; for many maps of one survey, keep one :class:`Eraser`.
 
     Args:
         survey: An exploration with all doors open.

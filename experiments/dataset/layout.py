@@ -94,7 +94,7 @@ def _clear_unfinished(folder: Path) -> None:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """The manifest of a dataset.
+    """Read the manifest of a dataset.
 
     Raises:
         InvalidInputError: No dataset, or one of another format.
@@ -113,7 +113,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def description(config: DatasetConfig, worlds: Sequence[World]) -> dict[str, Any]:
-    """What tells one dataset from another; whoever resumes must want the same."""
+    """Tell what tells one dataset from another; whoever resumes must want the same."""
     return {
         "program": PROGRAM,
         "format": FORMAT,
@@ -146,7 +146,7 @@ def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path
 
 
 def row(variant: Variant, about: Mapping[str, Any]) -> dict[str, Any]:
-    """A sample in its split's metadata: file names relative to the split, then figures."""
+    """Return a sample in its split's metadata: file names relative to the split, then figures."""
     base = f"{variant.world.name}/{Path(variant.id).name}"
     metrics = about["metrics"]
     return {
@@ -172,7 +172,7 @@ def row(variant: Variant, about: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def write_metadata(folder: Path, rows: Iterable[Mapping[str, Any]]) -> None:
-    """The table of one split, ``metadata.parquet``: a Hugging Face image folder reads it beside the pictures.
+    """Write the table of one split, ``metadata.parquet``: a Hugging Face image folder reads it beside the pictures.
 
     No more than ``ROWS`` rows are held at a time.
 

@@ -41,7 +41,7 @@ def write_survey(folder: Path, survey: OpenSurvey, about: dict[str, Any]) -> Non
 
 
 def read_survey(folder: Path, plan: FloorPlan, config: DatasetConfig, seed: int) -> OpenSurvey:
-    """A survey as it was written.
+    """Read a survey as it was written.
 
     Args:
         folder: Of the survey.

@@ -63,7 +63,7 @@ class Variant:
 
 
 def find_worlds(config: DatasetConfig) -> list[World]:
-    """The buildings, in the order of their names.
+    """Return the buildings, in the order of their names.
 
     Raises:
         InvalidInputError: An unreadable world, two of one name, or one without a room that a door closes.
@@ -92,7 +92,7 @@ def find_worlds(config: DatasetConfig) -> list[World]:
 
 
 def split_buildings(names: Sequence[str], seed: int) -> dict[str, Split]:
-    """Which split each building belongs to, drawn by the seed; whole buildings, so that none is in two splits."""
+    """Tell which split each building belongs to, drawn by the seed; whole buildings, so that none is in two splits."""
     order = stream(seed, "splits").permutation(len(names))
     held = max(round(HELD_OUT * len(names)), 1) if len(names) >= len(SPLITS) else 0
     splits: dict[str, Split] = {}
@@ -102,7 +102,7 @@ def split_buildings(names: Sequence[str], seed: int) -> dict[str, Split]:
 
 
 def find_variants(world: World, config: DatasetConfig) -> list[Variant]:
-    """Every sample of a building: doors closed one after the other, in as many orders as there are repetitions.
+    """Return every sample of a building: doors closed one after the other, in as many orders as there are repetitions.
 
     A door closed among i stays closed among i + 1, and the first door differs between repetitions for as long as there
     are doors (paper, section 5).

@@ -28,7 +28,7 @@ LEAST_KNOWN = 0.1
 
 
 def draw_worst(path: Path, scores: Sequence[Scores], samples: Mapping[str, SamplePath], method: str, most: int) -> bool:
-    """The samples with the lowest mean IoU: map, prediction and truth in one picture each.
+    """Draw the samples with the lowest mean IoU: map, prediction and truth in one picture each.
 
     Args:
         path: The PNG; the predictions are in ``<method>/<sample>/rooms.geojson`` beside it.
@@ -61,7 +61,7 @@ def draw_worst(path: Path, scores: Sequence[Scores], samples: Mapping[str, Sampl
 
 
 def extreme_cases(scores: Sequence[Scores], method: str) -> list[Scores]:
-    """The two kinds of case of figures 7 and 13: much is predicted from little, and well, or less well.
+    """Return the two kinds of case of figures 7 and 13: much is predicted from little, and well, or less well.
 
     Among the tenth of the samples whose maps show least of the building, the one with the lowest coverage error and,
     of another building where there is one, the one with the highest; where there are no tours, highest and lowest IoU.

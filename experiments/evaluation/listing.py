@@ -39,7 +39,7 @@ class SamplePath:
 
 
 def find_samples(datasets: Sequence[Path]) -> list[SamplePath]:
-    """Every sample of the datasets, by name.
+    """Return every sample of the datasets, by name.
 
     Raises:
         InvalidInputError: A dataset that is no folder, holds no sample or is of another version; two samples of one

@@ -172,7 +172,7 @@ class Starts:
         self._found: dict[FacesConfig, tuple[Started, float]] = {}
 
     def of(self, config: FacesConfig) -> tuple[Started, float]:
-        """What a method starts from, and the seconds that this took when it was done."""
+        """Tell what a method starts from, and the seconds that this took when it was done."""
         from closedrooms.predictor.paper.initial_layouts import start_rooms
 
         faces = FacesConfig(**{item.name: getattr(config, item.name) for item in fields(FacesConfig)})
@@ -184,7 +184,7 @@ class Starts:
 
 
 def predict_with(name: str, sample: Sample, starts: Starts | None = None) -> tuple[Prediction, float]:
-    """The prediction of one method on one sample, and how long it took.
+    """Return the prediction of one method on one sample, and how long it took.
 
     Args:
         name: Of the method.

@@ -101,7 +101,7 @@ def iou(a: BoolArray, b: BoolArray) -> float:
 
 
 def union_of(masks: Sequence[BoolArray], shape: tuple[int, int]) -> BoolArray:
-    """All cells of any mask."""
+    """Return all cells of any mask."""
     total = np.zeros(shape, dtype=np.bool_)
     for mask in masks:
         total |= mask

@@ -67,7 +67,7 @@ def by_world(groups: Sequence[FloatArray], worlds: Sequence[str]) -> list[FloatA
 
 
 def rounded(value: Any) -> float:
-    """A figure as it stands in tables: six decimals."""
+    """Return a figure as it stands in tables: six decimals."""
     return round(float(value), 6) + 0.0
 
 
@@ -98,7 +98,7 @@ class PairedTest:
 def paired(
     first: Mapping[str, float], second: Mapping[str, float], worlds: Mapping[str, str], resamples: int, name: str
 ) -> PairedTest | None:
-    """Whether two methods differ, on the samples that both have; ``None`` without any.
+    """Tell whether two methods differ, on the samples that both have; ``None`` without any.
 
     Args:
         first: Figure by sample.

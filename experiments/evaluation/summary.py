@@ -37,7 +37,7 @@ def grouped(scores: Sequence[Scores], key: str) -> dict[Any, list[Scores]]:
 
 
 def headline(scores: Sequence[Scores]) -> str:
-    """Which measure heads the report: matched rooms on the authors' maps, whose truth has rooms without a door."""
+    """Tell which measure heads the report: matched rooms on the authors' maps, whose truth has rooms without a door."""
     return "matched" if any("agreement" in score for score in scores) else "by_door"
 
 
@@ -109,7 +109,7 @@ def estimates(scores: Sequence[Scores]) -> dict[str, list[Scores]]:
 
 
 def world_rows(scores: Sequence[Scores]) -> list[Row]:
-    """A row a building and method: largest number of closed doors (paper, table 1), IoU and coverage error."""
+    """Return a row a building and method: largest number of closed doors (paper, table 1), IoU and coverage error."""
     rows = []
     for world, own in grouped(scores, "world").items():
         for method, group in grouped(own, "method").items():
@@ -152,7 +152,7 @@ def _figure(scores: Sequence[Scores], name: str) -> dict[str, float]:
 
 
 def room_rows(scores: Sequence[Scores]) -> list[Row]:
-    """A row a room and measure; a hidden room whose door was not seen counts 0 in a measure of its own."""
+    """Return a row a room and measure; a hidden room whose door was not seen counts 0 in a measure of its own."""
     rows: list[Row] = []
     for score in scores:
         head = {name: score[name] for name in ("method", "sample", "world", "repetition", "closed_doors")}
@@ -166,7 +166,7 @@ def room_rows(scores: Sequence[Scores]) -> list[Row]:
 
 
 def sample_rows(scores: Sequence[Scores]) -> list[Row]:
-    """A row a sample and method."""
+    """Return a row a sample and method."""
     rows: list[Row] = []
     for score in scores:
         names = ("method", "sample", "world", "repetition", "closed_doors", "doors", "hidden_share")

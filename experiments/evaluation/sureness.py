@@ -84,7 +84,7 @@ def _log_score(chance: FloatArray, free: FloatArray) -> FloatArray:
 
 
 def sureness_rows(scores: Sequence[Scores]) -> list[Row]:
-    """A row a method: how confidence and IoU agree, what the best of several guesses has, scores a cell."""
+    """Return a row a method: how confidence and IoU agree, what the best of several guesses has, scores a cell."""
     rows = []
     for method in dict.fromkeys(score["method"] for score in scores):
         own = [score["sure"] for score in scores if score["method"] == method and "sure" in score]
@@ -112,7 +112,7 @@ def sureness_rows(scores: Sequence[Scores]) -> list[Row]:
 
 
 def reliability_rows(scores: Sequence[Scores]) -> list[Row]:
-    """A row a method and group of equally many rooms: mean confidence and mean IoU."""
+    """Return a row a method and group of equally many rooms: mean confidence and mean IoU."""
     rows = []
     for method in dict.fromkeys(score["method"] for score in scores):
         own = [room for score in scores if score["method"] == method for room in score.get("sure", {}).get("rooms", [])]

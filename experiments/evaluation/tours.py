@@ -26,7 +26,7 @@ Tour = dict[str, Any]
 
 
 def plan_tour(grid: OccupancyGrid, doors: Sequence[ClosedDoor] = ()) -> CoverageTour:
-    """The tour on a map, which depends on its known cells only.
+    """Return the tour on a map, which depends on its known cells only.
 
     Raises:
         InvalidInputError: A map without free space.
@@ -37,7 +37,7 @@ def plan_tour(grid: OccupancyGrid, doors: Sequence[ClosedDoor] = ()) -> Coverage
 
 
 def cropped(grid: OccupancyGrid) -> OccupancyGrid:
-    """The known part of a map with a margin of 1 m."""
+    """Return the known part of a map with a margin of 1 m."""
     window = grid.known_bounds()
     if window is None:
         return grid

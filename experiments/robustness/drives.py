@@ -111,7 +111,7 @@ def map_drive(
 
 
 def odometry_noise(times_medium: float) -> NoiseConfig:
-    """The odometry of the noise level ``medium``, errors multiplied; an ideal lidar."""
+    """Return the odometry of the noise level ``medium``, errors multiplied; an ideal lidar."""
     medium = NOISE_LEVELS["medium"]
     return replace(
         NOISE_LEVELS["none"],
@@ -147,7 +147,7 @@ def _drifted(truth: FloatArray, noise: NoiseConfig, seed: int) -> FloatArray:
 
 
 def furnished(plan: FloorPlan, share: float, seed: int) -> FloorPlan:
-    """The plan with a share of the furniture that fills it; the robot starts where it would without.
+    """Return the plan with a share of the furniture that fills it; the robot starts where it would without.
 
     Args:
         plan: The building; its own furniture is taken out.

@@ -37,7 +37,7 @@ COLUMNS: tuple[tuple[str, dict[str, str]], ...] = (
 
 
 def draw_curves(path: Path, results: Sequence[LevelResult], found: Sequence[Onset]) -> None:
-    """A row a factor: mapping error, IoU with more and more stages repaired, coverage error, against the levels.
+    """Draw a row a factor: mapping error, IoU with more and more stages repaired, coverage error, against the levels.
 
     Args:
         path: The PNG.
@@ -89,7 +89,7 @@ def _curve(axes: Any, results: Sequence[LevelResult], name: str, title: str, col
 
 
 def draw_maps(path: Path, folder: Path, wanted: Sequence[Case]) -> bool:
-    """A row a factor, a column a level: map, detected doors, true rooms (orange) and predicted ones (blue).
+    """Draw a row a factor, a column a level: map, detected doors, true rooms (orange) and predicted ones (blue).
 
     Args:
         path: The PNG.

@@ -78,12 +78,12 @@ class Case:
 
 
 def first_setting(config: RobustnessConfig) -> Setting:
-    """Every factor at its first level."""
+    """Return every factor at its first level."""
     return Setting(**{factor: getattr(config, factor)[0] for factor in FACTORS[:-1]})
 
 
 def cases(config: RobustnessConfig) -> list[Case]:
-    """Every level of every factor asked for; the first levels of all factors are one and the same setting."""
+    """Return every level of every factor asked for; the first levels of all factors are one and the same setting."""
     first = first_setting(config)
     found: list[Case] = []
     for factor in config.factors:

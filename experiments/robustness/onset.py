@@ -95,7 +95,7 @@ class Onset:
 
 
 def level_results(rows: Sequence[Row], resamples: int) -> list[LevelResult]:
-    """Every level of every factor, in the order of the rows.
+    """Return every level of every factor, in the order of the rows.
 
     Args:
         rows: Of the trials, with ``factor``, ``number`` and ``level``.

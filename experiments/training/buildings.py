@@ -42,13 +42,13 @@ class Group:
 
 @cache
 def read_groups() -> tuple[Group, ...]:
-    """All groups of real and bundled buildings, in the order of the file."""
+    """Return all groups of real and bundled buildings, in the order of the file."""
     data = read_json(BUILDINGS, what="the uses of buildings")
     return tuple(Group(use, tuple(names)) for use in USES for names in data[use])
 
 
 def use_of(building: str) -> Use:
-    """What a building is used for.
+    """Tell what a building is used for.
 
     Args:
         building: The name of its file without suffix, or ``<kind>-g<version>-<seed>`` of a generated world.
@@ -66,7 +66,7 @@ def use_of(building: str) -> Use:
 
 
 def generated_use(version: int, seed: int) -> Use:
-    """What a generated world is used for: the first generator's by seed, those of later generators are reported."""
+    """Tell what a generated world is used for: by seed, those of later generators are reported."""
     if version > 1:
         return "report"
     return "fit" if seed < FIRST_CHOOSE else "choose"

@@ -48,7 +48,7 @@ class Pattern:
     def solve(
         self, to_a: FloatArray, to_b: FloatArray, errors: FloatArray, information: FloatArray, damping: float
     ) -> FloatArray:
-        """One damped step.
+        """Take one damped step.
 
         Args:
             to_a: Derivatives of the errors by pose a of each edge, shape (m, 3, 3).

@@ -32,7 +32,7 @@ def _first_echo(echoes: FloatArray, shortest: float) -> float:
 
 
 def scan_of(message: Any, ranges: FloatArray, mount: Mount) -> LaserScan:
-    """The sweep, counter-clockwise from above.
+    """Return the sweep, counter-clockwise from above.
 
     Args:
         message: LaserScan or MultiEchoLaserScan.

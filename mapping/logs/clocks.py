@@ -48,7 +48,7 @@ class Times:
         return self.recorded.size < 3 or bool(np.ptp(self.recorded) > 0.0)
 
     def by_header(self) -> FloatArray:
-        """The sensor's own times; those that are not set from the recorder."""
+        """Return the sensor's own times; those that are not set from the recorder."""
         unset = self.header <= 0.0
         if not unset.any() or not self.told:
             return self.header

@@ -61,7 +61,7 @@ def bridge_jumps(stamps: FloatArray, poses: FloatArray) -> tuple[FloatArray, int
 
 
 def jump_remarks(count: int) -> list[Remark]:
-    """What :func:`bridge_jumps` did."""
+    """Say what :func:`bridge_jumps` did."""
     if not count:
         return []
     what = "jumps of the odometry" if count > 1 else "a jump of the odometry"

@@ -105,7 +105,7 @@ class TransformTree:
         return twins[0] if len(twins) == 1 else None
 
     def rigid(self, start: str) -> dict[str, FloatArray]:
-        """All frames that do not move against ``start``, and ``start_T_frame`` of each, shape (4, 4)."""
+        """Return all frames that do not move against ``start``, and ``start_T_frame`` of each, shape (4, 4)."""
         reached = {start: np.eye(4)}
         waiting = deque([start])
         while waiting:
@@ -126,7 +126,7 @@ class TransformTree:
                 yield parent, np.asarray(np.linalg.inv(link.matrix), dtype=np.float64)
 
     def mount(self, base: str, lidar: str) -> Mount:
-        """Where the lidar sits on the robot.
+        """Tell where the lidar sits on the robot.
 
         Args:
             base: Frame of the robot.
@@ -167,7 +167,7 @@ class TransformTree:
         return goal in reached
 
     def base_of(self, lidar: str) -> str | None:
-        """The frame of the robot that carries the lidar: of a usual name, else the root; ``None`` if unknown."""
+        """Return the frame of the robot that carries the lidar: of a usual name, else the root; ``None`` if unknown."""
         frame = self.find(lidar)
         if frame is None:
             return None
@@ -180,7 +180,7 @@ class TransformTree:
         return roots[0] if roots else None
 
     def odometry(self, lidar: str) -> "TransformOdometry | None":
-        """The transform by which the odometry moves the robot that carries the lidar."""
+        """Return the transform by which the odometry moves the robot that carries the lidar."""
         frame = self.find(lidar)
         if frame is None:
             return None
@@ -223,7 +223,7 @@ class TransformOdometry:
 def transform_matrix(
     translation: tuple[float, float, float], rotation: tuple[float, float, float, float]
 ) -> FloatArray:
-    """The homogeneous matrix, shape (4, 4), of a shift [m] and a quaternion ``x, y, z, w`` of any length above 0.
+    """Make the homogeneous matrix (4, 4) of a shift [m] and a quaternion ``x, y, z, w`` of any length above 0.
 
     Raises:
         InvalidInputError: Numbers that are not finite, or a quaternion of no length.
@@ -248,12 +248,12 @@ def _planar(matrix: FloatArray) -> tuple[float, float, float]:
 
 
 def clean_name(name: str) -> str:
-    """A frame's name without the slash that old tf began it with."""
+    """Return a frame's name without the slash that old tf began it with."""
     return name.strip().strip("/")
 
 
 def last_name(name: str) -> str:
-    """A frame's name without prefix and namespace."""
+    """Return a frame's name without prefix and namespace."""
     return clean_name(name).rpartition("/")[2]
 
 

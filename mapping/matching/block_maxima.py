@@ -71,5 +71,5 @@ class BlockMaxima:
 
 
 def pairs(steps: IntArray) -> IntArray:
-    """All pairs of two steps, rows first, shape (steps^2, 2)."""
+    """Return all pairs of two steps, rows first, shape (steps^2, 2)."""
     return np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)

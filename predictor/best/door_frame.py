@@ -44,7 +44,7 @@ class Window:
         return Window(max(self.v0 - v, 0), max(self.u0 - u, 0), min(self.v1 + v, rows), min(self.u1 + u, cols))
 
     def joined(self, other: "Window") -> "Window":
-        """The smallest window that holds both."""
+        """Return the smallest window that holds both."""
         return Window(min(self.v0, other.v0), min(self.u0, other.u0), max(self.v1, other.v1), max(self.u1, other.u1))
 
 

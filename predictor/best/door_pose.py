@@ -42,7 +42,7 @@ class DoorPose:
     quarter: int
 
     def looks(self, angle: float, quarter: int) -> bool:
-        """Whether its frame is that one."""
+        """Tell whether its frame is that one."""
         return self.angle == angle and self.quarter == quarter
 
 

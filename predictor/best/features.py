@@ -174,13 +174,13 @@ def overlap(r: Rectangles) -> FloatArray:
 
 
 def door_margin(r: Rectangles) -> FloatArray:
-    """How much too near the door is to a side [m]."""
+    """Tell how much too near the door is to a side [m]."""
     margin = np.minimum(r.entry.u - r.u0, r.u1 - r.entry.u) * r.frame.resolution
     return np.asarray(np.maximum(DOOR_MARGIN - margin, 0.0))
 
 
 def side_middle(r: Rectangles) -> FloatArray:
-    """How near the sides lie to the middle between this door and the next, 0 to 2."""
+    """Tell how near the sides lie to the middle between this door and the next, 0 to 2."""
     entry, thickness = r.entry, r.frame.thickness
     out = np.zeros(len(r.u0))
     if entry.right is not None:
@@ -191,7 +191,7 @@ def side_middle(r: Rectangles) -> FloatArray:
 
 
 def near_aligned(r: Rectangles) -> FloatArray:
-    """How sure a near room of the same row ends in line with the back."""
+    """Tell how sure a near room of the same row ends in line with the back."""
     same = r.evidence.same["top"]
     near = same.stretch(r.v1, r.u0 - NEAR, r.u0) + same.stretch(r.v1, r.u1, r.u1 + NEAR)
     return np.asarray(1.0 - np.exp(-near / SURE))
@@ -208,12 +208,12 @@ def outside(r: Rectangles) -> FloatArray:
 
 
 def outside_area(r: Rectangles) -> FloatArray:
-    """The same, by area; a row of doors announces a row of rooms, which may well lie outside all that is known."""
+    """Measure the same by area; a row of doors announces rooms that may lie outside all that is known."""
     return r.outside * np.maximum(r.log_small, 0.0) / r.entry.row
 
 
 def lone_outside(r: Rectangles) -> FloatArray:
-    """The same, by area, of a lone door in the outline: it leads to a porch, stairs or a closet."""
+    """Return the same, by area, of a lone door in the outline: it leads to a porch, stairs or a closet."""
     lone = r.entry.left is None and r.entry.right is None
     return r.outside * r.log_small * lone
 
@@ -224,7 +224,7 @@ def open_share(r: Rectangles) -> FloatArray:
 
 
 def open_area(r: Rectangles) -> FloatArray:
-    """The same, by area; a row of doors announces a row of rooms there."""
+    """Return the same, by area; a row of doors announces a row of rooms there."""
     return r.open * np.maximum(r.log_small, 0.0) / r.entry.row
 
 
@@ -250,7 +250,7 @@ def beyond_front(r: Rectangles) -> FloatArray:
 
 
 def sticks_out(r: Rectangles) -> FloatArray:
-    """How sure the back walls of the building beside a rectangle end before its own, 0 to 1."""
+    """Tell how sure the back walls of the building beside a rectangle end before its own, 0 to 1."""
     first, last = r.v0 + PASSED[0] + 1, r.v1 - PASSED[1] + 1
     total = np.zeros(len(r.u0))
     for low, high in ((r.u0 - BESIDE, r.u0), (r.u1, r.u1 + BESIDE)):
@@ -260,18 +260,18 @@ def sticks_out(r: Rectangles) -> FloatArray:
 
 
 def passage_end(r: Rectangles) -> FloatArray:
-    """How sure the walls of both sides begin before the door's wall: the room ends a passage."""
+    """Tell how sure the walls of both sides begin before the door's wall: the room ends a passage."""
     return r.right.stub * r.left.stub
 
 
 def width_seen(r: Rectangles) -> FloatArray:
-    """How usual the width is in this building."""
+    """Tell how usual the width is in this building."""
     seen = r.evidence.seen["width"]
     return np.asarray(seen[np.clip(r.u1 - r.u0, 0, len(seen) - 1)])
 
 
 def depth_seen(r: Rectangles) -> FloatArray:
-    """How usual the depth is in this building."""
+    """Tell how usual the depth is in this building."""
     seen = r.evidence.seen["depth"]
     return np.asarray(seen[np.clip(r.v1 - r.v0, 0, len(seen) - 1)])
 

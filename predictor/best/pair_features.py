@@ -80,7 +80,7 @@ def overlap(p: Pairs) -> FloatArray:
 
 
 def same_depth(p: Pairs) -> FloatArray:
-    """How well the backs of two rooms of one wall agree."""
+    """Tell how well the backs of two rooms of one wall agree."""
     if p.back is None:
         return np.zeros(p.overlap.shape)
     return np.asarray(np.exp(-np.abs(p.a[..., p.back] - p.b[..., p.back]) / OFF_DEPTH) * p.agree)
@@ -102,7 +102,7 @@ def gap_between(p: Pairs) -> FloatArray:
 
 
 def same_width(p: Pairs) -> FloatArray:
-    """How well the widths of two rooms of one wall agree."""
+    """Tell how well the widths of two rooms of one wall agree."""
     if p.back is None:
         return np.zeros(p.overlap.shape)
     axis = 1 - p.back % 2

@@ -145,7 +145,7 @@ class _Search:
         return weights
 
     def safest(self, i: int, chosen: list[int]) -> int:
-        """The rectangle of a door with the largest expected overlap (IoU), given what the others have chosen."""
+        """Return the rectangle of a door with the largest expected overlap (IoU), given what the others have chosen."""
         score = self.seen_by(i, chosen) / TEMPERATURE
         weight = np.exp(score - score.max())
         expected = np.round(overlaps_of(self.hypotheses[i].boxes) @ (weight / weight.sum()), 9)
@@ -162,7 +162,7 @@ class _Search:
         return alone + sum(float(table[chosen[i], chosen[j]]) for (i, j), table in self.pairs.items())
 
     def surest_first(self) -> list[int]:
-        """A start that settles the doors with the clearest best rectangle first."""
+        """Return a start that settles the doors with the clearest best rectangle first."""
         clear = [float(s.scores[0] - s.scores[min(5, len(s.scores) - 1)]) for s in self.hypotheses]
         chosen = [-1] * len(self.hypotheses)
         for i in sorted(range(len(chosen)), key=lambda i: (-round(clear[i], 9), *self.hypotheses[i].boxes[0].tolist())):

@@ -32,7 +32,7 @@ class Spread:
     share: FloatArray
 
     def on(self, frame: GridFrame) -> FloatArray:
-        """The probabilities at the centres of a frame's cells, 0 outside, shape ``frame.shape``, float32."""
+        """Return the probabilities at the centres of a frame's cells, 0 outside, shape ``frame.shape``, float32."""
         rotation = np.array([self.along, [-self.along[1], self.along[0]]])  # map offsets to (col, row) [m]
         first = np.array([frame.origin_x, frame.origin_y]) + frame.resolution / 2 - self.origin
         matrix = np.empty((2, 3))
@@ -43,7 +43,7 @@ class Spread:
         return np.asarray(cv2.warpAffine(self.share.astype(np.float32), matrix, size, flags=flags, borderValue=0.0))
 
     def bounds(self, least: float) -> tuple[float, float, float, float] | None:
-        """What holds all cells of a share of at least ``least``, map frame [m]; ``None`` where none has it."""
+        """Tell what holds all cells of a share of at least ``least``, map frame [m]; ``None`` where none has it."""
         rows, cols = np.nonzero(self.share >= least)
         if not rows.size:
             return None

@@ -62,7 +62,7 @@ def calibration_of(method: str) -> Calibration:
 
 @cache
 def read_calibrations() -> dict[str, Calibration]:
-    """The shipped numbers by method."""
+    """Read the shipped numbers by method."""
     data = read_json(FILE, what="the calibration of confidence")
     return {method: _parse(numbers) for method, numbers in data["methods"].items()}
 

@@ -64,7 +64,7 @@ def judge(
 def form_beliefs(
     grid: OccupancyGrid, doors: Sequence[ClosedDoor], prediction: Prediction, numbers: Calibration
 ) -> list[Belief]:
-    """What is thought of each room: as its method says, else from its shape and kind."""
+    """Tell what is thought of each room: as its method says, else from its shape and kind."""
     if prediction.beliefs:
         return list(prediction.beliefs)
     named: Mapping[str, ClosedDoor] = {door.id: door for door in doors}

@@ -106,7 +106,7 @@ class RoomVariants:
         return np.asarray(shared / np.maximum(size + whole - shared, 1.0))
 
     def believe(self, weights: FloatArray) -> Belief:
-        """What follows when the shapes have these probabilities, shape (variants,)."""
+        """Tell what follows when the shapes have these probabilities, shape (variants,)."""
         weights = weights / weights.sum()
         overlap = self.overlaps()
         chosen = choose_diverse(overlap, weights, SAME)
@@ -145,7 +145,7 @@ def _find_largest(mask: BoolArray) -> BoolArray:
 def believe_variants(
     grid: OccupancyGrid, room: Room, doors: Mapping[str, ClosedDoor], shares: Mapping[str, FloatArray]
 ) -> Belief:
-    """What to think of a room of which nothing but its shape and kind is known.
+    """Tell what to think of a room of which nothing but its shape and kind is known.
 
     Args:
         grid: The map.

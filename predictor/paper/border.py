@@ -28,7 +28,7 @@ class BorderRoom:
     depth: float
 
     def polygon(self) -> Polygon:
-        """The rectangle [m]."""
+        """Return the rectangle [m]."""
         reach = self.depth * self.outward
         ring = Polygon((self.start, self.end, self.end + reach, self.start + reach))
         return shapely.geometry.polygon.orient(ring)

@@ -48,11 +48,11 @@ class Growth:
         return np.asarray(self.unknown & (self.owner < 0))
 
     def layout(self, room: int) -> IntArray:
-        """The faces of a room."""
+        """Return the faces of a room."""
         return np.flatnonzero(self.owner == room)
 
     def is_border(self, room: int) -> bool:
-        """Whether a room starts in a border face (paper, section 3.6)."""
+        """Tell whether a room starts in a border face (paper, section 3.6)."""
         return bool(self.arrangement.border[self.entrances[room].face])
 
     def candidates(self, room: int) -> IntArray:
@@ -73,7 +73,7 @@ class Growth:
         return (round(away, 6), *self.entrances[room].door.midpoint)
 
     def face_set(self, room: int, faces: IntArray, returnable: BoolArray) -> FaceSet:
-        """The faces that a layout of a room may be made of."""
+        """Return the faces that a layout of a room may be made of."""
         return face_set(self.arrangement, faces, returnable, self.free, self.entrances[room].facing.along)
 
 

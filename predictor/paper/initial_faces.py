@@ -54,7 +54,7 @@ def distances_to_edges(arrangement: Arrangement, point: FloatArray) -> FloatArra
 def find_entrance(
     arrangement: Arrangement, unknown: BoolArray, door: ClosedDoor, *, reach: float, slack: float = 0.25
 ) -> Entrance | str:
-    """The closest edge between a known and an unknown face, and the unknown one of the two.
+    """Return the closest edge between a known and an unknown face, and the unknown one of the two.
 
     An edge with an unknown face on both sides is taken only where none of the former is within ``slack`` of the
     closest edge: a door in a thick wall lies between the lines of its two sides.

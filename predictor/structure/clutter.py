@@ -43,7 +43,7 @@ def filter_clutter(grid: OccupancyGrid) -> OccupancyGrid:
 
 
 def free_islands(grid: OccupancyGrid, area: float, doors: Sequence[Point], reach: float) -> OccupancyGrid:
-    """The same map with furniture that free space surrounds turned free, hollows and all.
+    """Return the same map with furniture that free space surrounds turned free, hollows and all.
 
     A table in the middle of a room has straight sides as long as a wall's; its lines part rooms. Where walls are
     looked for it is better gone. Three things that free space surrounds look alike and stay: a piece of wall between

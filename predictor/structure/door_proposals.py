@@ -209,7 +209,7 @@ def _recesses(line: _Line, resolution: float, config: ProposalConfig) -> _Recess
     sums = np.cumsum(np.pad(values, ((0, 0), (before + 1, after))), axis=1)
 
     def window(low: int, high: int) -> FloatArray:
-        """The three sums over the bins from ``first + low`` up to ``first + high``, shape (3, size)."""
+        """Return the three sums over the bins from ``first + low`` up to ``first + high``, shape (3, size)."""
         return np.asarray(sums[:, before + high :][:, :size] - sums[:, before + low :][:, :size])
 
     columns, gains = [], []

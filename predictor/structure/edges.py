@@ -30,7 +30,7 @@ LEAST = 80.0
 
 
 def shows_walls(grid: OccupancyGrid) -> bool:
-    """Whether what is occupied follows some direction, as walls do, or none, as noise of single cells.
+    """Tell whether what is occupied follows some direction, as walls do, or none, as noise of single cells.
 
     Edges are taken where the share of occupied cells among the known ones rises, so that the outline of what is known
     has no say; specks have none either.

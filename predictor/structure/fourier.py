@@ -15,18 +15,18 @@ PLAIN, BY_SIZE = 0, 2
 
 
 def quick_size(least: int) -> int:
-    """The smallest size from ``least`` on that has small prime factors only: a transform of it is quick."""
+    """Return the smallest size from ``least`` on that has small prime factors only: a transform of it is quick."""
     return int(_pocketfft().good_size(least, False))
 
 
 def transform(picture: npt.NDArray[np.float32]) -> Spectrum:
-    """The spectrum of a picture, shape (n, n)."""
+    """Return the spectrum of a picture, shape (n, n)."""
     spectrum: Spectrum = _pocketfft().c2c(picture, (0, 1), True, PLAIN, None, 1)
     return spectrum
 
 
 def transform_back(spectrum: Spectrum) -> Spectrum:
-    """The picture of a spectrum, shape (n, n), in the place of the spectrum."""
+    """Return the picture of a spectrum, shape (n, n), in the place of the spectrum."""
     picture: Spectrum = _pocketfft().c2c(spectrum, (0, 1), False, BY_SIZE, spectrum, 1)
     return picture
 

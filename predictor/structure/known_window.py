@@ -16,7 +16,7 @@ SMOOTH = 0.5
 
 
 def known_window(grid: OccupancyGrid, *, margin: int = 8) -> OccupancyGrid | None:
-    """The known cells with ``margin`` unknown cells around them, ``None`` when all is unknown.
+    """Return the known cells with ``margin`` unknown cells around them, ``None`` when all is unknown.
 
     Args:
         grid: A map.
@@ -30,7 +30,7 @@ def known_window(grid: OccupancyGrid, *, margin: int = 8) -> OccupancyGrid | Non
 
 
 def at_resolution(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:
-    """The same map in cells of ``resolution`` [m]; walls survive in coarser cells.
+    """Return the same map in cells of ``resolution`` [m]; walls survive in coarser cells.
 
     A coarser cell is occupied when any of the cells whose centre it holds is, else free when any is free. Finer cells
     interpolate, so that a slanted wall does not become a staircase, which has no direction.

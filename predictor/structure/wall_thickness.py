@@ -106,7 +106,7 @@ def _runs(grid: OccupancyGrid, starts: IntArray, angle: float, longest: int, cle
 
 
 def free_interior(room: Polygon, grid: OccupancyGrid, thickness: float) -> Polygon:
-    """A layout without what its walls take: the free interior, wall face to wall face.
+    """Return a layout without what its walls take: the free interior, wall face to wall face.
 
     A line of the layout lies on a wall's middle, or on the face that was seen. Where free space was seen beyond it,
     the wall begins there and takes its thickness from then on; elsewhere, towards other predicted rooms too, half of

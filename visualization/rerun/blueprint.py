@@ -65,7 +65,7 @@ class Layout:
 
 
 def arrange(holds: Contents, bounds: Bounds | None) -> rrb.Blueprint:
-    """The blueprint of a recording.
+    """Return the blueprint of a recording.
 
     Args:
         holds: What the recording holds.

@@ -51,7 +51,7 @@ class RecordedBuilding:
             stream.log(f"door_states/{door}", rr.StateChange(state="unseen"))
 
     def seen(self, doors: Collection[str]) -> None:
-        """The robot has seen these closed doors by now."""
+        """Draw the closed doors that the robot has seen by now."""
         for door in self._closed:
             if door in doors and self._states[door] < 0.5:
                 self._stream.log(f"door_states/{door}", rr.StateChange(state="seen"))

@@ -34,7 +34,7 @@ class Curves:
         return any(np.isfinite(row[8]) for row in self._poses)
 
     def add_poses(self, stamp: float, stage: int, odometry: Pose2, estimate: Pose2, truth: Pose2 | None) -> None:
-        """The poses at one scan."""
+        """Add the poses at one scan."""
         third = UNKNOWN_POSE if truth is None else truth.as_tuple()
         self._poses.append((stamp, float(stage), *odometry.as_tuple(), *estimate.as_tuple(), *third))
 
@@ -43,7 +43,7 @@ class Curves:
         self._poses = [(*row[:8], *map(float, pose)) for row, pose in zip(self._poses, poses, strict=True)]
 
     def add(self, path: str, value: float, name: str, colour: colours.Colour, *, dots: bool = False) -> None:
-        """One value of a curve, now."""
+        """Add one value of a curve, now."""
         if path not in self._styled:
             self._styled.add(path)
             marks = [rr.SeriesPoints(colors=[colour], marker_sizes=[5.0])] if dots else []
@@ -52,13 +52,13 @@ class Curves:
         self._stream.log(path, rr.Scalars(value))
 
     def add_iou(self, iou: Mapping[str, float], palette: Mapping[str, colours.Colour]) -> None:
-        """How well each room is predicted now, by door."""
+        """Add how well each room is predicted now, by door."""
         for door, value in iou.items():
             colour = palette.get(door, colours.INK)
             self.add(f"metrics/room_iou/{rr.escape_entity_path_part(door)}", value, door, colour, dots=True)
 
     def send_poses(self) -> None:
-        """The poses since the last time, so that a robot moves."""
+        """Send the poses since the last time, so that a robot moves."""
         rows, self._sent = self._poses[self._sent :], len(self._poses)
         if not rows:
             return

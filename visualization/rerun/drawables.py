@@ -39,7 +39,7 @@ def lifted(points: FloatArray, z: float) -> FloatArray:
 
 
 def grid_map(grid: OccupancyGrid) -> rr.GridMap:
-    """A map, cropped to what is known; unknown has the background's colour.
+    """Return a map, cropped to what is known; unknown has the background's colour.
 
     rerun draws the first row at the top and places the lower-left corner, so that the rows are turned.
     """
@@ -73,7 +73,7 @@ def outlines(
     radius: float = MEDIUM,
     z: float = Z_LINE,
 ) -> rr.LineStrips3D:
-    """The rings of polygons."""
+    """Return the rings of polygons."""
     rings = shapely.get_rings(shapely.get_parts(np.asarray(list(shapes), dtype=object)))
     strips = [lifted(shapely.get_coordinates(ring), z) for ring in rings]
     return rr.LineStrips3D(strips, colors=[colour], radii=[radius])
@@ -108,7 +108,7 @@ def points(
 
 
 def pose(at: Pose2, z: float = 0.0) -> rr.Transform3D:
-    """A planar pose as a transform of the parent's frame."""
+    """Return a planar pose as a transform of the parent's frame."""
     return rr.Transform3D(
         translation=[at.x, at.y, z],
         quaternion=rr.Quaternion(xyzw=[0.0, 0.0, np.sin(at.theta / 2), np.cos(at.theta / 2)]),
@@ -126,7 +126,7 @@ def pose_columns(poses: FloatArray) -> rr.ComponentColumnList:
 
 
 def solid(vertices: FloatArray, triangles: IntArray, colour: Colour, *, alpha: int = 255) -> rr.Mesh3D:
-    """A mesh with flat shading: corners are not shared, so that every triangle has its own normal."""
+    """Return a mesh with flat shading: corners are not shared, so that every triangle has its own normal."""
     corners = np.asarray(vertices, dtype=np.float64)[np.asarray(triangles)]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)

@@ -33,7 +33,7 @@ def draw_doors(stream: RecordingStream, root: str, doors: Sequence[ClosedDoor]) 
 
 
 def draw_input(stream: RecordingStream, grid: OccupancyGrid, doors: Sequence[ClosedDoor]) -> None:
-    """What a prediction starts from."""
+    """Draw what a prediction starts from."""
     stream.log("prediction/input", drawables.grid_map(grid))
     draw_doors(stream, "prediction/doors", doors)
 
@@ -75,7 +75,7 @@ def draw_rooms(
     iou: Mapping[str, float] | None = None,
     static: bool = False,
 ) -> None:
-    """A whole map with the rooms behind the doors in the doors' colours, labelled with IoU where known, else area."""
+    """Draw a whole map with the rooms in their doors' colours, labelled with IoU where known, else area."""
     stream.log(f"{root}/grid", drawables.grid_map(grid), static=static)
     if not static:
         stream.clear(f"{root}/rooms")

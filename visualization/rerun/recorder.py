@@ -112,7 +112,7 @@ class Recorder:
             self._stream.__exit__(kind, error, trace)
 
     def configuration(self, values: Mapping[str, object]) -> None:
-        """The configuration as it was resolved; paths (``out``) are left out, so that equal runs stay equal."""
+        """Record the configuration as it was resolved; paths (``out``) are left out, so that equal runs stay equal."""
         kept = {key: value for key, value in values.items() if key != "out"}
         text = json.dumps(kept, indent=2, default=str)
         self._hold(configuration=True)
@@ -171,11 +171,11 @@ class Recorder:
         self._hold(active="Mapping")
 
     def wants_map(self, stamp: float) -> bool:
-        """Whether enough time has passed since the last map."""
+        """Tell whether enough time has passed since the last map."""
         return stamp >= self._last_map + MAP_PERIOD - 1e-6
 
     def map(self, grid: OccupancyGrid, stamp: float, *, final: bool = False) -> None:
-        """The map and the paths so far, every few seconds."""
+        """Record the map and the paths so far, every few seconds."""
         if not final and not self.wants_map(stamp):
             return
         first, self._last_map = not self._holds.mapping, stamp
@@ -230,7 +230,7 @@ class Recorder:
         self._stream.log("map/loops", drawables.strips(bars, colours.LOOP, radius=drawables.THICK, z=drawables.Z_PATH))
 
     def trajectory(self, stamps: FloatArray, poses: FloatArray) -> None:
-        """The whole trajectory after the last optimisation."""
+        """Record the whole trajectory after the last optimisation."""
         if len(stamps):
             self._stream.at(float(stamps[-1]), self._stage)
             path = np.asarray(poses, dtype=np.float64)[:, :2]
@@ -248,7 +248,7 @@ class Recorder:
         self._stream.log("map/path/truth", drawables.strips([way], colours.TRUTH, z=drawables.Z_PATH))
 
     def truth(self, grid: OccupancyGrid, rooms: Sequence[Room]) -> None:
-        """The true map and rooms, there whatever the time."""
+        """Record the true map and rooms, there whatever the time."""
         draw_rooms(self._stream, "rooms/truth", grid, rooms, self._palette, static=True)
         self._hold(truth=True)
 
@@ -260,7 +260,7 @@ class Recorder:
         *,
         iou: Mapping[str, float] | None = None,
     ) -> None:
-        """The prediction from its input to the completed map, stage by stage.
+        """Record the prediction from its input to the completed map, stage by stage.
 
         Args:
             observed: The map M.
@@ -291,7 +291,7 @@ class Recorder:
         *,
         iou: Mapping[str, float] | None = None,
     ) -> None:
-        """What would be predicted by what is known now, while the robot still explores."""
+        """Record what would be predicted by what is known now, while the robot still explores."""
         self._stream.at(stamp, self._stage)
         self._draw_prediction(observed, doors, prediction, iou or {}, staged=False)
 
@@ -335,7 +335,7 @@ class Recorder:
         self._hold(tours=tuple(tours))
 
     def revision(self, prediction: "Prediction", tour: FloatArray, stamp: float) -> None:
-        """The prediction and the rest of the tour while the robot drives."""
+        """Record the prediction and the rest of the tour while the robot drives."""
         self._stage = Stage.DRIVING
         self._stream.at(stamp, self._stage)
         self._stream.say("Driving", f"{len(prediction.rooms)} rooms are still predicted")
@@ -344,12 +344,12 @@ class Recorder:
         self._hold(driving=True, active="Driving")
 
     def note(self, text: str, stamp: float | None = None) -> None:
-        """One line of the log."""
+        """Record one line of the log."""
         self._stream.at(stamp)
         self._stream.log("log/run", rr.TextLog(text, level=rr.TextLogLevel.INFO))
 
     def table(self, markdown: str) -> None:
-        """The table of results."""
+        """Record the table of results."""
         self._stream.log("result", _markdown(markdown), static=True)
         self._hold(result=True)
 

@@ -115,7 +115,7 @@ class RecordingStream:
         self._rec.send_blueprint(blueprint)
 
     def at(self, stamp: float | None = None, stage: int | None = None) -> None:
-        """What follows belongs to ``stamp`` [s] and ``stage``; either stays as it was where not given."""
+        """Log what follows at ``stamp`` [s] and ``stage``; either stays as it was where not given."""
         if stamp is not None:
             self._rec.set_time("sim_time", duration=stamp)
         if stage is not None:
@@ -135,7 +135,7 @@ class RecordingStream:
         self._rec.send_columns(path, times, columns)
 
     def say(self, title: str, text: str) -> None:
-        """What happens at this stage, for the view ``Stage``."""
+        """Say what happens at this stage, in the view ``Stage``."""
         self.log("stage", rr.TextDocument(f"## {title}\n{text}", media_type=rr.MediaType.MARKDOWN))
 
     def clear(self, path: str) -> None:
@@ -143,5 +143,5 @@ class RecordingStream:
         self.log(path, rr.Clear(recursive=True))
 
     def property(self, name: str, values: dict[str, str]) -> None:
-        """A property of the whole recording, shown by the viewer beside its name."""
+        """Set a property of the whole recording, shown by the viewer beside its name."""
         self._rec.send_property(name, rr.AnyValues(drop_untyped_nones=True, **values))

@@ -23,7 +23,7 @@ SMALLEST = 0.2
 
 
 def repaired(polygon: Polygon, name: str, remarks: list[Remark]) -> Polygon | None:
-    """A valid outline of usable size, or ``None``; what was done is added to ``remarks``."""
+    """Return a valid outline of usable size, or ``None``; what was done is added to ``remarks``."""
     if not polygon.is_valid:
         reason = shapely.is_valid_reason(polygon).split("[")[0]
         parts = shapely.get_parts(areal(shapely.make_valid(polygon)))
@@ -86,7 +86,7 @@ def _on_grid(outline: Polygon) -> Polygon:
 
 
 def outline_lines(outlines: Sequence[Polygon | None], kept: Sequence[Polygon | None]) -> BaseGeometry:
-    """The walls of a file that draws rooms: the outlines of those that became rooms, as they were given.
+    """Return the walls of a file that draws rooms: the outlines of those that became rooms, as they were given.
 
     Where two rooms claim the same floor, one of them lost it and its wall there; that stands in the remarks already.
     """

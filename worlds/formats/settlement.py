@@ -44,7 +44,7 @@ class Source:
 
 
 def settle(plan: FloorPlan, remarks: Iterable[Remark], source: Source, path: Path) -> FloorPlan:
-    """The plan without its bad doors, valid, with every remark on it.
+    """Return the plan without its bad doors, valid, with every remark on it.
 
     Args:
         plan: As the importer made it.
@@ -150,7 +150,7 @@ def _odd_rooms(areas: Sequence[float]) -> list[Remark]:
 
 
 def no_rooms(expected: str, areas: Sequence[float], remarks: Sequence[Remark], path: Path) -> InvalidInputError:
-    """The error of a file none of whose rooms can be used, with the reason.
+    """Return the error of a file none of whose rooms can be used, with the reason.
 
     Args:
         expected: What a file of this format holds.

@@ -62,7 +62,7 @@ RECIPES: dict[str, Recipe] = {
 
 
 def bundled_plan(name: str) -> FloorPlan:
-    """A bundled world made anew by the generator."""
+    """Return a bundled world made anew by the generator."""
     recipe = RECIPES[name]
     return generate(
         recipe.kind,
@@ -76,5 +76,5 @@ def bundled_plan(name: str) -> FloorPlan:
 
 
 def bundled_text(name: str) -> str:
-    """The JSON text of a bundled world made anew; equal to its file, byte for byte."""
+    """Return the JSON text of a bundled world made anew; equal to its file, byte for byte."""
     return plan_text(bundled_plan(name))

@@ -37,7 +37,7 @@ class Run:
     deepest: float = 0.0
 
     def box(self, s0: float, s1: float, t0: float, t1: float) -> Polygon:
-        """The rectangle from ``s0`` to ``s1`` along the run and ``t0`` to ``t1`` away from the corridor."""
+        """Return the rectangle from ``s0`` to ``s1`` along the run and ``t0`` to ``t1`` away from the corridor."""
         c, s = math.cos(self.angle), math.sin(self.angle)
         (x, y), n = self.origin, self.side
         return Polygon(
@@ -77,7 +77,7 @@ def _step(value: float) -> float:
 
 
 def bar(rng: np.random.Generator, m: Measures) -> Skeleton:
-    """One straight corridor, with rooms on both sides or, now and then, on one."""
+    """Return one straight corridor, with rooms on both sides or, now and then, on one."""
     one_sided = rng.random() < 0.25
     return _along([(0.0, 0.0), (m.legs[0], 0.0)], m, [(m.depths[0], 0.0 if one_sided else m.depths[1])])
 
@@ -97,12 +97,12 @@ def you(rng: np.random.Generator, m: Measures) -> Skeleton:
 
 
 def tee(rng: np.random.Generator, m: Measures) -> Skeleton:
-    """A wing that leaves the middle of another at a right angle."""
+    """Return a wing that leaves the middle of another at a right angle."""
     return _branched(rng, m, RIGHT_ANGLE)
 
 
 def slanted(rng: np.random.Generator, m: Measures) -> Skeleton:
-    """A straight building with a wing that leaves its end, or its middle, at another angle."""
+    """Return a straight building with a wing that leaves its end, or its middle, at another angle."""
     turn = math.radians(float(rng.integers(20, 46)))
     if rng.random() < 0.4:
         return _branched(rng, m, RIGHT_ANGLE - turn / 2)
