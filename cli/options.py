@@ -62,7 +62,7 @@ class Command:
 
 
 def load(place: str) -> Any:
-    """Load what stands at ``module:name``; the module is imported, so that every command imports no more than it needs."""
+    """Load what stands at ``module:name``; the module is imported, so that a command imports no more than it needs."""
     module, name = place.split(":")
     return getattr(importlib.import_module(f"closedrooms.{module}"), name)
 

@@ -47,7 +47,7 @@ class GraphDraft:
         return vertex
 
     def nearest_reachable(self, cell: IntArray) -> IntArray:
-        """Find the nearest cell where the robot can be: of those that the clean map shows in free sight, if there are any.
+        """Find the nearest cell where the robot can be: of those that the clean map shows in free sight, if any.
 
         A vertex in the middle of a table moves beside it.
         """

@@ -25,7 +25,7 @@ class SweepMotion:
 
     @classmethod
     def between(cls, before: Pose2, after: Pose2, seconds: float) -> "SweepMotion":
-        """Find the constant motion that leads from one pose to another in ``seconds`` [s]: the logarithm of their step."""
+        """Find the constant motion that leads from one pose to another in ``seconds``: the logarithm of their step."""
         step = before.inverse() @ after
         half = step.theta / 2.0
         # How much longer the arc is than its chord, turned back by half of the turn.

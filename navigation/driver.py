@@ -69,7 +69,7 @@ class Driver:
         self.state = "driving"
 
     def ahead(self, distance: float) -> FloatArray:
-        """Cut the path from the robot's place on it, up to ``distance`` [m], as points about 0.1 m apart, shape (n, 2)."""
+        """Cut the path from the robot's place on it, up to ``distance`` [m], as points 0.1 m apart, shape (n, 2)."""
         if self._track is None:
             return np.empty((0, 2))
         end = min(self._progress + distance, self._track.length)

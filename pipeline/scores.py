@@ -63,7 +63,7 @@ def mean(figures: Mapping[str, float]) -> float | None:
 
 
 def rooms_seen(plan: FloorPlan, grid: OccupancyGrid, map_T_world: Pose2) -> int:
-    """Count the true rooms that the robot saw: |R| of section 5.2. A room counts when half of it is known in ``grid``."""
+    """Count the true rooms that the robot saw: |R| of section 5.2. A room counts when half of it is known."""
     return count_seen(room_points(plan), grid, map_T_world)
 
 

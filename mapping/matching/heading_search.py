@@ -55,7 +55,7 @@ def search_heading(field: LikelihoodField, points: FloatArray, guess: Pose2, sig
 
 
 def angle_step(field: LikelihoodField, points: FloatArray) -> float:
-    """Find a turn that moves a far point by two cells [rad] (Olson, section III.B, takes one; walls blur over several)."""
+    """Find a turn that moves a far point by two cells [rad] (Olson, section III.B, takes one; walls blur over more)."""
     far = math.sqrt(float((points * points).sum()) / max(len(points), 1))
     return min(max(2.0 * field.lattice.resolution / max(far, 1.0), 0.004), 0.04)
 
