@@ -111,4 +111,5 @@ def test_a_live_run_with_a_bag_that_maps_to_the_same_map(tmp_path: Path) -> None
     assert again.frame == mine.frame
     assert np.mean(again.cells != mine.cells) < 0.005
     poses = [np.loadtxt(folder / "trajectory.tum")[:, 1:3] for folder in (out, tmp_path / "map")]
-    assert np.abs(poses[0] - poses[1]).max() < 0.02
+    # By a cell at most: what falls the other way moves a match.
+    assert np.abs(poses[0] - poses[1]).max() < 0.05
