@@ -14,6 +14,8 @@ from urllib.parse import quote
 from closedrooms.core.errors import InvalidInputError
 
 HOST = "127.0.0.1"
+# How long a viewer may take to leave before it is killed [s].
+LEAVE = 3.0
 # A viewer opens its port within a second; on a busy machine it has taken six [s].
 PATIENCE = 30.0
 
@@ -52,10 +54,16 @@ def open_viewer(*, web: bool, tell: Callable[[str], None]) -> Iterator[str]:
 
 
 def _end(viewer: "subprocess.Popen[bytes]") -> None:
-    """End a viewer and what it started: the program that pip installs starts another one."""
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(viewer.pid, signal.SIGTERM)
-    viewer.wait()
+    """End a viewer and what it started: the program that pip installs starts another, which outlives it a little."""
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        end = time.monotonic() + LEAVE
+        while time.monotonic() < end:
+            try:
+                os.killpg(viewer.pid, number)
+            except ProcessLookupError:
+                return
+            viewer.poll()  # else the program itself stays in its group
+            time.sleep(0.02)
 
 
 def _program() -> str:
