@@ -30,9 +30,9 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
-from closedrooms.core.geojson import read_rooms
-from closedrooms.pipeline.report import figure
-from closedrooms.pipeline.scores import mean, room_iou
+from closedrooms.core.files.geojson import read_rooms
+from closedrooms.pipeline.reporting.report import figure
+from closedrooms.pipeline.reporting.scores import mean, room_iou
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.geometry import wall_area
 from closedrooms.worlds.library import load_world

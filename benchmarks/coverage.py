@@ -19,16 +19,16 @@ import networkx as nx
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.files.rosmap import read_map
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.core.random import stream
-from closedrooms.core.rosmap import read_map
-from closedrooms.coverage.biconnected import measure_paths
 from closedrooms.coverage.config import CoverageConfig, TourConfig
-from closedrooms.coverage.free_space import clean_free_space
-from closedrooms.coverage.graph import TopologicalGraph
-from closedrooms.coverage.graph_builder import build_graph
-from closedrooms.coverage.skeleton import thin, trace_skeleton
-from closedrooms.coverage.tour_planner import solve_tour
+from closedrooms.coverage.graph.free_space import clean_free_space
+from closedrooms.coverage.graph.graph_builder import build_graph
+from closedrooms.coverage.graph.skeleton import thin, trace_skeleton
+from closedrooms.coverage.graph.topological_graph import TopologicalGraph
+from closedrooms.coverage.tour.biconnected import measure_paths
+from closedrooms.coverage.tour.tour_planner import solve_tour
 
 SIZES = ((40.0, 30.0), (100.0, 75.0), (200.0, 150.0))
 

@@ -16,17 +16,17 @@ from typing import Any
 
 import numpy as np
 
-from closedrooms.core.geojson import write_doors
+from closedrooms.core.files.geojson import write_doors
+from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.random import stream
-from closedrooms.core.rosmap import write_map
 from closedrooms.coverage.estimates import compare_lengths
-from closedrooms.coverage.tour import CoverageTour
-from closedrooms.coverage.tour_planner import plan_coverage
+from closedrooms.coverage.tour.coverage_tour import CoverageTour
+from closedrooms.coverage.tour.tour_planner import plan_coverage
 from closedrooms.experiments.dataset.erase import Eraser
 from closedrooms.experiments.dataset.open_survey import survey_open
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.pipeline.scores import mean, room_iou, rooms_seen
+from closedrooms.pipeline.reporting.scores import mean, room_iou, rooms_seen
 from closedrooms.predictor.methods import predict
 from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.worlds.closing import closable_rooms

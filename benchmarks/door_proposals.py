@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.geojson import read_doors
-from closedrooms.core.rosmap import read_map
+from closedrooms.core.files.geojson import read_doors
+from closedrooms.core.files.rosmap import read_map
 from closedrooms.predictor.structure.door_proposal_config import ProposalConfig
 from closedrooms.predictor.structure.door_proposals import SMOOTH, DoorProposal, propose_doors
 

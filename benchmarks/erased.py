@@ -15,14 +15,14 @@ from pathlib import Path
 
 import numpy as np
 
-from closedrooms.core.geojson import read_doors, read_rooms
-from closedrooms.core.rosmap import read_map
+from closedrooms.core.files.geojson import read_doors, read_rooms
+from closedrooms.core.files.rosmap import read_map
 from closedrooms.experiments.dataset.config import DatasetConfig, MapSource
 from closedrooms.experiments.dataset.sample import Outcome, Task, make
 from closedrooms.experiments.dataset.variants import Variant, find_variants, find_worlds
 from closedrooms.experiments.evaluation.scores import iou
 from closedrooms.experiments.workers import Crew
-from closedrooms.pipeline.scores import room_iou
+from closedrooms.pipeline.reporting.scores import room_iou
 from closedrooms.predictor.methods import predict
 
 WORLDS = (

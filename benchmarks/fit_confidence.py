@@ -23,14 +23,14 @@ from sklearn.linear_model import Ridge
 from sklearn.model_selection import GroupKFold, cross_val_predict
 
 from closedrooms.core.arrays import FloatArray
-from closedrooms.core.files import write_json
+from closedrooms.core.files.outgoing import write_json
 from closedrooms.core.grid import GridFrame
 from closedrooms.experiments.evaluation.listing import find_samples
-from closedrooms.experiments.evaluation.sample import Starts
+from closedrooms.experiments.evaluation.sample_evaluation import Starts
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
 from closedrooms.experiments.evaluation.sureness import cells_asked
 from closedrooms.experiments.training.buildings import read_groups, use_of
-from closedrooms.pipeline.scores import polygon_iou
+from closedrooms.pipeline.reporting.scores import polygon_iou
 from closedrooms.predictor.confidence.belief import Belief
 from closedrooms.predictor.confidence.calibration import FILE
 from closedrooms.predictor.confidence.judge import join_spreads

@@ -21,9 +21,9 @@ from rich.console import Console
 from rich.table import Table
 
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.geojson import read_doors, write_doors
+from closedrooms.core.files.geojson import read_doors, write_doors
+from closedrooms.core.files.rosmap import read_map, write_map
 from closedrooms.core.grid import UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.core.rosmap import read_map, write_map
 from closedrooms.predictor.structure.known_window import known_window
 
 RESOLUTION = 0.05

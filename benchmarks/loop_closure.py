@@ -25,9 +25,9 @@ from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import ate
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.pipeline.progress import Silent
-from closedrooms.pipeline.run_log import RunLog
-from closedrooms.pipeline.scores import area_mapped
+from closedrooms.pipeline.reporting.progress import Silent
+from closedrooms.pipeline.reporting.run_log import RunLog
+from closedrooms.pipeline.reporting.scores import area_mapped
 from closedrooms.pipeline.survey import survey_building
 from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.simulation import Simulation

@@ -18,9 +18,9 @@ from rich.console import Console
 from rich.table import Table
 
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.geojson import read_doors
+from closedrooms.core.files.geojson import read_doors
+from closedrooms.core.files.rosmap import read_map
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.core.rosmap import read_map
 from closedrooms.predictor.methods import predict
 
 

@@ -28,9 +28,9 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray
 from closedrooms.core.door import ClosedDoor, Point
+from closedrooms.core.files.rosmap import read_map
 from closedrooms.core.grid import OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.core.rosmap import read_map
 from closedrooms.experiments.evaluation.scores import iou, room_masks
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.structure.clutter import filter_clutter

@@ -21,9 +21,9 @@ from shapely import affinity
 
 from closedrooms.core.arrays import BoolArray, CellArray, FloatArray
 from closedrooms.core.door import ClosedDoor, Point
-from closedrooms.core.geojson import read_doors
+from closedrooms.core.files.geojson import read_doors
+from closedrooms.core.files.rosmap import read_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.core.rosmap import read_map
 from closedrooms.core.shapes import Shape
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.structure.known_window import known_window

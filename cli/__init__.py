@@ -11,7 +11,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status: :func:`closedrooms.cli.commands.main`."""
     if arguments is None:
         # A signal while the rest is imported ends the program quietly: nothing has begun.
-        from closedrooms.core.stopping import leave_at_once
+        from closedrooms.core.runtime.stopping import leave_at_once
 
         leave_at_once()
     from closedrooms.cli.commands import main as work

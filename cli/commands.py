@@ -13,9 +13,9 @@ from typing import Any
 
 from closedrooms.cli.usage import UsageError
 from closedrooms.core.errors import ClosedroomsError, OutputError
-from closedrooms.core.packages import missing_package, require
-from closedrooms.core.stopping import SIGNALS, Stop, Terminated, end_in_time, leave_at_once, stopping
-from closedrooms.core.unfinished import remove_unfinished
+from closedrooms.core.files.unfinished import remove_unfinished
+from closedrooms.core.runtime.packages import missing_package, require
+from closedrooms.core.runtime.stopping import SIGNALS, Stop, Terminated, end_in_time, leave_at_once, stopping
 
 DONE, BAD_INPUT, WRONG_USAGE, PARTLY_FAILED, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 # Failures that are named on the terminal; the rest stands in files.
@@ -118,7 +118,7 @@ def _main(words: Sequence[str]) -> int:
             status = WRONG_USAGE if not words else int(stop.code or DONE)
     if options is None:
         return status
-    from closedrooms.pipeline.progress import Terminal
+    from closedrooms.pipeline.reporting.progress import Terminal
 
     command = options.about["command"]
     _check_packages(command, options)

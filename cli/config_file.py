@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.incoming import read_json, read_text
+from closedrooms.core.files.incoming import read_json, read_text
 
 # A configuration has some hundred numbers, a manifest a few for each door or sample.
 MOST_BYTES = 50_000_000

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from closedrooms.core.report import Report
 from closedrooms.pipeline.config import ConvertWorld, GenerateWorld, ListWorlds, ShowWorld
-from closedrooms.pipeline.progress import Progress
+from closedrooms.pipeline.reporting.progress import Progress
 
 if TYPE_CHECKING:
     from closedrooms.worlds.plan import FloorPlan

@@ -2,10 +2,9 @@
 
 - Words: ``pose``, ``grid``, ``scan``, ``observation``, ``door``, ``room``, ``robot`` (radius and speeds, said once).
 - Cells: ``shapes`` (which cells a polygon, its outline or a doorway holds), ``arrays``.
-- Files in: ``incoming`` (the one opener), ``archives``, ``numbers``, ``names``, ``yaml_text``; out: ``files``.
-- Formats: ``rosmap``, ``map_picture``, ``geojson``, ``tum``.
-- For people: ``errors``, ``remarks`` (what was dropped, repaired, guessed), ``report``, ``nearest``, ``packages``.
-- ``options`` that commands share, ``random`` streams of one seed, ``lazy`` public faces.
+- For people: ``errors``, ``remarks`` (what was dropped, repaired, guessed), ``report``, ``names``, ``numbers``,
+  ``nearest``.
+- ``random`` streams of one seed; ``files/`` in and out; ``runtime/``: missing packages, signals, lazy public faces.
 
 This is the public face: ``from closedrooms.core import OccupancyGrid, read_map``. A name is imported when it is first
 asked for, so that ``import closedrooms.core`` stays quick and loads no library.
@@ -13,7 +12,7 @@ asked for, so that ``import closedrooms.core`` stays quick and loads no library.
 
 from typing import TYPE_CHECKING, Any
 
-from closedrooms.core.lazy import lazy_face
+from closedrooms.core.runtime.lazy import lazy_face
 
 if TYPE_CHECKING:
     from closedrooms.core.door import ClosedDoor as ClosedDoor
@@ -21,12 +20,18 @@ if TYPE_CHECKING:
     from closedrooms.core.errors import ClosedroomsError as ClosedroomsError
     from closedrooms.core.errors import InvalidInputError as InvalidInputError
     from closedrooms.core.errors import OutputError as OutputError
-    from closedrooms.core.geojson import read_doors as read_doors
-    from closedrooms.core.geojson import read_features as read_features
-    from closedrooms.core.geojson import read_rooms as read_rooms
-    from closedrooms.core.geojson import write_doors as write_doors
-    from closedrooms.core.geojson import write_features as write_features
-    from closedrooms.core.geojson import write_rooms as write_rooms
+    from closedrooms.core.files.geojson import read_doors as read_doors
+    from closedrooms.core.files.geojson import read_features as read_features
+    from closedrooms.core.files.geojson import read_rooms as read_rooms
+    from closedrooms.core.files.geojson import write_doors as write_doors
+    from closedrooms.core.files.geojson import write_features as write_features
+    from closedrooms.core.files.geojson import write_rooms as write_rooms
+    from closedrooms.core.files.rosmap import RosMap as RosMap
+    from closedrooms.core.files.rosmap import read_map as read_map
+    from closedrooms.core.files.rosmap import read_ros_map as read_ros_map
+    from closedrooms.core.files.rosmap import write_map as write_map
+    from closedrooms.core.files.tum import read_trajectory as read_trajectory
+    from closedrooms.core.files.tum import write_trajectory as write_trajectory
     from closedrooms.core.grid import FREE as FREE
     from closedrooms.core.grid import OCCUPIED as OCCUPIED
     from closedrooms.core.grid import UNKNOWN as UNKNOWN
@@ -36,13 +41,7 @@ if TYPE_CHECKING:
     from closedrooms.core.remarks import Remark as Remark
     from closedrooms.core.room import Alternative as Alternative
     from closedrooms.core.room import Room as Room
-    from closedrooms.core.rosmap import RosMap as RosMap
-    from closedrooms.core.rosmap import read_map as read_map
-    from closedrooms.core.rosmap import read_ros_map as read_ros_map
-    from closedrooms.core.rosmap import write_map as write_map
     from closedrooms.core.scan import LaserScan as LaserScan
-    from closedrooms.core.tum import read_trajectory as read_trajectory
-    from closedrooms.core.tum import write_trajectory as write_trajectory
 
     __version__: str
 
@@ -51,14 +50,14 @@ _load, __dir__, __all__ = lazy_face(
     {
         "door": ("ClosedDoor", "DoorSighting"),
         "errors": ("ClosedroomsError", "InvalidInputError", "OutputError"),
-        "geojson": ("read_doors", "read_features", "read_rooms", "write_doors", "write_features", "write_rooms"),
+        "files.geojson": ("read_doors", "read_features", "read_rooms", "write_doors", "write_features", "write_rooms"),
         "grid": ("FREE", "OCCUPIED", "UNKNOWN", "GridFrame", "OccupancyGrid"),
         "pose": ("Pose2",),
         "remarks": ("Remark",),
         "room": ("Alternative", "Room"),
-        "rosmap": ("RosMap", "read_map", "read_ros_map", "write_map"),
+        "files.rosmap": ("RosMap", "read_map", "read_ros_map", "write_map"),
         "scan": ("LaserScan",),
-        "tum": ("read_trajectory", "write_trajectory"),
+        "files.tum": ("read_trajectory", "write_trajectory"),
     },
 )
 

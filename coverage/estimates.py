@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.coverage.tour import CoverageTour
+from closedrooms.coverage.tour.coverage_tour import CoverageTour
 
 
 @dataclass(frozen=True, slots=True)

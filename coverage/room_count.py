@@ -5,7 +5,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.coverage.config import GraphConfig
-from closedrooms.coverage.free_space import clean_free_space
+from closedrooms.coverage.graph.free_space import clean_free_space
 
 # A neck parts two rooms when it is narrower than this share of the width of both. A door of 0.9 m off a corridor of
 # 2 m has 0.45; two pillars that narrow a corridor of 2.4 m to 1.8 m have 0.75.

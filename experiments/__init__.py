@@ -5,7 +5,7 @@
 
 from typing import TYPE_CHECKING
 
-from closedrooms.core.lazy import lazy_face
+from closedrooms.core.runtime.lazy import lazy_face
 
 if TYPE_CHECKING:
     from closedrooms.experiments.dataset.config import DatasetConfig as DatasetConfig

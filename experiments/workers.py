@@ -18,9 +18,9 @@ from itertools import chain, count, islice
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
-from closedrooms.core.packages import missing_package, require
-from closedrooms.core.stopping import SIGNALS, Stop, end_in_time, handle
-from closedrooms.core.unfinished import remove_unfinished
+from closedrooms.core.files.unfinished import remove_unfinished
+from closedrooms.core.runtime.packages import missing_package, require
+from closedrooms.core.runtime.stopping import SIGNALS, Stop, end_in_time, handle
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -8,12 +8,12 @@ from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.door import Point
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.coverage.biconnected import measure_paths
 from closedrooms.coverage.config import CoverageConfig
-from closedrooms.coverage.graph_builder import build_graph
-from closedrooms.coverage.local_search import search_tour
-from closedrooms.coverage.routing import find_christofides_tour
-from closedrooms.coverage.tour import CoverageTour
+from closedrooms.coverage.graph.graph_builder import build_graph
+from closedrooms.coverage.tour.biconnected import measure_paths
+from closedrooms.coverage.tour.coverage_tour import CoverageTour
+from closedrooms.coverage.tour.local_search import search_tour
+from closedrooms.coverage.tour.routing import find_christofides_tour
 
 # A stop counts as visited when the robot comes so close [m]: it stands for what is seen from there.
 VISITED = 0.5

@@ -12,7 +12,7 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.coverage.config import CoverageConfig
-from closedrooms.coverage.tour import CoverageTour
+from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.navigation.config import RobotNavigation
 from closedrooms.navigation.control_loop import Outcome
 from closedrooms.navigation.costmap import NavigationMap

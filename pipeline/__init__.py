@@ -2,16 +2,15 @@
 
 - One command a file: ``run``, ``predict``, ``map``, ``cover``, ``propose_doors``, ``world_files``; their options:
   ``config``, ``propose_doors_config``.
-- Parts of a run: ``survey`` (explore and map), ``bounds``, ``drive``, ``run_log``, ``stopwatch``, ``manifest``.
-- What came of it: ``scores``, ``run_metrics``, ``report``, ``drive_report``; told while it works: ``progress``,
-  ``live_recording``, ``log_observer``.
+- Parts of a run: ``survey`` (explore and map), ``bounds``, ``drive``; several runs: ``runs``.
+- ``reporting/``: progress, figures, tables, ``run.json``.
 
 The main job is ``closedrooms.pipeline.run.run``: it is named like its module and so stands there.
 """
 
 from typing import TYPE_CHECKING
 
-from closedrooms.core.lazy import lazy_face
+from closedrooms.core.runtime.lazy import lazy_face
 
 if TYPE_CHECKING:
     from closedrooms.pipeline.config import CoverConfig as CoverConfig

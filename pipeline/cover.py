@@ -6,20 +6,20 @@ from typing import Any
 import numpy as np
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import check_output_folder, output_folder
-from closedrooms.core.geojson import write_doors, write_features
+from closedrooms.core.files.geojson import write_doors, write_features
+from closedrooms.core.files.outgoing import check_output_folder, output_folder
+from closedrooms.core.files.rosmap import RosMap, read_ros_map, write_map
 from closedrooms.core.report import Report
-from closedrooms.core.rosmap import RosMap, read_ros_map, write_map
-from closedrooms.coverage.drivable_path import find_drivable_paths
-from closedrooms.coverage.ros_tour import write_path_message, write_waypoints
-from closedrooms.coverage.tour import CoverageTour
-from closedrooms.coverage.tour_features import make_tour_features
-from closedrooms.coverage.tour_planner import plan_coverage
+from closedrooms.coverage.tour.coverage_tour import CoverageTour
+from closedrooms.coverage.tour.drivable_path import find_drivable_paths
+from closedrooms.coverage.tour.ros_tour import write_path_message, write_waypoints
+from closedrooms.coverage.tour.tour_features import make_tour_features
+from closedrooms.coverage.tour.tour_planner import plan_coverage
 from closedrooms.pipeline.config import CoverConfig
 from closedrooms.pipeline.given_doors import given_doors
-from closedrooms.pipeline.manifest import input_path, resolved, versions
-from closedrooms.pipeline.progress import Progress, Silent
-from closedrooms.pipeline.stopwatch import Stopwatch
+from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
+from closedrooms.pipeline.reporting.progress import Progress, Silent
+from closedrooms.pipeline.reporting.stopwatch import Stopwatch
 
 
 def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Report:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.coverage.config import CoverageConfig
-from closedrooms.coverage.tour import CoverageTour
+from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import RobotNavigation
@@ -14,8 +14,8 @@ from closedrooms.navigation.control_loop import LoopLog, run_loop
 from closedrooms.navigation.opened_doors import ReopenedMap
 from closedrooms.navigation.tour_follower import TourFollower, TourOutcome, TourPlan
 from closedrooms.pipeline.bounds import Outline
-from closedrooms.pipeline.live_recording import DriveRecording
-from closedrooms.pipeline.run_log import RunLog
+from closedrooms.pipeline.reporting.live_recording import DriveRecording
+from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.predictor.revision import Predict
 
 if TYPE_CHECKING:

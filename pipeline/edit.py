@@ -8,14 +8,14 @@ from typing import Any
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import ClosedroomsError, reason
-from closedrooms.core.geojson import write_features
+from closedrooms.core.files.geojson import write_features
+from closedrooms.core.files.rosmap import RosMap
 from closedrooms.core.report import Report
 from closedrooms.core.room import Room
-from closedrooms.core.rosmap import RosMap
 from closedrooms.coverage.config import CoverageConfig
-from closedrooms.coverage.tour import CoverageTour
-from closedrooms.coverage.tour_features import make_tour_features
-from closedrooms.coverage.tour_planner import plan_coverage
+from closedrooms.coverage.tour.coverage_tour import CoverageTour
+from closedrooms.coverage.tour.tour_features import make_tour_features
+from closedrooms.coverage.tour.tour_planner import plan_coverage
 from closedrooms.pipeline.config import PredictConfig
 from closedrooms.pipeline.predict import predict_map
 from closedrooms.predictor.methods import METHODS, predict

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.geojson import read_doors
+from closedrooms.core.files.geojson import read_doors
 from closedrooms.core.remarks import Remark
 
 
@@ -15,7 +15,7 @@ def given_doors(path: Path, remarks: list[Remark]) -> list[ClosedDoor]:
         remarks: Told what was left out or named here.
 
     Raises:
-        InvalidInputError: See :func:`closedrooms.core.geojson.read_doors`,
+        InvalidInputError: See :func:`closedrooms.core.files.geojson.read_doors`,
             :func:`closedrooms.mapping.logs.clicked_points.read_clicked_points`.
     """
     from closedrooms.mapping.logs.clicked_points import is_bag, read_clicked_points

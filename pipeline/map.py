@@ -6,22 +6,22 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from closedrooms.core.files import check_output_folder, output_folder
-from closedrooms.core.geojson import write_doors
+from closedrooms.core.files.geojson import write_doors
+from closedrooms.core.files.outgoing import check_output_folder, output_folder
+from closedrooms.core.files.rosmap import write_map
+from closedrooms.core.files.tum import write_trajectory
 from closedrooms.core.pose import Pose2
 from closedrooms.core.report import Report
-from closedrooms.core.rosmap import write_map
-from closedrooms.core.tum import write_trajectory
 from closedrooms.mapping.logs import RecordedRun, read_run
 from closedrooms.mapping.logs.clocks import find_gaps
 from closedrooms.mapping.map_builder import BuiltMap, build_map
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import align
 from closedrooms.pipeline.config import MapConfig
-from closedrooms.pipeline.log_observer import LogWatch
-from closedrooms.pipeline.manifest import input_path, resolved, versions
-from closedrooms.pipeline.progress import Progress, Silent
-from closedrooms.pipeline.stopwatch import Stopwatch
+from closedrooms.pipeline.reporting.log_observer import LogWatch
+from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
+from closedrooms.pipeline.reporting.progress import Progress, Silent
+from closedrooms.pipeline.reporting.stopwatch import Stopwatch
 from closedrooms.visualization.no_recording import no_recording
 
 if TYPE_CHECKING:

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import check_output_folder, output_folder
-from closedrooms.core.geojson import write_doors, write_rooms
+from closedrooms.core.files.geojson import write_doors, write_rooms
+from closedrooms.core.files.outgoing import check_output_folder, output_folder
+from closedrooms.core.files.rosmap import RosMap, read_ros_map, write_map, write_raw_map
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.report import Report
 from closedrooms.core.room import Room
-from closedrooms.core.rosmap import RosMap, read_ros_map, write_map, write_raw_map
 from closedrooms.pipeline.config import PredictConfig
 from closedrooms.pipeline.given_doors import given_doors
-from closedrooms.pipeline.manifest import input_path, resolved, versions
-from closedrooms.pipeline.progress import Progress, Silent
-from closedrooms.pipeline.stopwatch import Stopwatch
+from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
+from closedrooms.pipeline.reporting.progress import Progress, Silent
+from closedrooms.pipeline.reporting.stopwatch import Stopwatch
 from closedrooms.predictor.inpainting import withdraw_unsure
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction, free_probability

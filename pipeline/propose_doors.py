@@ -7,13 +7,13 @@ import numpy as np
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import new_files
-from closedrooms.core.geojson import Feature, write_features
+from closedrooms.core.files.geojson import Feature, write_features
+from closedrooms.core.files.outgoing import new_files
+from closedrooms.core.files.rosmap import RosMap, read_ros_map
 from closedrooms.core.report import Report
-from closedrooms.core.rosmap import RosMap, read_ros_map
-from closedrooms.pipeline.progress import Progress, Silent
 from closedrooms.pipeline.propose_doors_config import DoorsConfig
-from closedrooms.pipeline.stopwatch import Stopwatch
+from closedrooms.pipeline.reporting.progress import Progress, Silent
+from closedrooms.pipeline.reporting.stopwatch import Stopwatch
 from closedrooms.predictor.structure.door_proposals import DoorProposal, propose_doors
 
 

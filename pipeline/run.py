@@ -8,19 +8,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import check_output_folder, output_folder
-from closedrooms.core.geojson import write_doors, write_features, write_rooms
+from closedrooms.core.files.geojson import write_doors, write_features, write_rooms
+from closedrooms.core.files.outgoing import check_output_folder, output_folder
+from closedrooms.core.files.rosmap import write_map, write_raw_map
+from closedrooms.core.files.tum import write_trajectory
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.names import file_name
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
 from closedrooms.core.report import Report
-from closedrooms.core.rosmap import write_map, write_raw_map
-from closedrooms.core.tum import write_trajectory
 from closedrooms.coverage.config import CoverageConfig
-from closedrooms.coverage.tour import CoverageTour
-from closedrooms.coverage.tour_features import make_tour_features
-from closedrooms.coverage.tour_planner import plan_coverage
+from closedrooms.coverage.tour.coverage_tour import CoverageTour
+from closedrooms.coverage.tour.tour_features import make_tour_features
+from closedrooms.coverage.tour.tour_planner import plan_coverage
 from closedrooms.mapping.logs.bag_writer import check_bags, write_bag
 from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.mapper import Mapper
@@ -28,15 +28,15 @@ from closedrooms.navigation.tour_follower import TourPlan
 from closedrooms.pipeline.bounds import check_size, check_width, too_narrow
 from closedrooms.pipeline.config import RunConfig
 from closedrooms.pipeline.drive import DriveResult, DriveSettings, drive_tour
-from closedrooms.pipeline.drive_report import draw_drive, drive_features, drive_metrics
-from closedrooms.pipeline.live_recording import GrowingPrediction
-from closedrooms.pipeline.manifest import input_path, resolved, versions
-from closedrooms.pipeline.progress import Progress, Silent
-from closedrooms.pipeline.report import markdown, run_report
-from closedrooms.pipeline.run_log import RunLog
-from closedrooms.pipeline.run_metrics import run_metrics
-from closedrooms.pipeline.scores import room_iou
-from closedrooms.pipeline.stopwatch import Stopwatch
+from closedrooms.pipeline.reporting.drive_report import draw_drive, drive_features, drive_metrics
+from closedrooms.pipeline.reporting.live_recording import GrowingPrediction
+from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
+from closedrooms.pipeline.reporting.progress import Progress, Silent
+from closedrooms.pipeline.reporting.report import markdown, run_report
+from closedrooms.pipeline.reporting.run_log import RunLog
+from closedrooms.pipeline.reporting.run_metrics import run_metrics
+from closedrooms.pipeline.reporting.scores import room_iou
+from closedrooms.pipeline.reporting.stopwatch import Stopwatch
 from closedrooms.pipeline.survey import Survey, Truth, survey_building, true_building
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction, free_probability

@@ -9,8 +9,8 @@ from closedrooms.core.errors import ClosedroomsError, InvalidInputError
 from closedrooms.core.names import file_name
 from closedrooms.core.report import Report
 from closedrooms.pipeline.config import RunConfig
-from closedrooms.pipeline.progress import Progress, Silent
-from closedrooms.pipeline.report import figure
+from closedrooms.pipeline.reporting.progress import Progress, Silent
+from closedrooms.pipeline.reporting.report import figure
 from closedrooms.pipeline.run import run
 from closedrooms.worlds.library import load_world
 

@@ -14,10 +14,10 @@ from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.control_loop import LoopLog, run_loop
 from closedrooms.navigation.explorer import Explorer
 from closedrooms.pipeline.bounds import Outline
-from closedrooms.pipeline.live_recording import ExplorationRecording, GrowingPrediction
-from closedrooms.pipeline.progress import Progress, Silent
-from closedrooms.pipeline.run_log import RunLog
-from closedrooms.pipeline.stopwatch import Stopwatch
+from closedrooms.pipeline.reporting.live_recording import ExplorationRecording, GrowingPrediction
+from closedrooms.pipeline.reporting.progress import Progress, Silent
+from closedrooms.pipeline.reporting.run_log import RunLog
+from closedrooms.pipeline.reporting.stopwatch import Stopwatch
 from closedrooms.visualization.no_recording import no_recording
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.truth import rasterise, true_rooms, truth_bounds

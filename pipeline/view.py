@@ -12,9 +12,9 @@ from pathlib import Path
 from urllib.parse import quote
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
-from closedrooms.core.incoming import check_regular, is_file, is_folder
-from closedrooms.core.packages import require
-from closedrooms.pipeline.progress import Progress
+from closedrooms.core.files.incoming import check_regular, is_file, is_folder
+from closedrooms.core.runtime.packages import require
+from closedrooms.pipeline.reporting.progress import Progress
 from closedrooms.pipeline.view_config import ViewConfig
 
 RECORDING = "run.rrd"

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import new_files
+from closedrooms.core.files.outgoing import new_files
 from closedrooms.core.names import shown
 from closedrooms.worlds.library import DEFAULT_WORLD, PLANS, bundled_names, load_world, read_world
 from closedrooms.worlds.plan import FloorPlan
@@ -169,10 +169,10 @@ def write_ros_map(path: Path, plan: FloorPlan) -> None:
     import math
 
     from closedrooms.core.door import ClosedDoor
-    from closedrooms.core.geojson import write_doors
+    from closedrooms.core.files.geojson import write_doors
+    from closedrooms.core.files.rosmap import write_map
     from closedrooms.core.grid import GridFrame
     from closedrooms.core.pose import Pose2
-    from closedrooms.core.rosmap import write_map
     from closedrooms.worlds.truth import rasterise, truth_bounds
 
     x_min, y_min, x_max, y_max = truth_bounds(plan, Pose2())

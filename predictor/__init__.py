@@ -8,7 +8,7 @@ on with it as knowledge arrives.
 
 from typing import TYPE_CHECKING
 
-from closedrooms.core.lazy import lazy_face
+from closedrooms.core.runtime.lazy import lazy_face
 
 if TYPE_CHECKING:
     from closedrooms.predictor.config import BestConfig as BestConfig

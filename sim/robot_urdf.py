@@ -11,7 +11,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.incoming import is_file, read_bytes
+from closedrooms.core.files.incoming import is_file, read_bytes
 from closedrooms.core.robot import RobotConfig
 from closedrooms.sim.config import SimConfig
 from closedrooms.sim.differential_drive import Motion

@@ -163,7 +163,7 @@ def test_nothing_outside_core_opens_a_file_by_itself() -> None:
             found = openings(path.read_text()) - ALLOWED.get(name, set())
             if found:
                 strange[name] = sorted(found)
-    assert not strange, f"core.incoming opens files: {strange}"
+    assert not strange, f"core.files.incoming opens files: {strange}"
 
 
 def read_outside_validation(tree: ast.AST) -> set[str]:

@@ -6,7 +6,7 @@ in ``colours`` that the recording shares. ``no_recording`` stands in where nothi
 
 from typing import TYPE_CHECKING
 
-from closedrooms.core.lazy import lazy_face
+from closedrooms.core.runtime.lazy import lazy_face
 
 if TYPE_CHECKING:
     from closedrooms.visualization.floor_plan import draw_plan as draw_plan

@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.polygon import orient
 
-from closedrooms.core.files import write_bytes
+from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.names import plot_text
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.geometry import door_leaf, wall_area

@@ -11,14 +11,14 @@ import shapely
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.files import write_bytes
+from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.names import shown
 from closedrooms.core.room import Room
 from closedrooms.visualization import colours
 
 if TYPE_CHECKING:
-    from closedrooms.coverage.tour import CoverageTour
+    from closedrooms.coverage.tour.coverage_tour import CoverageTour
     from closedrooms.predictor.prediction import Prediction
     from closedrooms.visualization.canvas import Bounds, Canvas, Pixels
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import clear_errors, write_json
-from closedrooms.core.geojson import read_doors, write_doors
-from closedrooms.core.incoming import is_file, read_json
+from closedrooms.core.files.geojson import read_doors, write_doors
+from closedrooms.core.files.incoming import is_file, read_json
+from closedrooms.core.files.outgoing import clear_errors, write_json
 from closedrooms.core.numbers import FARTHEST, is_number
 from closedrooms.predictor.methods import find_method
 from closedrooms.web.document import Document, as_saved

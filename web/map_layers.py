@@ -2,8 +2,8 @@
 
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.names import shown
-from closedrooms.coverage.tour import CoverageTour
-from closedrooms.coverage.tour_features import make_tour_features
+from closedrooms.coverage.tour.coverage_tour import CoverageTour
+from closedrooms.coverage.tour.tour_features import make_tour_features
 from closedrooms.visualization.colours import INK, TOURS, Colour, room_colours
 from closedrooms.web.map_board import MapBoard, css
 from closedrooms.web.pictures import map_url

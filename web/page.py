@@ -11,7 +11,7 @@ from nicegui.events import KeyEventArguments, UploadEventArguments, ValueChangeE
 
 from closedrooms.core.door import Point
 from closedrooms.core.errors import ClosedroomsError
-from closedrooms.coverage.tour import CoverageTour
+from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.predictor.methods import METHODS
 from closedrooms.web.door_list import DoorList
 from closedrooms.web.map_board import HandleEvent, MapBoard

@@ -11,9 +11,9 @@ from functools import partial
 from typing import Any
 
 from closedrooms.core.errors import OutputError
-from closedrooms.core.incoming import check_regular
-from closedrooms.core.packages import require
-from closedrooms.pipeline.progress import Progress
+from closedrooms.core.files.incoming import check_regular
+from closedrooms.core.runtime.packages import require
+from closedrooms.pipeline.reporting.progress import Progress
 from closedrooms.web.config import EditConfig
 from closedrooms.web.drafts import Drafts
 from closedrooms.web.gate import Gate

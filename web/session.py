@@ -7,12 +7,12 @@ from pathlib import Path
 
 from closedrooms.core.door import ClosedDoor, Point, Segment
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
-from closedrooms.core.files import write_bytes
-from closedrooms.core.geojson import read_doors
-from closedrooms.core.incoming import is_folder
+from closedrooms.core.files.geojson import read_doors
+from closedrooms.core.files.incoming import is_folder
+from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.names import file_name
 from closedrooms.core.report import Report
-from closedrooms.coverage.tour import CoverageTour
+from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.pipeline.config import PredictConfig
 from closedrooms.pipeline.edit import Outcome, plan_tour, predict_rooms, save_rooms
 from closedrooms.predictor.structure.door_proposals import DoorProposal

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files.rosmap import RosMap, read_ros_map
 from closedrooms.core.pose import Pose2
-from closedrooms.core.rosmap import RosMap, read_ros_map
 from closedrooms.predictor.structure.door_proposals import DoorProposal, propose_doors
 from closedrooms.web.config import EditConfig
 from closedrooms.web.snapping import WallSnapper

@@ -10,7 +10,7 @@
 
 from typing import TYPE_CHECKING
 
-from closedrooms.core.lazy import lazy_face
+from closedrooms.core.runtime.lazy import lazy_face
 
 if TYPE_CHECKING:
     from closedrooms.worlds.closing import check_closed as check_closed

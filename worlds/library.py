@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.incoming import is_there, read_head, reading
+from closedrooms.core.files.incoming import is_there, read_head, reading
 from closedrooms.core.nearest import nearest
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ import hashlib
 from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import MANIFEST
-from closedrooms.core.incoming import opened, read_json
+from closedrooms.core.files.incoming import opened, read_json
+from closedrooms.core.files.outgoing import MANIFEST
 
 # Recordings of equal runs differ in their bytes (`rerun rrd compare` finds them equal).
 NOT_REPEATABLE = {"run.rrd"}

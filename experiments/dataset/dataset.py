@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from closedrooms.core.errors import InvalidInputError, OutputError
-from closedrooms.core.files import MANIFEST, write_bytes, write_json
-from closedrooms.core.incoming import read_json
-from closedrooms.core.packages import require
+from closedrooms.core.files.incoming import read_json
+from closedrooms.core.files.outgoing import MANIFEST, write_bytes, write_json
 from closedrooms.core.report import Report
+from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.dataset.card import card
 from closedrooms.experiments.dataset.checksums import check
 from closedrooms.experiments.dataset.config import DatasetConfig
@@ -29,7 +29,7 @@ from closedrooms.experiments.dataset.layout import (
 from closedrooms.experiments.dataset.sample import Outcome, Task, make
 from closedrooms.experiments.dataset.variants import SPLITS, Variant, World, find_variants, find_worlds
 from closedrooms.experiments.workers import Crew, Lost
-from closedrooms.pipeline.progress import Progress, Silent
+from closedrooms.pipeline.reporting.progress import Progress, Silent
 
 
 def dataset(config: DatasetConfig, *, progress: Progress | None = None) -> Report:

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError
-from closedrooms.core.files import MANIFEST, PROGRAM, new_file, write_json
-from closedrooms.core.incoming import read_json
+from closedrooms.core.files.incoming import read_json
+from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, new_file, write_json
 from closedrooms.experiments.dataset.checksums import digest
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.sample import FORMAT, NOT_CONTENT, SURVEYS
 from closedrooms.experiments.dataset.variants import SPLITS, Variant, World
-from closedrooms.pipeline.manifest import resolved, versions
+from closedrooms.pipeline.reporting.manifest import resolved, versions
 
 DATASET_MANIFEST = "manifest.json"
 CARD = "README.md"

@@ -12,8 +12,8 @@ from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.control_loop import LoopStatus
-from closedrooms.pipeline.progress import Silent
-from closedrooms.pipeline.run_log import RunLog
+from closedrooms.pipeline.reporting.progress import Silent
+from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.pipeline.survey import survey_building
 from closedrooms.sim.config import SimConfig
 from closedrooms.sim.simulation import Simulation

@@ -11,12 +11,12 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import OutputError, reason
-from closedrooms.core.files import output_folder
-from closedrooms.core.geojson import write_doors, write_rooms
+from closedrooms.core.files.geojson import write_doors, write_rooms
+from closedrooms.core.files.outgoing import output_folder
+from closedrooms.core.files.rosmap import write_map
+from closedrooms.core.files.tum import write_trajectory
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
-from closedrooms.core.rosmap import write_map
-from closedrooms.core.tum import write_trajectory
 from closedrooms.experiments.dataset.checksums import checksums
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.erase import Eraser
@@ -27,10 +27,10 @@ from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import ate
-from closedrooms.pipeline.manifest import resolved, versions
-from closedrooms.pipeline.progress import Silent
-from closedrooms.pipeline.run_log import RunLog
-from closedrooms.pipeline.scores import area_mapped, count_seen, room_points, rounded
+from closedrooms.pipeline.reporting.manifest import resolved, versions
+from closedrooms.pipeline.reporting.progress import Silent
+from closedrooms.pipeline.reporting.run_log import RunLog
+from closedrooms.pipeline.reporting.scores import area_mapped, count_seen, room_points, rounded
 from closedrooms.pipeline.survey import Truth, survey_building
 from closedrooms.sim.simulation import Simulation
 from closedrooms.visualization.rerun.opening import open_recording

@@ -4,11 +4,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from closedrooms.core.archives import read_arrays
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import MANIFEST, output_folder
-from closedrooms.core.incoming import read_json
-from closedrooms.core.tum import read_trajectory, write_trajectory
+from closedrooms.core.files.archives import read_arrays
+from closedrooms.core.files.incoming import read_json
+from closedrooms.core.files.outgoing import MANIFEST, output_folder
+from closedrooms.core.files.tum import read_trajectory, write_trajectory
 from closedrooms.experiments.dataset.checksums import checksums
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.open_survey import OpenSurvey

@@ -9,12 +9,12 @@ import shapely
 from shapely.geometry import Polygon
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.geojson import read_rooms
+from closedrooms.core.files.geojson import read_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.names import plot_text
 from closedrooms.experiments.evaluation.curves import save_figure
 from closedrooms.experiments.evaluation.listing import SamplePath
-from closedrooms.experiments.evaluation.sample import predict_with
+from closedrooms.experiments.evaluation.sample_evaluation import predict_with
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
 from closedrooms.experiments.evaluation.scores import hidden_area
 from closedrooms.experiments.evaluation.summary import MEASURES, estimates

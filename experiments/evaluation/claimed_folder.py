@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError, OutputError
-from closedrooms.core.files import MANIFEST, PROGRAM, write_json
-from closedrooms.core.incoming import read_json
+from closedrooms.core.files.incoming import read_json
+from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, write_json
 
 
 def claim(folder: Path, command: str) -> None:

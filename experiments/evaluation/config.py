@@ -7,7 +7,7 @@ from pathlib import Path
 import tyro
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.options import check_least
+from closedrooms.core.runtime.options import check_least
 from closedrooms.experiments.scheduler_address import check_scheduler
 from closedrooms.predictor.methods import find_method
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from closedrooms.core.files import write_bytes
+from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.visualization.colours import ROOM_COLOURS, Colour
 
 Row = dict[str, Any]

@@ -7,16 +7,16 @@ from functools import partial
 from statistics import median
 from typing import Any
 
-from closedrooms.core.files import MANIFEST, PROGRAM, only_writer, write_json
-from closedrooms.core.packages import require
+from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, only_writer, write_json
 from closedrooms.core.report import Report
+from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.evaluation.claimed_folder import claim
 from closedrooms.experiments.evaluation.config import EvaluateConfig
 from closedrooms.experiments.evaluation.listing import SamplePath, find_samples
-from closedrooms.experiments.evaluation.sample import Outcome, Scores, evaluate_sample
+from closedrooms.experiments.evaluation.sample_evaluation import Outcome, Scores, evaluate_sample
 from closedrooms.experiments.workers import Crew, Lost
-from closedrooms.pipeline.manifest import input_path, resolved, versions
-from closedrooms.pipeline.progress import Progress, Silent
+from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
+from closedrooms.pipeline.reporting.progress import Progress, Silent
 
 
 def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Report:

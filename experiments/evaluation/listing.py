@@ -6,8 +6,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import MANIFEST
-from closedrooms.core.incoming import read_text
+from closedrooms.core.files.incoming import read_text
+from closedrooms.core.files.outgoing import MANIFEST
 from closedrooms.core.numbers import repr_of
 
 FILES = ("map.yaml", "doors.geojson", "truth.yaml")

@@ -7,8 +7,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from closedrooms.core.files import write_bytes
-from closedrooms.core.incoming import read_bytes
+from closedrooms.core.files.incoming import read_bytes
+from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.names import xml_text
 
 STYLE = """

@@ -8,13 +8,13 @@ import numpy as np
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import MANIFEST
-from closedrooms.core.geojson import read_doors, read_rooms
+from closedrooms.core.files.geojson import read_doors, read_rooms
+from closedrooms.core.files.incoming import read_json
+from closedrooms.core.files.outgoing import MANIFEST
+from closedrooms.core.files.rosmap import read_map
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.core.incoming import read_json
 from closedrooms.core.numbers import repr_of
 from closedrooms.core.room import Room
-from closedrooms.core.rosmap import read_map
 from closedrooms.experiments.dataset.checksums import check, digest
 from closedrooms.experiments.evaluation.listing import SamplePath
 from closedrooms.predictor.structure.known_window import MAX_CELLS

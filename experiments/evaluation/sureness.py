@@ -11,7 +11,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.experiments.evaluation.statistics import rounded
-from closedrooms.pipeline.scores import polygon_iou
+from closedrooms.pipeline.reporting.scores import polygon_iou
 from closedrooms.predictor.prediction import Prediction
 
 Scores = dict[str, Any]

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from closedrooms.core.files import write_bytes
+from closedrooms.core.files.outgoing import write_bytes
 
 Row = Mapping[str, Any]
 

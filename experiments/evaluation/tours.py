@@ -9,13 +9,13 @@ from typing import Any
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import write_json
+from closedrooms.core.files.incoming import read_json
+from closedrooms.core.files.outgoing import write_json
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.core.incoming import read_json
 from closedrooms.coverage.config import CoverageConfig
-from closedrooms.coverage.tour import CoverageTour
+from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.experiments.dataset.checksums import digest
-from closedrooms.pipeline.manifest import versions
+from closedrooms.pipeline.reporting.manifest import versions
 
 # The robot starts at the origin of the map.
 START = (0.0, 0.0)
@@ -31,7 +31,7 @@ def plan_tour(grid: OccupancyGrid, doors: Sequence[ClosedDoor] = ()) -> Coverage
     Raises:
         InvalidInputError: A map without free space.
     """
-    from closedrooms.coverage.tour_planner import plan_coverage
+    from closedrooms.coverage.tour.tour_planner import plan_coverage
 
     return plan_coverage(cropped(grid), doors, CoverageConfig(), start=START)
 

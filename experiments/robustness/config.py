@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import tyro
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.options import check_least
+from closedrooms.core.runtime.options import check_least
 from closedrooms.experiments.scheduler_address import check_scheduler
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig

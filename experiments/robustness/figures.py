@@ -9,8 +9,8 @@ import shapely
 from shapely.geometry import Polygon
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.geojson import read_doors, read_rooms
-from closedrooms.core.rosmap import read_map
+from closedrooms.core.files.geojson import read_doors, read_rooms
+from closedrooms.core.files.rosmap import read_map
 from closedrooms.experiments.evaluation.curves import save_figure
 from closedrooms.experiments.robustness.config import Factor
 from closedrooms.experiments.robustness.levels import UNITS, Case

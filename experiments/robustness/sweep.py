@@ -11,19 +11,19 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError, reason
-from closedrooms.core.files import MANIFEST, PROGRAM, only_writer, write_json
-from closedrooms.core.incoming import read_json
+from closedrooms.core.files.incoming import read_json
+from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, only_writer, write_json
 from closedrooms.core.names import file_name
-from closedrooms.core.packages import require
 from closedrooms.core.report import Report
+from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.evaluation.claimed_folder import claim
 from closedrooms.experiments.evaluation.tours import code_digest
 from closedrooms.experiments.robustness.config import FACTORS, RobustnessConfig
 from closedrooms.experiments.robustness.levels import Case, Setting, cases
 from closedrooms.experiments.robustness.onset import Onset
 from closedrooms.experiments.workers import Crew, Lost
-from closedrooms.pipeline.manifest import input_path, resolved, versions
-from closedrooms.pipeline.progress import Progress, Silent
+from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
+from closedrooms.pipeline.reporting.progress import Progress, Silent
 from closedrooms.worlds.library import bundled_names, distinct_names, load_world
 
 Row = dict[str, Any]

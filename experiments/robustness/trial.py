@@ -11,11 +11,11 @@ import shapely
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.geojson import write_doors, write_rooms
+from closedrooms.core.files.geojson import write_doors, write_rooms
+from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.random import stream
 from closedrooms.core.room import Room
-from closedrooms.core.rosmap import write_map
 from closedrooms.experiments.dataset.erase import Eraser
 from closedrooms.experiments.dataset.open_survey import OpenSurvey
 from closedrooms.experiments.evaluation.scores import iou, room_masks
@@ -26,7 +26,7 @@ from closedrooms.experiments.robustness.door_noise import disturbed_doors, phant
 from closedrooms.experiments.robustness.drives import Drive, furnished, map_drive, odometry_noise, record_drive
 from closedrooms.experiments.robustness.levels import Setting, first_setting
 from closedrooms.mapping.trajectory import ate
-from closedrooms.pipeline.scores import room_iou, rooms_seen
+from closedrooms.pipeline.reporting.scores import room_iou, rooms_seen
 from closedrooms.pipeline.survey import Truth, true_building
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction

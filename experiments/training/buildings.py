@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import write_bytes
-from closedrooms.core.incoming import read_bytes, read_json
+from closedrooms.core.files.incoming import read_bytes, read_json
+from closedrooms.core.files.outgoing import write_bytes
 
 Use = Literal["fit", "choose", "report"]
 USES: tuple[Use, ...] = get_args(Use)

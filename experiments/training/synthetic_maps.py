@@ -17,12 +17,12 @@ from scipy.special import ndtri
 
 from closedrooms.core.arrays import BoolArray, CellArray, FloatArray
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.files import write_json
-from closedrooms.core.geojson import write_doors, write_rooms
+from closedrooms.core.files.geojson import write_doors, write_rooms
+from closedrooms.core.files.outgoing import write_json
+from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
-from closedrooms.core.rosmap import write_map
 from closedrooms.worlds.closing import hidden_rooms
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start_pose import start_pose

@@ -8,7 +8,7 @@
 
 from typing import TYPE_CHECKING
 
-from closedrooms.core.lazy import lazy_face
+from closedrooms.core.runtime.lazy import lazy_face
 
 if TYPE_CHECKING:
     from closedrooms.mapping.logs.reader import read_run as read_run

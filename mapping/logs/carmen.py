@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from closedrooms.core.archives import TruncatedError, log_lines
 from closedrooms.core.arrays import FloatArray
+from closedrooms.core.files.archives import TruncatedError, log_lines
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.incoming import is_folder
+from closedrooms.core.files.incoming import is_folder
 from closedrooms.core.remarks import Remark
 from closedrooms.mapping.logs.rosbag import opened_bag
 

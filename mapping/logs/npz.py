@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from closedrooms.core.archives import read_arrays
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import write_bytes
+from closedrooms.core.files.archives import read_arrays
+from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan

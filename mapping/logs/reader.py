@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.incoming import is_file, is_folder, read_head, reading
+from closedrooms.core.files.incoming import is_file, is_folder, read_head, reading
 from closedrooms.core.remarks import Remark
 from closedrooms.mapping.logs.bag_options import BagOptions
 from closedrooms.mapping.logs.odometry import bridge_jumps, jump_remarks

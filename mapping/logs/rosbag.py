@@ -11,7 +11,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.incoming import check_regular, is_file, is_folder, read_head, reading
+from closedrooms.core.files.incoming import check_regular, is_file, is_folder, read_head, reading
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan

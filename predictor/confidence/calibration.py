@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray
-from closedrooms.core.incoming import read_json
+from closedrooms.core.files.incoming import read_json
 
 FILE = Path(__file__).parent / "calibration.json"
 # Whose numbers a method of another package gets.

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from closedrooms.cli.commands import main
+from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.core.rosmap import write_map
 from closedrooms.predictor import methods
 
 Call = Callable[..., int]

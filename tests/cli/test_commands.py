@@ -11,8 +11,8 @@ import pytest
 
 from closedrooms.cli.commands import main
 from closedrooms.cli.table import COMMANDS
+from closedrooms.core.files.rosmap import read_map, write_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.core.rosmap import read_map, write_map
 
 
 def call(*words: str | Path) -> int:

@@ -114,7 +114,7 @@ def test_dataset_and_evaluate_repeat_their_results(tmp_path, call):
 
 @pytest.mark.parametrize("name", [command.name for command in COMMANDS])
 def test_every_configuration_is_read_back_as_it_was_written(name, settings):
-    from closedrooms.pipeline.manifest import resolved
+    from closedrooms.pipeline.reporting.manifest import resolved
 
     words = REQUIRED.get(name, ())
     config = read(*name.split(), *words)

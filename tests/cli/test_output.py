@@ -12,7 +12,7 @@ import pytest
 from closedrooms.cli import commands
 from closedrooms.core.remarks import Remark
 from closedrooms.core.report import Report
-from closedrooms.pipeline import progress
+from closedrooms.pipeline.reporting import progress
 
 
 def predict(corridor, *options):

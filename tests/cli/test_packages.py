@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from closedrooms.cli.table import COMMANDS
-from closedrooms.core import packages
+from closedrooms.core.runtime import packages
 
 
 def absent(monkeypatch, *names):

@@ -17,8 +17,8 @@ from shapely.geometry import box
 
 from closedrooms.cli.commands import main
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.geojson import read_doors, read_rooms
-from closedrooms.core.rosmap import read_map
+from closedrooms.core.files.geojson import read_doors, read_rooms
+from closedrooms.core.files.rosmap import read_map
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.layout import alone, write_metadata, write_sums
 from closedrooms.experiments.dataset.variants import (

@@ -13,10 +13,10 @@ from shapely.geometry import box
 from closedrooms.cli.commands import main
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import ClosedroomsError
-from closedrooms.core.geojson import read_rooms, write_doors, write_rooms
+from closedrooms.core.files.geojson import read_rooms, write_doors, write_rooms
+from closedrooms.core.files.rosmap import read_map, write_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.core.rosmap import read_map, write_map
 from closedrooms.experiments.evaluation.config import EvaluateConfig
 from closedrooms.experiments.evaluation.evaluate import evaluate
 from closedrooms.experiments.evaluation.listing import find_samples

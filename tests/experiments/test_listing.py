@@ -10,10 +10,10 @@ from shapely.geometry import box
 from closedrooms.cli.commands import main
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import ClosedroomsError
-from closedrooms.core.geojson import write_doors, write_rooms
+from closedrooms.core.files.geojson import write_doors, write_rooms
+from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.core.rosmap import write_map
 from closedrooms.experiments.dataset.checksums import checksums, digest
 from closedrooms.experiments.evaluation.listing import find_samples
 from closedrooms.experiments.evaluation.samples import read_sample

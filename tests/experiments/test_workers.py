@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.packages import MissingPackageError
+from closedrooms.core.runtime.packages import MissingPackageError
 from closedrooms.experiments.workers import AHEAD, TRIES, Crew, Lost
 
 DEADLY = "__import__('os')._exit(1)"
@@ -90,7 +90,7 @@ def test_a_missing_package_is_said_once_with_what_brings_it(workers: int) -> Non
 
 
 def test_what_the_work_needs_is_looked_for_before_the_first_job(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("closedrooms.core.packages.find_spec", lambda _name: None)
+    monkeypatch.setattr("closedrooms.core.runtime.packages.find_spec", lambda _name: None)
     crew: Crew[str, object] = Crew(1, needs=("gtsam",), by="a test")
     with pytest.raises(MissingPackageError, match="a test needs gtsam"):
         list(crew.do(DO, ["1 / 0"]))

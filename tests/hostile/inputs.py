@@ -16,9 +16,9 @@ import numpy as np
 import yaml
 from PIL import Image
 
-from closedrooms.core.geojson import read_doors, read_rooms
-from closedrooms.core.rosmap import read_ros_map
-from closedrooms.core.tum import read_trajectory
+from closedrooms.core.files.geojson import read_doors, read_rooms
+from closedrooms.core.files.rosmap import read_ros_map
+from closedrooms.core.files.tum import read_trajectory
 from closedrooms.mapping.logs import read_run
 from closedrooms.worlds.library import load_world
 

@@ -173,8 +173,8 @@ def fuzz(kind: str, folder: Path, examples: int, number: int) -> None:
 
 
 def test_a_defect_behind_a_broken_file_is_seen() -> None:
-    from closedrooms.core.geojson import read_doors
-    from closedrooms.core.incoming import reading
+    from closedrooms.core.files.geojson import read_doors
+    from closedrooms.core.files.incoming import reading
 
     def broken() -> None:
         with reading("a.geojson", "doors"):

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.coverage.config import CoverageConfig, GraphConfig
-from closedrooms.coverage.line_of_sight import is_clear
-from closedrooms.coverage.tour_planner import plan_coverage
+from closedrooms.coverage.graph.line_of_sight import is_clear
+from closedrooms.coverage.tour.tour_planner import plan_coverage
 from closedrooms.navigation.remaining_tour import RemainingTour, open_tour
 
 FRAME = GridFrame(0.05, 0.0, 0.0, 170, 300)

@@ -17,7 +17,7 @@ from closedrooms.core.robot import RobotConfig
 from closedrooms.core.room import Room
 from closedrooms.core.scan import LaserScan
 from closedrooms.coverage.config import CoverageConfig
-from closedrooms.coverage.tour_planner import plan_coverage
+from closedrooms.coverage.tour.tour_planner import plan_coverage
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import NavigationConfig

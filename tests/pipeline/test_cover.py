@@ -5,8 +5,8 @@ import pytest
 import yaml
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
-from closedrooms.core.rosmap import write_map
 from closedrooms.pipeline.config import CoverConfig
 from closedrooms.pipeline.cover import cover_map
 

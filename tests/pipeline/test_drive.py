@@ -6,15 +6,15 @@ import pytest
 
 from closedrooms.core.random import stream
 from closedrooms.coverage.config import CoverageConfig
-from closedrooms.coverage.tour_planner import plan_coverage
+from closedrooms.coverage.tour.tour_planner import plan_coverage
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.tour_follower import TourPlan
 from closedrooms.pipeline.drive import DriveSettings, drive_tour
-from closedrooms.pipeline.drive_report import drive_metrics
-from closedrooms.pipeline.progress import Silent
-from closedrooms.pipeline.run_log import RunLog
+from closedrooms.pipeline.reporting.drive_report import drive_metrics
+from closedrooms.pipeline.reporting.progress import Silent
+from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.pipeline.survey import survey_building, true_building
 from closedrooms.predictor.methods import predict
 from closedrooms.sim.config import SimConfig

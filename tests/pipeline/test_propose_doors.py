@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from closedrooms.cli.commands import main
-from closedrooms.core.geojson import read_doors
+from closedrooms.core.files.geojson import read_doors
+from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.core.rosmap import write_map
 
 
 @pytest.fixture

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from closedrooms.cli.commands import main
-from closedrooms.core.geojson import read_doors, read_features, read_rooms
-from closedrooms.core.rosmap import read_map
-from closedrooms.core.tum import read_trajectory
+from closedrooms.core.files.geojson import read_doors, read_features, read_rooms
+from closedrooms.core.files.rosmap import read_map
+from closedrooms.core.files.tum import read_trajectory
 from closedrooms.mapping.logs import read_run
 from closedrooms.pipeline.config import RunConfig
 from closedrooms.pipeline.run import choose_closed

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files.rosmap import read_ros_map
 from closedrooms.core.report import Report
-from closedrooms.core.rosmap import read_ros_map
 from closedrooms.pipeline import runs
 from closedrooms.pipeline.config import MapConfig, RunConfig
 from closedrooms.pipeline.map import map_log
-from closedrooms.pipeline.progress import Silent
+from closedrooms.pipeline.reporting.progress import Silent
 from closedrooms.pipeline.runs import plan_runs, run_all
 from closedrooms.visualization.rerun.live import HOST, open_viewer
 

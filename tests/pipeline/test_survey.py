@@ -9,8 +9,8 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.pipeline.progress import Silent
-from closedrooms.pipeline.run_log import RunLog
+from closedrooms.pipeline.reporting.progress import Silent
+from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.pipeline.survey import Survey, survey_building
 from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.simulation import Simulation

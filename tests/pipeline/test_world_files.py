@@ -4,7 +4,7 @@ import pytest
 from PIL import Image
 
 from closedrooms.core.errors import InvalidInputError, OutputError
-from closedrooms.core.rosmap import read_map
+from closedrooms.core.files.rosmap import read_map
 from closedrooms.pipeline.world_files import (
     convert_world,
     describe_world,

@@ -11,9 +11,9 @@ from shapely import affinity
 import closedrooms.predictor.paper.wall_lines as structure_module
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.geojson import read_doors
+from closedrooms.core.files.geojson import read_doors
+from closedrooms.core.files.rosmap import read_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.core.rosmap import read_map
 from closedrooms.predictor.config import LinesConfig, PaperConfig, RoseConfig
 from closedrooms.predictor.methods import METHODS, predict
 from closedrooms.predictor.paper.segments import find_segments

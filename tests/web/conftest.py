@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
-from closedrooms.core.rosmap import write_map
 
 # Middles of the three closed doors of the map, on their leaves [m]: two below the corridor, one above.
 DOORS = ((3.0, -0.125), (8.0, -0.125), (13.0, 2.125))

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.geojson import read_doors, write_doors
+from closedrooms.core.files.geojson import read_doors, write_doors
 from closedrooms.predictor.config import BestConfig
 from closedrooms.web.document import MOST_STEPS, Document, History, as_saved
 

@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 
 from closedrooms.cli.commands import main
-from closedrooms.core.geojson import read_doors
+from closedrooms.core.files.geojson import read_doors
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
 MISSING = [

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from closedrooms.core.errors import OutputError
-from closedrooms.core.geojson import read_doors, read_rooms
+from closedrooms.core.files.geojson import read_doors, read_rooms
 from closedrooms.core.pose import Pose2
 from closedrooms.pipeline.config import PredictConfig
 from closedrooms.pipeline.predict import predict_map

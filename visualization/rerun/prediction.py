@@ -17,7 +17,7 @@ from closedrooms.visualization.rerun import drawables
 from closedrooms.visualization.rerun.stream import RecordingStream, Stage
 
 if TYPE_CHECKING:
-    from closedrooms.coverage.tour import CoverageTour
+    from closedrooms.coverage.tour.coverage_tour import CoverageTour
     from closedrooms.predictor.prediction import PredictionTrace
 
 LINE_COLOURS: dict[str, Colour] = {"wall": (0, 114, 178), "border": (110, 110, 120), "split": (213, 94, 0)}

@@ -26,7 +26,7 @@ from closedrooms.visualization.rerun.stream import RecordingStream, Stage
 from closedrooms.visualization.rerun.weighed import draw_weighed, room_name
 
 if TYPE_CHECKING:
-    from closedrooms.coverage.tour import CoverageTour
+    from closedrooms.coverage.tour.coverage_tour import CoverageTour
     from closedrooms.predictor.prediction import Prediction
     from closedrooms.visualization.rerun.building import RecordedBuilding
     from closedrooms.worlds.plan import FloorPlan

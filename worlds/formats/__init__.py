@@ -6,7 +6,7 @@
 
 from typing import TYPE_CHECKING
 
-from closedrooms.core.lazy import lazy_face
+from closedrooms.core.runtime.lazy import lazy_face
 
 if TYPE_CHECKING:
     from closedrooms.worlds.formats.houseexpo import read_houseexpo as read_houseexpo

@@ -10,7 +10,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.incoming import read_json
+from closedrooms.core.files.incoming import read_json
 from closedrooms.core.numbers import FARTHEST
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.door_hinges import hung

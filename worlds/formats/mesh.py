@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import shapely
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import write_bytes
+from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.names import xml_text
 from closedrooms.worlds.boxes import Leaf, door_leaves
 from closedrooms.worlds.door_hinges import without_entrances

@@ -9,8 +9,8 @@ from shapely.geometry import Polygon
 
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import write_bytes
-from closedrooms.core.incoming import read_json
+from closedrooms.core.files.incoming import read_json
+from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.names import is_name, is_path
 from closedrooms.core.numbers import is_number, repr_of
 from closedrooms.core.remarks import Remark

@@ -12,9 +12,9 @@ from shapely.geometry import LineString, Polygon
 
 from closedrooms.core.door import Point
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files.yaml_text import parse_yaml
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
-from closedrooms.core.yaml_text import parse_yaml
 from closedrooms.worlds.formats.hallways import Hallway, JoinedRooms, extend_into_rooms
 from closedrooms.worlds.formats.portals import plan_of_portals
 from closedrooms.worlds.formats.settlement import Source, settle

@@ -15,8 +15,8 @@ from shapely.strtree import STRtree
 
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files.yaml_text import parse_yaml
 from closedrooms.core.remarks import Remark
-from closedrooms.core.yaml_text import parse_yaml
 from closedrooms.worlds.door_hinges import hung
 from closedrooms.worlds.formats.settlement import Source, settle
 from closedrooms.worlds.geometry import areal

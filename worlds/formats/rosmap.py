@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.geojson import read_doors
+from closedrooms.core.files.geojson import read_doors
+from closedrooms.core.files.incoming import is_file
+from closedrooms.core.files.rosmap import RosMap, read_bare_picture, read_ros_map
 from closedrooms.core.grid import UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.core.incoming import is_file
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
-from closedrooms.core.rosmap import RosMap, read_bare_picture, read_ros_map
 from closedrooms.worlds.door_hinges import hung
 from closedrooms.worlds.formats.raster_rooms import find_rooms_and_doors, mark_gaps
 from closedrooms.worlds.formats.raster_walls import trace_walls

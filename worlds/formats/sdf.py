@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from closedrooms.core.files import write_bytes
+from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.names import xml_text
 from closedrooms.worlds.boxes import Box, Leaf, door_leaves, wall_boxes
 from closedrooms.worlds.door_hinges import without_entrances

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files import write_bytes
+from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.grid import GridFrame
 from closedrooms.core.names import shown, stage_text
 from closedrooms.core.pose import Pose2

@@ -5,7 +5,7 @@ from typing import Any
 from xml.etree.ElementTree import ParseError
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.incoming import MAX_DEPTH, read_text
+from closedrooms.core.files.incoming import MAX_DEPTH, read_text
 
 MAX_BYTES = 100_000_000
 

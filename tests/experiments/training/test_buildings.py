@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.arrays import BoolArray
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.rosmap import read_map
+from closedrooms.core.files.rosmap import read_map
 from closedrooms.experiments.training.buildings import COLUMNS, LEDGER, USES, note_report, read_groups, use_of
 from closedrooms.worlds.library import bundled_names, read_world
 

@@ -3,8 +3,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from closedrooms.core.files.rosmap import read_map
 from closedrooms.core.random import stream
-from closedrooms.core.rosmap import read_map
 from closedrooms.core.shapes import cells_inside
 from closedrooms.experiments.evaluation.listing import find_samples
 from closedrooms.experiments.evaluation.samples import read_sample

@@ -9,7 +9,7 @@ import shapely
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.geojson import write_doors
+from closedrooms.core.files.geojson import write_doors
 from closedrooms.pipeline.world_files import write_ros_map
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.formats.houseexpo import read_houseexpo

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from closedrooms.core.arrays import BoolArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.geojson import write_doors
+from closedrooms.core.files.geojson import write_doors
+from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
-from closedrooms.core.rosmap import write_map
 from closedrooms.sim.building import building_solids
 from closedrooms.sim.config import RobotConfig
 from closedrooms.sim.contacts import Obstacles, edges_of

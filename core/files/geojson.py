@@ -1,0 +1,359 @@
+"""Doors, rooms and other features in the map frame as GeoJSON (metres, not degrees)."""
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, MultiLineString, MultiPoint, MultiPolygon, Point, Polygon, mapping, shape
+from shapely.geometry.base import BaseGeometry
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files.incoming import read_json, reading
+from closedrooms.core.files.outgoing import write_bytes
+from closedrooms.core.names import is_name, shown
+from closedrooms.core.numbers import FARTHEST, MAX_DOORS, MAX_ROOMS, WIDEST, check_count, is_number, repr_of
+from closedrooms.core.remarks import Remark
+from closedrooms.core.room import Alternative, Room
+
+Feature = tuple[BaseGeometry, dict[str, Any]]
+MAX_FEATURES = 1_000_000
+# Other shapes of one room that are read; three are written.
+MAX_ALTERNATIVES = 100
+# How deep the lists of coordinates of each geometry are, above the positions.
+LISTS = {"Point": 0, "LineString": 1, "MultiPoint": 1, "Polygon": 2, "MultiLineString": 2, "MultiPolygon": 3}
+
+
+def write_features(path: Path, features: Iterable[Feature]) -> None:
+    """Write geometries [m, map frame] with their properties, a line each, coordinates rounded to 0.1 mm.
+
+    Raises:
+        OutputError: The folder cannot be written.
+    """
+    lines = [
+        json.dumps(
+            {"type": "Feature", "properties": properties, "geometry": mapping(shapely.transform(geometry, _rounded))},
+            allow_nan=False,
+        )
+        for geometry, properties in features
+    ]
+    head = '{"type": "FeatureCollection", "frame": "map", "units": "m", "features": ['
+    write_bytes(path, ("\n".join([head, ",\n".join(lines), "]}"]) + "\n").encode())
+
+
+def _rounded(coordinates: FloatArray) -> FloatArray:
+    # Beyond 1e11 a float holds no tenth of a millimetre, and rounding would overflow in the end.
+    return np.where(np.abs(coordinates) < 1e11, np.round(np.clip(coordinates, -1e11, 1e11), 4), coordinates) + 0.0
+
+
+def read_features(
+    path: Path, *, what: str = "a GeoJSON FeatureCollection", remarks: list[Remark] | None = None
+) -> list[Feature]:
+    """Read geometries and properties of an untrusted file, as we, QGIS or geopandas write it.
+
+    A bare Feature or geometry counts as a collection of one. The ``id`` of a Feature stands in its properties when
+    these have none. Features without a geometry (``null``) are skipped.
+
+    Args:
+        path: The file.
+        what: What it should be, for the message.
+        remarks: Told what was skipped.
+
+    Raises:
+        InvalidInputError: No GeoJSON, a feature without a valid geometry (named by its number), units other than
+            metres, coordinates that are not finite or too far away, too many features.
+    """
+    data = read_json(path, what=what)
+    features = _features(data)
+    if features is None:
+        kind = data.get("type") if isinstance(data, dict) else type(data).__name__
+        raise InvalidInputError(f"no FeatureCollection but {repr_of(kind)}", expected=what, where=path)
+    if data.get("units", "m") != "m":
+        raise InvalidInputError(f"units {repr_of(data['units'])}", expected="metres in the map frame ('m')", where=path)
+    check_count(len(features), MAX_FEATURES, "features", path)
+    null = sum(isinstance(f, dict) and f.get("geometry", f) is None for f in features)
+    if null == len(features) > 0:
+        raise InvalidInputError(f"{null} features without a geometry (null)", expected=what, where=path)
+    if null and remarks is not None:
+        why = "they have no geometry (null)" if null > 1 else "it has no geometry (null)"
+        remarks.append(Remark(action="dropped", what="features" if null > 1 else "feature", why=why, count=null))
+    with reading(path, what):
+        return [
+            _read_feature(number, feature, path)
+            for number, feature in enumerate(features)
+            if not (isinstance(feature, dict) and feature.get("geometry", feature) is None)
+        ]
+
+
+def _features(data: Any) -> list[Any] | None:
+    """The features that parsed GeoJSON holds, ``None`` when it is none."""
+    kind = data.get("type") if isinstance(data, dict) else None
+    if kind == "FeatureCollection" and isinstance(data.get("features"), list):
+        return list(data["features"])
+    if kind == "Feature":
+        return [data]
+    if isinstance(kind, str) and kind in LISTS:
+        return [{"type": "Feature", "properties": {}, "geometry": data}]
+    return None
+
+
+def _read_feature(number: int, feature: Any, path: Path) -> Feature:
+    try:
+        geometry = feature["geometry"]
+        _check_positions(geometry["coordinates"], LISTS[geometry["type"]])
+        made = shape(geometry)
+        properties = feature.get("properties") or {}
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, shapely.errors.ShapelyError) as error:
+        raise InvalidInputError(
+            f"feature {number} has no readable geometry",
+            expected=f"GeoJSON, finite metres up to {FARTHEST:g}",
+            where=path,
+        ) from error
+    if not isinstance(properties, dict):
+        raise InvalidInputError(
+            f"feature {number} with properties {repr_of(properties)}", expected="names and values", where=path
+        )
+    if made.is_empty:
+        raise InvalidInputError(f"feature {number} is empty", expected="a geometry in metres", where=path)
+    if properties.get("id") is None and feature.get("id") is not None:
+        properties = {**properties, "id": feature["id"]}
+    return made, properties
+
+
+def _check_positions(value: Any, depth: int) -> None:
+    """Make sure that coordinates are lists as deep as their geometry wants, and numbers at the bottom.
+
+    Raises:
+        ValueError: They are not: shapely would take some of them for something else.
+    """
+    if not isinstance(value, list):
+        raise ValueError("no list")
+    if depth > 0:
+        for part in value:
+            _check_positions(part, depth - 1)
+    elif value and not (2 <= len(value) <= 4 and all(is_number(v) and -FARTHEST <= v <= FARTHEST for v in value)):
+        raise ValueError("no position")
+
+
+def write_doors(path: Path, doors: Sequence[ClosedDoor]) -> None:
+    """Write closed doors: a LineString from jamb to jamb where the segment is known, else a Point."""
+
+    def feature(door: ClosedDoor) -> Feature:
+        geometry = Point(door.midpoint) if door.segment is None else LineString(door.segment)
+        properties: dict[str, Any] = {"id": door.id, "state": door.state}
+        if door.width is not None:
+            properties["width"] = round(door.width, 4)
+        return geometry, properties
+
+    write_features(path, map(feature, doors))
+
+
+def read_doors(path: Path, *, remarks: list[Remark] | None = None) -> list[ClosedDoor]:
+    """Read closed doors given as Points or LineStrings, or their Multi forms.
+
+    One without ``id`` is numbered ``d00``, ``d01``, ... The parts of a Multi geometry are doors of their own. Doors
+    whose ``state`` says ``open``, in any case, are left out.
+
+    Args:
+        path: The file.
+        remarks: Told what was left out or named here.
+
+    Raises:
+        InvalidInputError: Another geometry, an id that is no short text or number, two doors of one id, a width that
+            is no positive number or wider than any door, more than ``MAX_DOORS`` doors.
+    """
+    what = "a GeoJSON FeatureCollection of closed doors (Points or LineStrings)"
+    told: list[Remark] = []
+    features = [
+        (part, properties) for geometry, properties in read_features(path, what=what, remarks=told)
+        for part in _parts(geometry)
+    ]  # fmt: skip
+    check_count(len(features), MAX_DOORS, "doors", path)
+    names = _door_names(features, path, told)
+    doors, opened = [], []
+    for name, (geometry, properties) in zip(names, features, strict=True):
+        if str(properties.get("state", "closed")).strip().lower() == "open":
+            opened.append(name)
+        else:
+            doors.append(_door(name, geometry, properties, path))
+    if opened:
+        noun = "door" if len(opened) == 1 else "doors"
+        told.append(
+            Remark(action="dropped", what=noun, why="the file says open", names=tuple(opened), count=len(opened))
+        )
+    if remarks is not None:
+        remarks.extend(told)
+    return doors
+
+
+def _parts(geometry: BaseGeometry) -> list[BaseGeometry]:
+    """The parts of a Multi geometry; pieces of one line are one."""
+    if isinstance(geometry, MultiLineString):
+        geometry = shapely.line_merge(geometry)
+    return list(shapely.get_parts(geometry)) if isinstance(geometry, MultiLineString | MultiPoint) else [geometry]
+
+
+def _door_names(features: Sequence[Feature], path: Path, remarks: list[Remark]) -> list[str]:
+    """Names of doors: as given, numbered where none is given or several parts share one."""
+    given = [_given_name(number, properties.get("id"), path) for number, (_, properties) in enumerate(features)]
+    taken = {name for name in given if name is not None}
+    names: list[str] = []
+    parts: list[str] = []
+    named: dict[str, dict[str, Any]] = {}
+    for number, ((_, properties), name) in enumerate(zip(features, given, strict=True)):
+        if name is None:
+            numbers = range(number, number + 2 * len(features) + 1)
+            names.append(next(n for n in map("d{:02d}".format, numbers) if n not in taken))
+        elif name in named:
+            # Parts of one feature share its properties.
+            if named[name] is not properties:
+                raise InvalidInputError(f"two doors with the id {name!r}", expected="one door an id", where=path)
+            parts.append(next(n for n in (f"{name}-{k}" for k in range(2, len(features) + 2)) if n not in taken))
+            names.append(parts[-1])
+        else:
+            named[name] = properties
+            names.append(name)
+        taken.add(names[-1])
+    numbered = [name for name, known in zip(names, given, strict=True) if known is None]
+    for made, why in ((numbered, "the file has none, they were numbered"), (parts, "one feature holds several doors")):
+        if made:
+            noun = "id" if len(made) == 1 else "ids"
+            remarks.append(Remark(action="guessed", what=noun, why=why, names=tuple(made), count=len(made)))
+    return names
+
+
+def _given_name(number: int, value: Any, path: Path) -> str | None:
+    if value is None or value == "":
+        return None
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)  # a column of whole numbers with a gap in it is one of floats to geopandas
+    if isinstance(value, bool) or not isinstance(value, str | int | float) or not is_name(str(value)):
+        raise InvalidInputError(
+            f"feature {number} with the id {repr_of(value)}", expected="a short text or a number", where=path
+        )
+    return str(value)
+
+
+def _door(name: str, geometry: BaseGeometry, properties: dict[str, Any], path: Path) -> ClosedDoor:
+    width = properties.get("width")
+    if width is not None and not (is_number(width) and 0 < width <= WIDEST):
+        raise InvalidInputError(
+            f"door {name!r} of width {repr_of(width)}", expected=f"metres above 0, at most {WIDEST:g}", where=path
+        )
+    state = shown(properties.get("state") or "closed", longest=60)
+    if isinstance(geometry, Point):
+        return ClosedDoor(name, (geometry.x, geometry.y), None, width, state)
+    if isinstance(geometry, LineString):
+        (x0, y0), (x1, y1) = geometry.coords[0][:2], geometry.coords[-1][:2]
+        length = math.hypot(x1 - x0, y1 - y0)
+        midpoint = (x0 / 2 + x1 / 2, y0 / 2 + y1 / 2)
+        if length > WIDEST:
+            raise InvalidInputError(f"door {name!r} of {length:.6g} m", expected=f"at most {WIDEST:g} m", where=path)
+        if length == 0.0:
+            return ClosedDoor(name, midpoint, None, width, state)
+        return ClosedDoor(name, midpoint, ((x0, y0), (x1, y1)), width or length, state)
+    raise InvalidInputError(f"door {name!r} is a {geometry.geom_type}", expected="a Point or a LineString", where=path)
+
+
+def write_rooms(path: Path, rooms: Sequence[Room]) -> None:
+    """Write predicted rooms (``kind``, ``score``, ``bounded``; ``confidence`` and ``alternatives``), or true ones."""
+
+    def feature(room: Room) -> Feature:
+        properties: dict[str, Any] = {"doors": list(room.doors)}
+        if room.kind is not None:
+            score = None if room.score is None else round(room.score, 6)
+            properties |= {"kind": room.kind, "score": score, "bounded": room.bounded}
+        if room.confidence is not None:
+            properties["confidence"] = round(room.confidence, 4)
+            properties["alternatives"] = [
+                {
+                    "probability": round(other.probability, 4),
+                    "geometry": mapping(shapely.transform(other.polygon, _rounded)),
+                }
+                for other in room.alternatives
+            ]
+        return room.polygon, properties
+
+    write_features(path, map(feature, rooms))
+
+
+def read_rooms(path: Path, *, remarks: list[Remark] | None = None) -> list[Room]:
+    """Read rooms; invalid polygons are repaired by ``shapely.make_valid``.
+
+    Args:
+        path: The file.
+        remarks: Told what was left out or repaired.
+
+    Raises:
+        InvalidInputError: Another geometry than Polygon or MultiPolygon, ``doors`` that is no list of ids, a ``score``
+            or ``kind`` of another type, a ``confidence`` or probability that is none, ``alternatives`` that are no list
+            of polygons, more than ``MAX_ROOMS`` rooms.
+    """
+    features = read_features(path, what="a GeoJSON FeatureCollection of rooms (Polygons)", remarks=remarks)
+    check_count(len(features), MAX_ROOMS, "rooms", path)
+    rooms = [_room(number, geometry, properties, path) for number, (geometry, properties) in enumerate(features)]
+    invalid = sum(not geometry.is_valid for geometry, _ in features)
+    if invalid and remarks is not None:
+        noun = "room" if invalid == 1 else "rooms"
+        remarks.append(Remark(action="repaired", what=noun, why="the outline crosses itself", count=invalid))
+    return rooms
+
+
+def _room(number: int, read: BaseGeometry, properties: dict[str, Any], path: Path) -> Room:
+    doors, kind, score = properties.get("doors", []), properties.get("kind"), properties.get("score")
+    if not isinstance(doors, list) or not all(isinstance(d, str | int) and is_name(str(d)) for d in doors):
+        raise InvalidInputError(f"room {number} with doors {repr_of(doors)}", expected="a list of ids", where=path)
+    if kind is not None and not isinstance(kind, str):
+        raise InvalidInputError(f"room {number} of kind {repr_of(kind)}", expected="a text", where=path)
+    if score is not None and not is_number(score):
+        raise InvalidInputError(f"room {number} of score {repr_of(score)}", expected="a number", where=path)
+    geometry = _area(number, read, path)
+    known = kind if kind in {"independent", "dependent", "border"} else None
+    confidence = _share(number, properties.get("confidence"), "confidence", path)
+    others = _alternatives(number, properties.get("alternatives") or [], path)
+    bounded = bool(properties.get("bounded"))
+    return Room(geometry, tuple(map(str, doors)), known, score, bounded, confidence, others)  # type: ignore[arg-type]
+
+
+def _area(number: int, read: BaseGeometry, path: Path) -> Polygon | MultiPolygon:
+    geometry = read if read.is_valid else _repaired(read)
+    if not isinstance(geometry, Polygon | MultiPolygon) or geometry.is_empty:
+        raise InvalidInputError(f"room {number} is a {geometry.geom_type}", expected="a Polygon", where=path)
+    return geometry
+
+
+def _share(number: int, value: Any, name: str, path: Path) -> float | None:
+    if value is not None and not (is_number(value) and 0.0 <= value <= 1.0):
+        raise InvalidInputError(f"room {number} of {name} {repr_of(value)}", expected="0 to 1", where=path)
+    return value
+
+
+def _alternatives(number: int, given: Any, path: Path) -> tuple[Alternative, ...]:
+    """The other shapes that a room may have.
+
+    Raises:
+        InvalidInputError: Something else.
+    """
+    wanted = f"a list of at most {MAX_ALTERNATIVES} probabilities and geometries"
+    if not isinstance(given, list) or len(given) > MAX_ALTERNATIVES or not all(isinstance(g, dict) for g in given):
+        raise InvalidInputError(f"room {number} with alternatives {repr_of(given)}", expected=wanted, where=path)
+    found = []
+    for other in given:
+        read, _ = _read_feature(number, {"geometry": other.get("geometry")}, path)
+        probability = _share(number, other.get("probability"), "probability", path)
+        if probability is None:
+            raise InvalidInputError(f"room {number} with an alternative of no probability", expected=wanted, where=path)
+        found.append(Alternative(_area(number, read, path), probability))
+    return tuple(found)
+
+
+def _repaired(geometry: BaseGeometry) -> BaseGeometry:
+    """The areas of an invalid polygon made valid."""
+    valid = shapely.get_parts(shapely.make_valid(geometry))
+    parts = [p for g in valid for p in shapely.get_parts(g) if isinstance(p, Polygon)]
+    return parts[0] if len(parts) == 1 else MultiPolygon(parts)

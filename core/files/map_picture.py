@@ -1,0 +1,132 @@
+"""The picture of a ROS map: where its YAML says it is, and its grey values."""
+
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from closedrooms.core.arrays import BoolArray
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files.incoming import is_file, opened, reading
+from closedrooms.core.names import shown
+
+WHAT = "a PGM or PNG map"
+# 20,000 x 20,000 cells are 1 km x 1 km at 0.05 m; a larger picture is refused before it is decoded.
+MAX_CELLS = 400_000_000
+# Pictures above the first number of cells have at most the second number of cells a byte: PNG shrinks blank paper up to
+# 1000 times (8000 at one bit a pixel), maps of buildings 20 to 300 times.
+UNSUSPICIOUS_CELLS, MAX_CELLS_A_BYTE = 30_000_000, 1000
+FORMATS = ("PNG", "PPM", "BMP", "TIFF", "JPEG", "GIF", "WEBP")
+SCHEME = re.compile(r"(?i)(file|package|model|https?)://")
+
+
+def picture_path(image: str, path: Path, *, allow_outside: bool = False) -> tuple[Path, bool]:
+    """Return the picture that a map's YAML names, in any form that people write.
+
+    Sub-folders, ``~``, ``..``, ``file://``, ``package://`` and backslashes are understood. What the path leads to is
+    opened when it lies in the YAML's folder; otherwise the file of the same name beside the YAML is taken.
+
+    Args:
+        image: The field ``image``.
+        path: The YAML.
+        allow_outside: Also open what lies elsewhere, where there is such a file.
+
+    Returns:
+        The picture, and whether it is another one than the field names.
+
+    Raises:
+        InvalidInputError: It is not there, or lies outside and ``allow_outside`` is not set.
+    """
+    folder = path.parent
+    named = _named(image)
+    inside = folder / named
+    if is_file(inside) and (allow_outside or _lies_in(inside, folder)):
+        return inside, False
+    beside = folder / named.name
+    if named.name and is_file(beside) and _lies_in(beside, folder):
+        return beside, beside != inside
+    if is_file(inside):
+        raise InvalidInputError(
+            f"map image {shown(image, longest=80)!r} lies outside the folder of the YAML",
+            expected="a picture in it, or --allow-outside",
+            where=path,
+        )
+    raise InvalidInputError(
+        f"map image {shown(image, longest=80)!r} is missing", expected="a PGM or PNG beside the YAML", where=path
+    )
+
+
+def _named(image: str) -> Path:
+    """The path that ``image`` means; of a package only the part below it can be known."""
+    text = image.strip().replace("\\", "/")
+    text = re.sub("/{2,}", "/", text) if not SCHEME.match(text) else text
+    scheme = SCHEME.match(text)
+    if scheme:
+        rest = text[scheme.end() :]
+        _, _, below = rest.partition("/")
+        # file://host/path and file:///path; the first word of the others is a package or host.
+        text = f"/{below}" if scheme[1].lower() == "file" else below
+    elif re.match("[A-Za-z]:/", text):
+        text = text[2:]
+    named = Path(text)
+    try:
+        return named.expanduser()
+    except RuntimeError:  # ~somebody who is not known here
+        return named
+
+
+def _lies_in(path: Path, folder: Path) -> bool:
+    """Whether a file lies in a folder or below it, symbolic links followed."""
+    try:
+        return path.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):
+        return False
+
+
+def read_picture(path: Path) -> tuple[npt.NDArray[np.uint8], BoolArray | None]:
+    """Grey values and, where some may be transparent, which pixels are not; the size is checked before decoding.
+
+    Returns:
+        Grey values, shape (rows, cols), the first row at the top, and opaque pixels of the same shape or ``None``.
+
+    Raises:
+        InvalidInputError: Missing, no picture, broken, or too large.
+    """
+    from PIL import Image
+
+    # Our own bound comes before decoding, and its message names the file.
+    Image.MAX_IMAGE_PIXELS = None
+    with opened(path, WHAT) as file, reading(path, WHAT):
+        try:
+            # The other formats that Pillow knows start other programs (EPS) or hold no maps.
+            with Image.open(file, formats=FORMATS) as image:
+                _check_size(image.size, os.fstat(file.fileno()).st_size, path)
+                return _greys(image)
+        except (OSError, SyntaxError, EOFError) as error:
+            raise InvalidInputError("a picture that cannot be read", expected=WHAT, where=path) from error
+
+
+def _check_size(size: tuple[int, int], file_bytes: int, path: Path) -> None:
+    width, height = size
+    most = min(MAX_CELLS, max(file_bytes * MAX_CELLS_A_BYTE, UNSUSPICIOUS_CELLS))
+    if width * height > most:
+        raise InvalidInputError(
+            f"a picture of {width} x {height}", expected=f"at most {most} cells in {file_bytes} bytes", where=path
+        )
+
+
+def _greys(image: Any) -> tuple[npt.NDArray[np.uint8], BoolArray | None]:
+    if "A" in image.getbands() or "transparency" in image.info:
+        rgba = np.asarray(image.convert("RGBA"))
+        return np.asarray(image.convert("L")), rgba[..., 3] > 0
+    if image.mode in {"I", "I;16", "I;16B", "I;16L"}:
+        return _sixteen_bits(image), None
+    return np.asarray(image if image.mode == "L" else image.convert("L")), None
+
+
+def _sixteen_bits(image: Any) -> npt.NDArray[np.uint8]:
+    values = np.asarray(image).astype(np.int64)
+    return (values >> 8 if values.max() > 255 else values).clip(0, 255).astype(np.uint8)

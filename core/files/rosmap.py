@@ -1,0 +1,303 @@
+"""Maps as ROS map_server keeps them: a YAML beside a picture."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from closedrooms.core.arrays import CellArray, handed_over
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files.map_picture import picture_path, read_picture
+from closedrooms.core.files.outgoing import write_bytes
+from closedrooms.core.files.yaml_text import parse_yaml
+from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid, is_free, is_occupied
+from closedrooms.core.numbers import COARSEST, FARTHEST, FINEST, bounded, repr_of
+from closedrooms.core.pose import IDENTITY, Pose2, wrap_angle
+from closedrooms.core.remarks import Remark
+from closedrooms.core.room import Room
+
+# 205 is p = 0.196078: a free_thresh of 0.196 keeps it unknown, 0.25 would reload it as free.
+FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
+PIXEL_FREE, PIXEL_UNKNOWN, PIXEL_OCCUPIED = 254, 205, 0
+WHAT = "a ROS map (image, resolution, origin)"
+MAX_YAML = 1_000_000
+"""Longest description of a map that is read [bytes]."""
+SAME_YAW = 1e-9
+"""A turn below this is none [rad]: 1 km away it moves a point by a micrometre."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RosMap:
+    """A map that somebody else made.
+
+    The grid keeps the axes of its picture. Everything that the program works out lies in the frame of the grid, and is
+    brought to the map frame where it is written.
+
+    Attributes:
+        grid: The cells.
+        map_T_grid: Where the grid's frame lies in the map frame; the identity where the map's origin has no yaw, the
+            grid's origin is then the map's.
+        remarks: What was repaired or guessed.
+    """
+
+    grid: OccupancyGrid
+    map_T_grid: Pose2 = IDENTITY
+    remarks: tuple[Remark, ...] = ()
+
+    @property
+    def turned(self) -> bool:
+        """Whether grid and map have different axes."""
+        return self.map_T_grid != IDENTITY
+
+    def doors_on_grid(self, doors: Iterable[ClosedDoor]) -> list[ClosedDoor]:
+        """Doors of the map frame in the frame of the grid."""
+        grid_T_map = self.map_T_grid.inverse()
+        return [door.moved(grid_T_map) for door in doors] if self.turned else list(doors)
+
+    def doors_on_map(self, doors: Iterable[ClosedDoor]) -> list[ClosedDoor]:
+        """Doors of the grid's frame in the map frame."""
+        return [door.moved(self.map_T_grid) for door in doors] if self.turned else list(doors)
+
+    def rooms_on_map(self, rooms: Iterable[Room]) -> list[Room]:
+        """Rooms of the grid's frame in the map frame."""
+        if not self.turned:
+            return list(rooms)
+        return [
+            replace(
+                room,
+                polygon=self.on_map(room.polygon),
+                alternatives=tuple(replace(o, polygon=self.on_map(o.polygon)) for o in room.alternatives),
+            )
+            for room in rooms
+        ]
+
+    def on_map(self, geometry: BaseGeometry) -> Any:
+        """Return a geometry of the grid's frame in the map frame."""
+        return shapely.transform(geometry, self.map_T_grid.transform) if self.turned else geometry
+
+
+def write_map(stem: Path, grid: OccupancyGrid, *, map_T_grid: Pose2 = IDENTITY) -> None:
+    """Write ``<stem>.png`` and ``<stem>.yaml``, trinary (0.65 / 0.196), each whole or not at all.
+
+    Args:
+        stem: Path without suffix, e.g. ``out/map``.
+        grid: Written with row 0 at the bottom of the picture.
+        map_T_grid: Where the grid's frame lies in the map frame; its angle is the yaw of the map's origin.
+
+    Raises:
+        OutputError: The folder cannot be written.
+    """
+    values = np.arange(256).astype(np.uint8).view(np.int8)  # every cell value, at its place as a byte without sign
+    shades = np.full(256, PIXEL_UNKNOWN, dtype=np.uint8)
+    shades[is_free(values)] = PIXEL_FREE
+    shades[is_occupied(values)] = PIXEL_OCCUPIED
+    _write(stem, grid.frame, shades[grid.cells[::-1].view(np.uint8)], "trinary", map_T_grid)
+
+
+def write_raw_map(stem: Path, grid: OccupancyGrid, *, map_T_grid: Pose2 = IDENTITY) -> None:
+    """Write ``<stem>.png`` and ``<stem>.yaml`` in the mode ``raw``: values 0 to 100 as they are, 255 for -1.
+
+    Args:
+        stem: Path without suffix.
+        grid: Written with row 0 at the bottom of the picture.
+        map_T_grid: Where the grid's frame lies in the map frame.
+
+    Raises:
+        OutputError: The folder cannot be written.
+    """
+    _write(stem, grid.frame, grid.cells[::-1].view(np.uint8), "raw", map_T_grid)
+
+
+def _write(stem: Path, frame: GridFrame, pixels: npt.NDArray[np.uint8], mode: str, map_T_grid: Pose2) -> None:
+    import cv2
+
+    picture = stem.with_name(stem.name + ".png")
+    write_bytes(picture, cv2.imencode(".png", pixels)[1].tobytes())
+    x, y, yaw = frame.origin_x, frame.origin_y, 0.0
+    if map_T_grid != IDENTITY:
+        x, y, yaw = (map_T_grid @ Pose2(x, y)).as_tuple()
+    text = (
+        f"image: {picture.name}\n"
+        f"mode: {mode}\n"
+        f"resolution: {round(frame.resolution, 9)!r}\n"
+        f"origin: [{round(x, 9)!r}, {round(y, 9)!r}, {round(yaw, 12)!r}]\n"
+        "negate: 0\n"
+        f"occupied_thresh: {OCCUPIED_THRESH}\n"
+        f"free_thresh: {FREE_THRESH}\n"
+    )
+    write_bytes(stem.with_name(stem.name + ".yaml"), text.encode())
+
+
+def read_map(path: Path, *, allow_outside: bool = False) -> OccupancyGrid:
+    """Read a ROS map whose axes are those of the map frame: every map that this program writes of a building.
+
+    Args:
+        path: The YAML file.
+        allow_outside: See :func:`read_ros_map`.
+
+    Returns:
+        The grid in the map frame.
+
+    Raises:
+        InvalidInputError: See :func:`read_ros_map`; a map with a yaw.
+    """
+    read = read_ros_map(path, allow_outside=allow_outside)
+    if read.turned:
+        raise InvalidInputError(f"map origin with yaw {read.map_T_grid.theta:.6g}", expected="yaw 0 here", where=path)
+    return read.grid
+
+
+def read_ros_map(path: Path, *, allow_outside: bool = False) -> RosMap:
+    """Read a ROS map (map_server of ROS 1 and 2): PGM or PNG; trinary, scale or raw; with any yaw.
+
+    In trinary maps, a grey value one off the usual unknown (205, of a negated map 50) still counts as unknown, whatever
+    the thresholds are.
+
+    Args:
+        path: The YAML file.
+        allow_outside: Open ``image:`` outside the YAML's folder too; see
+            :func:`closedrooms.core.files.map_picture.picture_path`.
+
+    Raises:
+        InvalidInputError: A missing or broken file, a number out of bounds, a picture that is too large.
+    """
+    remarks: list[Remark] = []
+    fields = _read_fields(path)
+    resolution = bounded(_number(fields, "resolution"), FINEST, COARSEST, name="map resolution", unit="m", where=path)
+    x, y, yaw = _origin(fields.get("origin"), path, remarks)
+    mode = str(fields.get("mode") or "trinary").strip().lower()
+    if mode not in {"trinary", "scale", "raw"}:
+        raise InvalidInputError(f"map mode {repr_of(mode)}", expected="trinary, scale or raw", where=path)
+    image, other = picture_path(str(fields["image"]), path, allow_outside=allow_outside)
+    if other:
+        why = f"{fields['image']} is not there or outside, the file of its name beside the YAML was read"
+        remarks.append(Remark(action="guessed", what="picture", why=why, names=(image.name,)))
+    table = _raw() if mode == "raw" else _meanings(fields, mode, path)
+    # A turned grid keeps its own axes, with its corner as their origin.
+    corner, map_T_grid = ((x, y), IDENTITY) if yaw == 0.0 else ((0.0, 0.0), Pose2(x, y, yaw))
+    return RosMap(_grid(image, table, resolution, *corner), map_T_grid, tuple(remarks))
+
+
+def read_bare_picture(path: Path, *, resolution: float) -> OccupancyGrid:
+    """Read the picture of a map that has no YAML, with the thresholds that :func:`write_map` uses.
+
+    Args:
+        path: The picture.
+        resolution: Metres a pixel; the lower left corner lies at the origin.
+
+    Raises:
+        InvalidInputError: See :func:`closedrooms.core.files.map_picture.read_picture`.
+    """
+    return _grid(path, _meanings({}, "trinary", path), resolution, 0.0, 0.0)
+
+
+def _grid(picture: Path, table: CellArray, resolution: float, x: float, y: float) -> OccupancyGrid:
+    """The grid that a picture holds when ``table`` gives the cell of each grey value."""
+    pixels, opaque = read_picture(picture)
+    cells: CellArray = table[pixels[::-1]]
+    if opaque is not None:
+        cells[~opaque[::-1]] = UNKNOWN
+    return OccupancyGrid(GridFrame(resolution, x, y, *pixels.shape), handed_over(cells))
+
+
+def _read_fields(path: Path) -> dict[str, Any]:
+    """Every scalar as the text that stands there: map_server's reader (yaml-cpp) has other rules than PyYAML."""
+    # Read by the safe loader first: what it refuses is broken, and was never a map that somebody used.
+    parse_yaml(path, what=WHAT, max_bytes=MAX_YAML)
+    fields = parse_yaml(path, what=WHAT, max_bytes=MAX_YAML, plain=True)
+    if not isinstance(fields.get("image"), str):
+        raise InvalidInputError("a YAML without 'image'", expected=WHAT, where=path)
+    return fields
+
+
+def _as_number(text: object) -> float | None:
+    """A number as yaml-cpp reads it (``5e-2``, ``-5e-05``, ``.5``, ``.nan``, quoted or not), ``None`` for none."""
+    if not isinstance(text, str) or "_" in text:
+        return None
+    word = text.strip().lower()
+    try:
+        return float(word.replace(".", "") if word.lstrip("+-") in {".nan", ".inf"} else word)
+    except ValueError:
+        return None
+
+
+def _number(fields: dict[str, Any], key: str, default: float | None = None) -> Any:
+    """The number that a field holds, else what stands there, for the message."""
+    if key not in fields:
+        return default
+    value = _as_number(fields[key])
+    return fields[key] if value is None else value
+
+
+def _origin(value: Any, path: Path, remarks: list[Remark]) -> tuple[float, float, float]:
+    """``x, y`` [m] and yaw [rad] of the map's lower left corner; a whole turn, and no number, are no yaw."""
+    numbers = [_as_number(v) for v in value] if isinstance(value, list) else []
+    if len(numbers) not in {2, 3} or None in numbers:
+        raise InvalidInputError(
+            f"map origin {repr_of(value)}", expected="[x, y, yaw] in metres and radians", where=path
+        )
+    x, y, yaw = (float(v) for v in (*numbers, 0.0)[:3] if v is not None)
+    for name, coordinate in (("x", x), ("y", y)):
+        bounded(coordinate, -FARTHEST, FARTHEST, name=f"map origin {name}", unit="m", where=path)
+    if math.isnan(yaw):
+        remarks.append(Remark(action="guessed", what="yaw of the map", why="no number in the file, 0 was taken"))
+        return x, y, 0.0
+    yaw = wrap_angle(bounded(yaw, -1e6, 1e6, name="map origin yaw", unit="rad", where=path))
+    return x, y, yaw if abs(yaw) > SAME_YAW else 0.0
+
+
+def _raw() -> CellArray:
+    levels = np.arange(256)
+    return np.where(levels <= OCCUPIED, levels, UNKNOWN).astype(np.int8)
+
+
+def _meanings(fields: dict[str, Any], mode: str, path: Path) -> CellArray:
+    """The cell that each grey value stands for, shape (256,)."""
+    negate = _negate(fields.get("negate", "0"), path)
+    free_below, occupied_above = _thresholds(fields, path)
+    levels = np.arange(256)
+    p = (levels if negate else 255 - levels) / 255.0
+    table = np.full(256, UNKNOWN, dtype=np.int8)
+    if mode == "scale":
+        between = (p - free_below) / max(occupied_above - free_below, 1e-9) * 98.0 + 1.0
+        table = np.clip(np.rint(between), 1, 99).astype(np.int8)
+    table[p > occupied_above] = OCCUPIED
+    table[p < free_below] = FREE
+    if mode == "trinary":
+        # Others write 204 or 206 for unknown, or a free_thresh (0.25) that turns 205 into free.
+        unknown = 255 - PIXEL_UNKNOWN if negate else PIXEL_UNKNOWN
+        table[unknown - 1 : unknown + 2] = UNKNOWN
+    return table
+
+
+def _negate(value: Any, path: Path) -> bool:
+    words = {"0": False, "1": True, "false": False, "true": True, "no": False, "yes": True}
+    negate = words.get(value.strip().lower()) if isinstance(value, str) else None
+    if negate is None:
+        raise InvalidInputError(f"map negate {repr_of(value)}", expected="0 or 1", where=path)
+    return negate
+
+
+def _thresholds(fields: dict[str, Any], path: Path) -> tuple[float, float]:
+    """Below the first a cell is free, above the second occupied; one that is not given stays clear of the other."""
+    given = {
+        key: bounded(_number(fields, key), 0.0, 1.0, name=f"map {key}", where=path)
+        for key in ("free_thresh", "occupied_thresh")
+        if key in fields
+    }
+    occupied_above = given.get("occupied_thresh", max(OCCUPIED_THRESH, given.get("free_thresh", 0.0)))
+    free_below = given.get("free_thresh", min(FREE_THRESH, occupied_above))
+    if free_below > occupied_above:
+        raise InvalidInputError(
+            f"map thresholds free {free_below}, occupied {occupied_above}",
+            expected="0 <= free <= occupied <= 1",
+            where=path,
+        )
+    return free_below, occupied_above

@@ -1,0 +1,127 @@
+"""Tells the recorder about a run while the robot drives: call after every step of the control loop."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.room import Room
+from closedrooms.mapping.mapper import Mapper
+from closedrooms.navigation.control_loop import Step
+from closedrooms.navigation.explorer import Explorer
+from closedrooms.navigation.opened_doors import ReopenedMap
+from closedrooms.navigation.revised_prediction import Revision
+from closedrooms.navigation.tour_follower import TourFollower
+from closedrooms.pipeline.reporting.run_log import RunLog
+from closedrooms.pipeline.reporting.scores import room_iou
+from closedrooms.predictor.revision import Predict
+
+if TYPE_CHECKING:
+    from closedrooms.visualization.rerun.recorder import Recorder
+
+
+# What is known has grown much when it has by this factor.
+GROWN = 1.5
+
+
+class GrowingPrediction:
+    """Predicts anew whenever a closed door is first seen, so that a recording shows the prediction grow.
+
+    With a door known, it also does when what is known has grown by half: else it would stand still for minutes.
+    """
+
+    def __init__(self, recorder: "Recorder", predict: Predict, truth: Sequence[Room]) -> None:
+        """Prepare.
+
+        Args:
+            recorder: Told of every prediction.
+            predict: The method.
+            truth: Rooms behind the closed doors, map frame, which the predictions are held against.
+        """
+        self._recorder, self._predict, self._truth = recorder, predict, truth
+        self._seen: set[str] = set()
+        self._known = 0
+
+    def __call__(self, grid: OccupancyGrid, doors: Sequence[ClosedDoor], stamp: float) -> None:
+        """Predict if there is a door that was not there before, or much that was not known."""
+        new = [door.id for door in doors if door.id not in self._seen]
+        known = int(grid.known.sum())
+        if not doors or not (new or known > GROWN * self._known):
+            return
+        self._seen.update(new)
+        self._known = known
+        prediction = self._predict(grid, doors)
+        iou = room_iou(prediction.rooms, self._truth)
+        iou = {door: iou[door] for door in iou if door in self._seen}
+        self._recorder.growth(grid, doors, prediction, stamp, iou=iou)
+        for door in new:
+            room = next((room for room in prediction.rooms if door in room.doors), None)
+            what = prediction.failures.get(door, "nothing yet") if room is None else f"{room.polygon.area:.1f} m²"
+            self._recorder.note(f"closed door {door} first seen; predicted behind it: {what}", stamp)
+
+
+class ExplorationRecording:
+    """An exploration, step by step."""
+
+    def __init__(
+        self,
+        recorder: "Recorder",
+        log: RunLog,
+        mapper: Mapper,
+        explorer: Explorer,
+        growth: GrowingPrediction | None = None,
+    ) -> None:
+        self._recorder, self._log, self._mapper, self._explorer = recorder, log, mapper, explorer
+        self._growth = growth
+        self._told = 0
+
+    def __call__(self, step: Step) -> None:
+        """Record one step."""
+        recorder, stamp = self._recorder, step.stamp
+        record_step(recorder, self._log, step)
+        if recorder.wants_map(stamp):
+            grid, doors = self._mapper.grid(), self._mapper.doors()
+            recorder.map(grid, stamp)
+            recorder.doors(doors, stamp)
+            if self._growth is not None:
+                self._growth(grid, doors, stamp)
+        if self._explorer.searches != self._told:
+            self._told = self._explorer.searches
+            goal = self._explorer.goal
+            place, path = (None, None) if goal is None else (goal.place, goal.path.points)
+            recorder.frontiers(self._explorer.frontiers, place, path, stamp)
+
+
+class DriveRecording:
+    """A driven tour, step by step."""
+
+    def __init__(self, recorder: "Recorder", log: RunLog, reopened: ReopenedMap, follower: TourFollower) -> None:
+        self._recorder, self._log, self._reopened, self._follower = recorder, log, reopened, follower
+        self._told: int | None = None
+
+    def __call__(self, step: Step) -> None:
+        """Record one step."""
+        recorder, follower, stamp = self._recorder, self._follower, step.stamp
+        record_step(recorder, self._log, step)
+        if follower.is_waiting(stamp):
+            recorder.door_states(self._log.sim.door_states(), stamp)
+        if recorder.wants_map(stamp):
+            recorder.map(self._reopened.grid(), stamp)
+        if len(follower.revisions) != self._told:
+            for revision in follower.revisions[self._told or 0 :]:
+                recorder.note(_said(revision), stamp)
+            self._told = len(follower.revisions)
+            recorder.revision(follower.prediction, follower.path_left(), stamp)
+
+
+def record_step(recorder: "Recorder", log: RunLog, step: Step) -> None:
+    """Record what was sensed, where the robot thinks it is and where it is."""
+    observation = step.observation
+    recorder.scan(observation.scan, observation.odometry, step.map_T_robot, truth=log.map_T_robot)
+
+
+def _said(revision: Revision) -> str:
+    """One line of the log."""
+    looked = f"looked behind {', '.join(revision.doors)}" if revision.doors else "prediction revised"
+    changed = f", other shape behind {', '.join(revision.changed)}" if revision.changed else ""
+    return f"{looked}{changed}{': new tour' if revision.replanned else ''}"

@@ -1,0 +1,216 @@
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from shapely.geometry import MultiPolygon, box
+
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files.geojson import read_doors, read_rooms, write_doors, write_rooms
+from closedrooms.core.pose import Pose2
+from closedrooms.core.remarks import Remark
+from closedrooms.core.room import Alternative, Room
+
+
+def collection(path: Path, *features: dict[str, Any]) -> Path:
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": list(features)}))
+    return path
+
+
+def point(x: Any, y: Any, **properties: Any) -> dict[str, Any]:
+    geometry = {"type": "Point", "coordinates": [x, y]}
+    return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+
+def test_doors_are_read_back_with_segment_or_midpoint(tmp_path: Path) -> None:
+    doors = [
+        ClosedDoor("d00", (1.5, 2.0), ((1.0, 2.0), (2.0, 2.0)), 1.0),
+        ClosedDoor("d07", (-3.25, 4.0)),
+    ]
+    write_doors(tmp_path / "doors.geojson", doors)
+    assert read_doors(tmp_path / "doors.geojson") == doors
+    written = json.loads((tmp_path / "doors.geojson").read_text())
+    assert written["frame"] == "map"
+    assert written["units"] == "m"
+
+
+def test_doors_without_an_id_are_numbered_around_those_that_have_one(tmp_path: Path) -> None:
+    path = collection(tmp_path / "d", point(0, 0), point(1, 0, id="d00"), point(2, 0))
+    assert [door.id for door in read_doors(path)] == ["d01", "d00", "d02"]
+
+
+def test_open_doors_are_left_out(tmp_path: Path) -> None:
+    path = collection(tmp_path / "d", point(0, 0, id="a", state="open"), point(1, 0, id="b", state="closed"))
+    assert [door.id for door in read_doors(path)] == ["b"]
+
+
+def test_rooms_are_read_back(tmp_path: Path) -> None:
+    rooms = [
+        Room(box(0, 0, 2, 3), ("d00",), "border", 1.25, bounded=True),
+        Room(MultiPolygon([box(0, 0, 1, 1), box(5, 5, 6, 6)]), ("d01", "d02"), "dependent", None),
+    ]
+    write_rooms(tmp_path / "rooms.geojson", rooms)
+    again = read_rooms(tmp_path / "rooms.geojson")
+    assert [(r.doors, r.kind, r.score, r.bounded) for r in again] == [
+        (r.doors, r.kind, r.score, r.bounded) for r in rooms
+    ]
+    assert all(a.polygon.equals(b.polygon) for a, b in zip(again, rooms, strict=True))
+
+
+def test_a_bow_tie_is_repaired(tmp_path: Path) -> None:
+    ring = [[0, 0], [2, 2], [2, 0], [0, 2], [0, 0]]
+    feature = {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    (room,) = read_rooms(collection(tmp_path / "r", feature))
+    assert room.polygon.area == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("feature", "message"),
+    [
+        (point(0, float("nan")), "JSON"),
+        (point("a", "b"), "geometry"),
+        (point(10**400, 1), "401 digits"),
+        (point(1e300, 1), "geometry"),
+        ({"type": "Feature", "properties": {}, "geometry": None}, "geometry"),
+        (
+            {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, 1], [0, 0]]]}},
+            "Polygon",
+        ),
+        ({"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": []}}, "empty"),
+        (
+            {"type": "Feature", "geometry": {"type": "GeometryCollection", "geometries": []}},
+            "geometry",
+        ),
+        (point([1], [2]), "geometry"),
+        (point(0, 0, id=True), "id"),
+        (point(0, 0, id="x" * 1001), "id"),
+        (point(0, 0, width=1e9), "width"),
+        (point(0, 0) | {"properties": ["a"]}, "properties"),
+        (point(0, 0, id={"a": 1}), "id"),
+        (point(0, 0, width=-1), "width"),
+        (point(0, 0, width="wide"), "width"),
+        (3, "geometry"),
+    ],
+)
+def test_a_wrong_door_is_one_clear_line(tmp_path: Path, feature: Any, message: str) -> None:
+    path = collection(tmp_path / "d.geojson", feature)
+    with pytest.raises(InvalidInputError, match=message) as error:
+        read_doors(path)
+    assert str(error.value).endswith(str(path))
+
+
+def test_rejects_two_doors_of_one_id_and_other_json(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="two doors"):
+        read_doors(collection(tmp_path / "d", point(0, 0, id="a"), point(1, 0, id="a")))
+    (tmp_path / "x").write_text("[1, 2]")
+    with pytest.raises(InvalidInputError, match="FeatureCollection"):
+        read_doors(tmp_path / "x")
+    (tmp_path / "x").write_text('{"type": "Topology"}')
+    with pytest.raises(InvalidInputError, match="no FeatureCollection but 'Topology'"):
+        read_doors(tmp_path / "x")
+    (tmp_path / "x").write_text("{")
+    with pytest.raises(InvalidInputError, match="broken JSON"):
+        read_doors(tmp_path / "x")
+
+
+def test_a_door_at_the_bound_of_coordinates_is_read(tmp_path: Path) -> None:
+    ends = [[9.9e7, 9.9e7], [9.9e7 - 1.0, 9.9e7]]
+    line = {"type": "Feature", "properties": {}, "geometry": {"type": "LineString", "coordinates": ends}}
+    (door,) = read_doors(collection(tmp_path / "d", line))
+    assert door.midpoint == pytest.approx((9.9e7 - 0.5, 9.9e7))
+
+
+@pytest.mark.parametrize("wrong", [{"midpoint": (float("nan"), 0.0)}, {"segment": ((0.0, 0.0), (float("inf"), 1.0))}])
+def test_a_door_without_finite_coordinates_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InvalidInputError, match="finite coordinates"):
+        ClosedDoor(**({"id": "a", "midpoint": (0.5, 0.5)} | wrong))
+
+
+def test_a_moved_door_keeps_its_width() -> None:
+    door = ClosedDoor("d", (1.0, 0.0), ((0.5, 0.0), (1.5, 0.0)), 1.0).moved(Pose2(0.0, 0.0, 1.5707963267948966))
+    assert door.midpoint == pytest.approx((0.0, 1.0))
+    assert door.segment is not None
+    assert door.segment[1] == pytest.approx((0.0, 1.5))
+
+
+@pytest.mark.parametrize("alone", [point(1, 2), point(1, 2)["geometry"]])
+def test_a_bare_feature_or_geometry_is_a_collection_of_one(tmp_path: Path, alone: dict[str, Any]) -> None:
+    (tmp_path / "d").write_text(json.dumps(alone))
+    assert [door.midpoint for door in read_doors(tmp_path / "d")] == [(1.0, 2.0)]
+
+
+def multi(form: str, coordinates: list[Any], **properties: Any) -> dict[str, Any]:
+    return {"type": "Feature", "properties": properties, "geometry": {"type": form, "coordinates": coordinates}}
+
+
+def test_multi_forms_are_read_part_by_part_and_what_was_named_here_is_told(tmp_path: Path) -> None:
+    told: list[Remark] = []
+    features = [
+        multi("MultiPoint", [[0, 0]], id="one"),
+        multi("MultiLineString", [[[0, 5], [1, 5]]], id="line"),
+        multi("MultiLineString", [[[0, 7], [0.5, 7]], [[0.5, 7], [1, 7]]], id="pieces"),
+        multi("MultiPoint", [[3, 0], [5, 0]], id="two"),
+    ]
+    doors = read_doors(collection(tmp_path / "d", *features), remarks=told)
+    assert [door.id for door in doors] == ["one", "line", "pieces", "two", "two-2"]
+    assert [door.midpoint for door in doors] == [(0, 0), (0.5, 5), (0.5, 7), (3, 0), (5, 0)]
+    assert doors[2].width == pytest.approx(1.0)
+    assert [str(remark) for remark in told] == ["guessed 1 id (two-2): one feature holds several doors"]
+
+
+def test_the_id_of_a_feature_counts_where_its_properties_have_none(tmp_path: Path) -> None:
+    features = [point(0, 0) | {"id": 7}, point(1, 0, id=3.0), point(2, 0, id="") | {"id": "north"}]
+    features.append(point(3, 0) | {"id": 0})
+    assert [door.id for door in read_doors(collection(tmp_path / "d", *features))] == ["7", "3", "d02", "0"]
+
+
+def test_null_geometries_and_open_doors_in_any_case_are_left_out_and_counted(tmp_path: Path) -> None:
+    told: list[Remark] = []
+    nothing = {"type": "Feature", "properties": {"id": "x"}, "geometry": None}
+    features = [nothing, point(0, 0, id="a", state="OPEN"), point(1, 0, id="b", state="Closed"), nothing]
+    doors = read_doors(collection(tmp_path / "d", *features), remarks=told)
+    assert [door.id for door in doors] == ["b"]
+    assert [(remark.action, remark.what, remark.count, remark.loss) for remark in told] == [
+        ("dropped", "features", 2, False),
+        ("dropped", "door", 1, False),
+    ]
+
+
+@pytest.mark.parametrize("wrong", [{"kind": []}, {"doors": [{}]}, {"doors": "d00"}, {"score": "high"}])
+def test_a_room_with_wrong_properties_is_one_clear_line(tmp_path: Path, wrong: dict[str, Any]) -> None:
+    path = collection(tmp_path / "r", multi("Polygon", [[[0, 0], [1, 0], [1, 1], [0, 0]]], **wrong))
+    with pytest.raises(InvalidInputError, match="room 0"):
+        read_rooms(path)
+
+
+def test_a_room_is_read_with_its_confidence_and_alternatives(tmp_path: Path) -> None:
+    others = (Alternative(box(0, 0, 3, 3), 0.25), Alternative(box(0, 0, 5, 3), 0.125))
+    room = Room(box(0, 0, 4, 3), ("d",), "border", 1.5, confidence=0.75, alternatives=others)
+    write_rooms(tmp_path / "rooms.geojson", [room])
+    (read,) = read_rooms(tmp_path / "rooms.geojson")
+    assert read == room
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "match"),
+    [
+        ("confidence", 1.5, "confidence"),
+        ("confidence", "high", "confidence"),
+        ("alternatives", {"probability": 1}, "alternatives"),
+        ("alternatives", [3], "alternatives"),
+        ("alternatives", [{"probability": 0.5}], "geometry"),
+        ("alternatives", [{"probability": 0.5, "geometry": {"type": "Point", "coordinates": [0, 0]}}], "Point"),
+        ("alternatives", [{"geometry": {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]]]}}], "no"),
+    ],
+)
+def test_a_confidence_or_alternative_that_is_none_is_refused(
+    tmp_path: Path, name: str, value: object, match: str
+) -> None:
+    path = tmp_path / "rooms.geojson"
+    write_rooms(path, [Room(box(0, 0, 4, 3), ("d",), "border", 1.5, confidence=0.75)])
+    data = json.loads(path.read_text())
+    data["features"][0]["properties"][name] = value
+    path.write_text(json.dumps(data))
+    with pytest.raises(InvalidInputError, match=match):
+        read_rooms(path)
