@@ -151,9 +151,11 @@ def _code() -> str:
         *(root / "predictor").rglob("*.py"),
         *(root / "predictor").rglob("*.json"),
         *(root / "core").rglob("*.py"),
-        root / "pipeline" / "scores.py",
+        root / "pipeline" / "reporting" / "scores.py",
     ]
-    return code_digest([*files, *(here / name for name in ("sample.py", "samples.py", "scores.py", "sureness.py"))])
+    return code_digest(
+        [*files, *(here / name for name in ("sample_evaluation.py", "samples.py", "scores.py", "sureness.py"))]
+    )
 
 
 def _kept(path: Path, key: str) -> Scores | None:
