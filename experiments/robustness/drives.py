@@ -111,11 +111,11 @@ def map_drive(
 
 
 def odometry_noise(times_medium: float) -> NoiseConfig:
-    """Return the odometry of the noise level ``medium``, errors multiplied; an ideal lidar."""
+    """Scale the odometry errors of the noise level ``medium``; the lidar is ideal."""
     medium = NOISE_LEVELS["medium"]
     return replace(
         NOISE_LEVELS["none"],
-        way=medium.way * times_medium,
+        distance=medium.distance * times_medium,
         turn_per_metre=medium.turn_per_metre * times_medium,
         turn=medium.turn * times_medium,
     )

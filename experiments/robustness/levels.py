@@ -18,7 +18,7 @@ UNITS: dict[Factor, str] = {
     "clutter": "boxes that are moved",
     "lost": "share of sweeps lost",
     "freezes": "freezes of the odometry [1/min]",
-    "drops": "pieces of the way never counted [1/min]",
+    "drops": "motions never counted [1/min]",
     "unequal": "difference of the wheels, as a share",
     "phantoms": "phantom doors",
     "together": "all factors at their n-th level",
