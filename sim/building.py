@@ -109,6 +109,6 @@ def _check_doors(plan: FloorPlan, wanted: Collection[str], inner: Collection[str
 
 
 def gap_from(solids: Polygon | shapely.MultiPolygon, x: float, y: float) -> float:
-    """Distance of a place from the solids [m], 0 inside them."""
+    """Compute the distance of a place from the solids [m], 0 inside them."""
     distance = solids.distance(shapely.Point(x, y))
     return math.inf if solids.is_empty else float(distance)

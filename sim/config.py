@@ -176,7 +176,7 @@ NOISE_LEVELS: Mapping[str, NoiseConfig] = MappingProxyType(
 
 
 def noise_level(name: str) -> NoiseConfig:
-    """Return the noise of a level: ``none``, ``low``, ``medium`` or ``high``.
+    """Look up the noise of a level: ``none``, ``low``, ``medium`` or ``high``.
 
     Raises:
         InvalidInputError: No such level.
@@ -187,7 +187,7 @@ def noise_level(name: str) -> NoiseConfig:
 
 
 def lidar_preset(name: str) -> LidarConfig:
-    """Return the lidar of that name, see ``LIDAR_PRESETS``.
+    """Look up a lidar of ``LIDAR_PRESETS`` by its name.
 
     Raises:
         InvalidInputError: No such lidar.

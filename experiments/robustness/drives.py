@@ -147,7 +147,7 @@ def _drifted(truth: FloatArray, noise: NoiseConfig, seed: int) -> FloatArray:
 
 
 def furnished(plan: FloorPlan, share: float, seed: int) -> FloorPlan:
-    """Return the plan with a share of the furniture that fills it; the robot starts where it would without.
+    """Furnish a plan anew with a share of what would fill it; the robot starts where it would without.
 
     Args:
         plan: The building; its own furniture is taken out.

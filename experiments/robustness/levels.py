@@ -78,12 +78,12 @@ class Case:
 
 
 def first_setting(config: RobustnessConfig) -> Setting:
-    """Return every factor at its first level."""
+    """Set every factor to its first level."""
     return Setting(**{factor: getattr(config, factor)[0] for factor in FACTORS[:-1]})
 
 
 def cases(config: RobustnessConfig) -> list[Case]:
-    """Return every level of every factor asked for; the first levels of all factors are one and the same setting."""
+    """List every level of every factor asked for; the first levels of all factors are one and the same setting."""
     first = first_setting(config)
     found: list[Case] = []
     for factor in config.factors:
