@@ -38,7 +38,7 @@ class Place:
 
 
 def explain(event: Any, place: Place) -> str | None:
-    """Tell a failure to parse in one line; ``None`` where tyro's own words have to do.
+    """Explain a failure to parse in one line; ``None`` where tyro's own words have to do.
 
     Args:
         event: A ``ParseErrorEvent`` of tyro; its module is private, so nothing but the fields read here is relied on.

@@ -34,13 +34,13 @@ class Report:
         return bool(self.failures) or any(remark.loss for remark in self.remarks)
 
     def table(self) -> list[tuple[str, ...]]:
-        """Rows and remarks, all as wide as the head."""
+        """List rows and remarks, all as wide as the head."""
         width = len(self.rows[0])
         rows = [*map(tuple, self.rows), *remark_rows(self.remarks)]
         return [(*row, *[""] * (width - len(row))) for row in rows]
 
     def as_json(self) -> dict[str, Any]:
-        """Return the object that ``--json`` prints."""
+        """Write the object that ``--json`` prints."""
         return {
             "title": self.title,
             "written": str(self.folder),

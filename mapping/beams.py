@@ -59,7 +59,7 @@ def hit_points(scan: LaserScan, *, max_range: float, motion: SweepMotion | None 
 
 
 def matched_range(scan: LaserScan, *, max_range: float, margin: float) -> float:
-    """Range up to which points are matched [m]: ``margin`` [m] less than the sensor sees, or ``max_range``.
+    """Compute the range up to which points are matched [m]: ``margin`` less than the sensor sees, or ``max_range``.
 
     Of a short-sighted sensor at most a tenth of its range is left out.
     """
@@ -86,7 +86,7 @@ def clean(scan: LaserScan, *, max_range: float, motion: SweepMotion | None = Non
 
 
 def clean_alike(scans: Sequence[LaserScan], *, max_range: float, motion: SweepMotion | None = None) -> list[Beams]:
-    """As :func:`clean`, for several scans that differ in ranges and stamps only."""
+    """Clean, as :func:`clean`, several scans that differ in ranges and stamps only."""
     # Arrays below are of shape (scans, beams).
     first = scans[0]
     reach, increment = min(max_range, first.range_max), first.angle_increment
@@ -139,7 +139,7 @@ def clean_alike(scans: Sequence[LaserScan], *, max_range: float, motion: SweepMo
 
 
 def steadied(ranges: FloatArray, increment: float, *, wrap: bool) -> FloatArray:
-    """Ranges less their noise, as far as neighbouring beams show a straight wall.
+    """Reduce the noise of ranges as far as neighbouring beams show a straight wall.
 
     Along a straight wall 1/r is a cosine of the angle, so that the mean of two beams at equal angles to either side,
     divided by the cosine of that angle, gives 1/r between them, however slanted the wall. Pairs are taken from the
@@ -161,7 +161,7 @@ def steadied(ranges: FloatArray, increment: float, *, wrap: bool) -> FloatArray:
     padded = _padded(inverse, reach, wrap=wrap)
 
     def between(step: int) -> FloatArray:
-        """1/r between the two beams ``step`` to either side."""
+        """Interpolate 1/r between the two beams ``step`` to either side."""
         low, high = padded[..., reach - step :][..., :n], padded[..., reach + step :][..., :n]
         return np.asarray((low + high) / (2.0 * math.cos(step * increment)))
 
@@ -221,19 +221,19 @@ def _median(around: Sequence[FloatArray]) -> FloatArray:
 
 @functools.lru_cache(maxsize=8)
 def directions(angle_min: float, increment: float, beams: int) -> tuple[FloatArray, FloatArray]:
-    """Unit vectors of the beams and of the directions half-way to the next ones, shape (beams, 2) each."""
+    """Compute unit vectors of the beams and half-way to the next ones, shape (beams, 2) each."""
     angles = angle_min + increment * np.arange(beams)
     half = angles + increment / 2.0
     return np.column_stack((np.cos(angles), np.sin(angles))), np.column_stack((np.cos(half), np.sin(half)))
 
 
 def thin(points: FloatArray, spacing: float, most: int) -> FloatArray:
-    """Points of a scan, shape (n, 2), in beam order, at about ``spacing`` [m] along it and at most ``most`` of them."""
+    """Thin the points of a scan, shape (n, 2), in beam order, to ``most`` at most, about ``spacing`` [m] apart."""
     return points[spaced(points, np.array([len(points)]), spacing, most)]
 
 
 def spaced(points: FloatArray, counts: IntArray, spacing: float, most: int) -> BoolArray:
-    """Tell which points of each scan :func:`thin` keeps, shape (..., n).
+    """Mark the points of each scan that :func:`thin` keeps, shape (..., n).
 
     Args:
         points: In beam order, shape (..., n, 2) [m]; what stands after the first ``counts`` of a scan does not count.

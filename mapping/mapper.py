@@ -301,7 +301,7 @@ class Mapper:
         self._drawn = 0
 
     def grid(self) -> OccupancyGrid:
-        """Return the map so far, from the keyframes' present poses."""
+        """Draw the map so far, from the keyframes' present poses."""
         moved = [keyframe for keyframe in self.keyframes[self._drawn :] if _outdated(keyframe)]
         self._evidence.add_all([(k.beams, k.drawn) for k in moved if k.drawn is not None], sign=-1)
         self._evidence.add_all([(k.beams, k.pose) for k in moved])
@@ -311,11 +311,11 @@ class Mapper:
         return self._evidence.grid()
 
     def doors(self) -> list[ClosedDoor]:
-        """Closed doors seen so far, map frame, sorted by id."""
+        """Fuse the closed doors seen so far, map frame, sorted by id."""
         return fuse_doors(self.keyframes)
 
     def trajectory(self) -> tuple[FloatArray, FloatArray]:
-        """Stamps [s], shape (n,), and poses ``(x, y, theta)``, shape (n, 3), at the keyframes' present poses."""
+        """List stamps [s], shape (n,), and poses ``(x, y, theta)``, shape (n, 3), at the keyframes' present poses."""
         poses = [(self.keyframes[i].pose @ relative).as_tuple() for i, relative in self._references]
         return np.array(self._stamps, dtype=np.float64), np.array(poses, dtype=np.float64).reshape(-1, 3)
 

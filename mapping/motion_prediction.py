@@ -65,7 +65,7 @@ class MotionPrediction:
         )
 
     def step(self, odometry: Pose2 | None, stamp: float) -> Step:
-        """Return the motion since the scan before.
+        """Predict the motion since the scan before.
 
         Args:
             odometry: ``odom_T_robot``, ``None`` without one.

@@ -83,7 +83,7 @@ class Driver:
         self.recoveries = 0
 
     def command(self, pose: Pose2, scan: LaserScan, stamp: float, bumps: Sequence[float] = ()) -> tuple[float, float]:
-        """Speed [m/s] and turn rate [rad/s] for now; ``state`` says what they are about.
+        """Choose speed [m/s] and turn rate [rad/s] for now; ``state`` says what they are about.
 
         Args:
             pose: ``map_T_robot`` as estimated.

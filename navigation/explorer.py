@@ -69,7 +69,7 @@ class Explorer:
         grid: Callable[[], OccupancyGrid],
         bumps: Sequence[float] = (),
     ) -> tuple[float, float]:
-        """Speed [m/s] and turn rate [rad/s] for now.
+        """Decide on speed [m/s] and turn rate [rad/s] for now.
 
         Args:
             pose: ``map_T_robot`` as estimated.

@@ -54,7 +54,7 @@ class ReopenedMap:
         return self._mapper.process(scan, odometry, sightings)
 
     def grid(self) -> OccupancyGrid:
-        """Return the map so far; leaves that no later scan has seen or passed are unknown."""
+        """Draw the map so far; leaves that no later scan has seen or passed are unknown."""
         grid = self._mapper.grid()
         if not self._doors:
             return grid

@@ -60,7 +60,7 @@ class RemainingTour:
         self.home = _point(self._places[self._last])
 
     def pass_by(self, here: Point) -> bool:
-        """Strike off the stops close to ``here``; whether the next one was among them."""
+        """Strike off the stops close to ``here``; returns whether the next one was among them."""
         if not len(self._stops):
             return False
         past = np.hypot(*(self.left - np.array(here)).T) <= VISITED
@@ -79,7 +79,7 @@ class RemainingTour:
         return place
 
     def path(self) -> FloatArray:
-        """Return the path over all stops and home along the edges of the graph, shape (k, 2) [m]."""
+        """Join the paths over all stops and home along the edges of the graph, shape (k, 2) [m]."""
         at = {int(vertex): position for position, vertex in enumerate(self._metric.vertices)}
         stops = [at[int(vertex)] for vertex in (*self._stops, self._last)]
         path: FloatArray = self._places[self._metric.trace(stops)]

@@ -116,15 +116,15 @@ class TourFollower:
         return self._prediction.now
 
     def is_waiting(self, stamp: float) -> bool:
-        """Tell whether the robot waits for its doors at ``stamp`` [s]."""
+        """Check whether the robot waits for its doors at ``stamp`` [s]."""
         return self._started_at is None or stamp - self._started_at < DOOR_WAIT
 
     def path_left(self) -> FloatArray:
-        """Tell what is left to drive: the path ahead, then along the graph's edges, shape (k, 2) [m]."""
+        """Join what is left to drive: the path ahead, then along the graph's edges, shape (k, 2) [m]."""
         return np.vstack((self._driver.ahead(math.inf), self._stops.path()))
 
     def outcome(self) -> TourOutcome:
-        """Tell what became of the tour so far."""
+        """Report what became of the tour so far."""
         unreachable = np.array(self._unreachable).reshape(-1, 2)
         return TourOutcome(self.prediction, tuple(self.revisions), self._stops.visited, unreachable, self._replans)
 
@@ -135,7 +135,7 @@ class TourFollower:
         grid: Callable[[], OccupancyGrid],
         bumps: Sequence[float] = (),
     ) -> tuple[float, float]:
-        """Speed [m/s] and turn rate [rad/s] for now; (0, 0) once ``status`` is set.
+        """Decide on speed [m/s] and turn rate [rad/s] for now; (0, 0) once ``status`` is set.
 
         Args:
             pose: ``map_T_robot`` as estimated.

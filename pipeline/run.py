@@ -210,7 +210,7 @@ def _find_out(
 
 
 def choose_closed(plan: FloorPlan, config: RunConfig) -> tuple[str, ...]:
-    """Return the doors to close: as named, or those of rooms drawn by the seed.
+    """Choose the doors to close: as named, or those of rooms drawn by the seed.
 
     Raises:
         InvalidInputError: Unknown doors, or more rooms than can be closed.

@@ -26,7 +26,7 @@ STRETCH = 64
 def line_of_sight(
     grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesConfig, *, started: Started | None = None
 ) -> Prediction:
-    """Tell what can be seen from each door through unknown cells, up to known ones or the bounding box of the map.
+    """Predict what can be seen from each door through unknown cells, up to known ones or the map's bounding box.
 
     Args:
         grid: The map.
@@ -43,7 +43,7 @@ def line_of_sight(
 def geometric(
     grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesConfig, *, started: Started | None = None
 ) -> Prediction:
-    """Return all unknown faces in line of sight of each door, until faces on the border are met.
+    """Predict all unknown faces in line of sight of each door, until faces on the border are met.
 
     A face is in sight when its centre is: the straight line to the door crosses unknown faces only that are not on
     the border.

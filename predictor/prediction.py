@@ -123,7 +123,7 @@ class Prediction:
 
 
 def free_probability(prediction: Prediction, grid: OccupancyGrid) -> OccupancyGrid:
-    """Return the probability of each cell to be free on the frame of the completed map, in percent.
+    """Compute each cell's probability to be free on the frame of the completed map, in percent.
 
     Args:
         prediction: Of the map.

@@ -37,7 +37,7 @@ class Lidar:
         self._last_heading = 0.0
 
     def cast(self, world_T_robot: Pose2) -> tuple[FloatArray, IntArray]:
-        """True distances of the first hits, every ray cast whole; glass is as if it were not there.
+        """Measure the true distances of the first hits, every ray cast whole; glass is as if it were not there.
 
         Args:
             world_T_robot: Where the robot stands.
@@ -50,7 +50,7 @@ class Lidar:
         return self._shoot(start, directions, np.full(self.config.beams, self.config.range_max))
 
     def track(self, world_T_robot: Pose2, poses: FloatArray | None = None) -> tuple[FloatArray, IntArray]:
-        """Return the same as :meth:`cast`, sooner, for poses that follow each other; panes return what they return.
+        """Measure as :meth:`cast`, sooner, for poses that follow each other; panes return what they return.
 
         A ray's cost grows with its length, and most end after a few metres of the twenty they may go. So each is cast
         as far as its neighbours went in the last sweep and a little further; the few that hit nothing are cast whole.
@@ -89,7 +89,7 @@ class Lidar:
         return starts, np.column_stack((np.cos(angles), np.sin(angles))), float(headings[-1]) + self._mount.theta
 
     def beam_stamps(self, stamp: float) -> FloatArray:
-        """When each beam of a sweep that ends at ``stamp`` [s] is measured, shape (beams,) [s]."""
+        """Compute when each beam of a sweep that ends at ``stamp`` [s] is measured, shape (beams,) [s]."""
         first, last = self.config.beam_times
         return stamp + np.linspace(first, last, self.config.beams)
 
@@ -131,7 +131,7 @@ class Lidar:
         return np.where(first, away, distances), np.where(first, panes, bodies)
 
     def sweep(self, world_T_robot: Pose2, stamp: float, poses: FloatArray | None = None) -> tuple[LaserScan, IntArray]:
-        """Return one scan with its errors.
+        """Take one scan, with its errors.
 
         Args:
             world_T_robot: Where the robot stands.

@@ -268,7 +268,7 @@ class PhysicsWorld:
         bullet.changeDynamics(body, -1, activationState=bullet.ACTIVATION_STATE_WAKE_UP, physicsClientId=self._client)
 
     def joint_position(self, body: int, link: int) -> float:
-        """Tell where a joint is [rad or m]."""
+        """Read the position of a joint [rad or m]."""
         return float(self._bullet.getJointState(body, link, physicsClientId=self._client)[0])
 
     def move_joint(self, body: int, link: int, position: float) -> None:
@@ -276,21 +276,21 @@ class PhysicsWorld:
         self._bullet.resetJointState(body, link, position, physicsClientId=self._client)
 
     def cast(self, start: FloatArray, ends: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Return the first thing that each ray hits, glass left out.
+        """Find the first thing that each ray hits, glass left out.
 
         Args:
             start: Where all rays start, shape (3,), or each, shape (n, 3), world frame [m].
             ends: Where they end at the latest, shape (n, 3).
 
         Returns:
-            The share of the way to the end at the hit, shape (n,), 1 without one, and the body hit, shape (n,), -1
+            The share of the ray up to the hit, shape (n,), 1 without one, and the body hit, shape (n,), -1
             without one.
         """
         fractions, bodies, _ = self._cast(start, ends, SEEN, normals=False)
         return fractions, bodies
 
     def cast_at_glass(self, start: FloatArray, ends: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
-        """As :meth:`cast` for glass alone, with the normals where it is hit, shape (n, 3)."""
+        """Find the first pane that each ray hits, as :meth:`cast`, with the normals there, shape (n, 3)."""
         return self._cast(start, ends, GLASS, normals=True)
 
     def _cast(

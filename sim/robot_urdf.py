@@ -33,11 +33,11 @@ GROUND = 0.03
 BOX_MARGIN = 1e-3
 # Words in the names of links that carry a lidar.
 LIDAR_NAMES = ("base_scan", "laser", "lidar", "hokuyo")
-# The drive that calibrates: so long each way [s], at these shares of the limits.
+# The drive that calibrates: so long straight and so long turning [s], at these shares of the limits.
 SETTLE, DRIVE, SHARE = 1.0, 2.0, 0.5
 # What is tried, as shares of the accelerations set, until a robot does not tip by so much [rad].
 GENTLER, TIPS = (1.0, 0.5, 0.25, 0.12), 0.1
-# Pieces of a drive after which the tilt is looked at; a heading turns by less than half a turn in each.
+# Stretches of a drive after which the tilt is looked at; a heading turns by less than half a turn in each.
 STRETCHES = 20
 # A robot that gets less than this share of what its wheels turn does not drive on them.
 DRIVES = 0.1
@@ -77,7 +77,7 @@ class Joint:
 
 
 def with_own_robot(config: SimConfig) -> SimConfig:
-    """Return the settings with radius, height and lidar of the URDF that they name; as they are where they name none.
+    """Replace radius, height and lidar in the settings by those of the URDF that they name, if they name one.
 
     Raises:
         InvalidInputError: The URDF cannot be used; the message says why.
@@ -326,7 +326,7 @@ def _calibrated(model: RobotModel, robot: RobotConfig, path: Path) -> tuple[Robo
 
 @dataclass(frozen=True, slots=True)
 class _Trial:
-    """How a robot drove: shares of the way and the turn that its wheels counted, and the largest tilt [rad]."""
+    """How a robot drove: shares of the distance and the turn that its wheels counted, and the largest tilt [rad]."""
 
     ahead: float
     turned: float

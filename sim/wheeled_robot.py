@@ -57,7 +57,7 @@ class WheeledRobot:
             v: Commanded speed [m/s]; the limits are applied.
             w: Commanded turn rate [rad/s]; the limits are applied.
             duration: Time [s]; what is no whole step is done next time.
-            sink: Takes every piece of the way as the wheels' encoders count it, in order.
+            sink: Takes every motion as the wheels' encoders count it, in order.
         """
         limits = self.config
         v = min(max(v, -limits.max_speed), limits.max_speed)
@@ -115,7 +115,7 @@ class WheeledRobot:
         return [wheel.sign * state[0] for state, (_, wheel) in zip(states, self._wheels, strict=True)]
 
     def _count_wheels(self) -> Motion:
-        """The way since the last reading, by the encoders alone."""
+        """The motion since the last reading, by the encoders alone."""
         before, self._angles = self._angles, self._read_wheels()
         rolled = {1: 0.0, -1: 0.0}
         for old, new, (_, wheel) in zip(before, self._angles, self._wheels, strict=True):

@@ -175,7 +175,7 @@ def as_saved(doors: Sequence[ClosedDoor]) -> tuple[ClosedDoor, ...]:
 
 
 def as_segment(door: ClosedDoor) -> Segment:
-    """Return the jambs of a door; of a bare point a line of its width along x."""
+    """Compute the jambs of a door; of a bare point, a line of its width along x."""
     return door.segment or _around(door.midpoint, 0.0, door.width or USUAL_WIDTH)
 
 

@@ -126,7 +126,7 @@ def _aimed(document: Document, name: str, degrees: float) -> Document:
 
 
 def describe(room: Room) -> str:
-    """Return a room in one line: its area, its kind, how sure the prediction is where the method says so."""
+    """Describe a room in one line: area, kind, and how sure the prediction is where the method says so."""
     parts = [f"{room.polygon.area:.1f} m²", room.kind or ""]
     confidence = getattr(room, "confidence", None)
     if confidence is not None:

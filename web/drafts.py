@@ -106,7 +106,7 @@ class Drafts:
 
 
 def state_folder() -> Path:
-    """``closedrooms`` in the folder where programs of this user keep their state (XDG Base Directory Specification)."""
+    """Find the folder where this user's programs keep their state (XDG Base Directory Specification)."""
     given = os.environ.get("XDG_STATE_HOME", "")
     # A relative path counts as none (the specification).
     base = Path(given) if given and Path(given).is_absolute() else Path.home() / ".local" / "state"

@@ -86,7 +86,7 @@ class EditSession:
         ]
 
     def segment(self, door: ClosedDoor) -> Segment:
-        """Return the jambs of a door in the frame of the grid [m]."""
+        """Look up the jambs of a door in the frame of the grid [m]."""
         a, b = as_segment(door)
         return (self.sheet.point_on_grid(a), self.sheet.point_on_grid(b))
 
@@ -235,7 +235,7 @@ class EditSession:
         return report
 
     def draft(self) -> Draft | None:
-        """Tell what this visitor left unsaved at their last visit, where it is not what the page shows anyway.
+        """Read what this visitor left unsaved at their last visit, where it is not what the page shows anyway.
 
         Raises:
             ClosedroomsError: It cannot be read any more.

@@ -58,7 +58,7 @@ def _box(a: Point, b: Point, thickness: float) -> Box:
 
 
 def wall_boxes(plan: FloorPlan) -> list[Box]:
-    """Return the walls between their gaps; at corners both walls reach to the other's face."""
+    """Cut the walls into boxes between their gaps; at corners both walls reach to the other's face."""
     meeting: defaultdict[tuple[int, int], list[float]] = defaultdict(list)
     for wall in plan.walls:
         for end in wall.segment:
@@ -111,7 +111,7 @@ def _between(gaps: Sequence[tuple[float, float]], length: float) -> list[tuple[f
 
 
 def door_leaves(plan: FloorPlan, door: PlanDoor) -> list[Leaf]:
-    """Return the leaves of a door: one, or two of half the width for a double door."""
+    """Make the closed leaves of a door: one, or two of half the width for a double door."""
     thickness = min(LEAF_THICKNESS, WallLines(plan).thickness(door.segment) or LEAF_THICKNESS)
     first, second = door.segment
     if door.kind == "sliding":
@@ -140,7 +140,7 @@ def _side(plan: FloorPlan, door: PlanDoor) -> int:
 
 
 def opened(leaf: Leaf, angle: float = math.pi / 2) -> Box:
-    """Tell where a leaf stands when it is open: turned by ``angle`` [rad], or slid aside by its length."""
+    """Place an open leaf: turned by ``angle`` [rad], or slid aside by its length."""
     box = leaf.box
     if leaf.hinge is None:
         step = leaf.turn * box.length

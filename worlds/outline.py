@@ -23,7 +23,7 @@ SHORTEST = 0.01
 
 
 def leaks(plan: FloorPlan, radius: float = RADIUS) -> bool:
-    """Tell whether a disc of ``radius`` [m] gets from a room to the outside, every door open."""
+    """Check whether a disc of ``radius`` [m] gets from a room to the outside, every door open."""
     walls = wall_area(plan)
     rooms = shapely.union_all([room.polygon for room in plan.rooms])
     x_min, y_min, x_max, y_max = shapely.total_bounds([walls, rooms])
@@ -37,7 +37,7 @@ def leaks(plan: FloorPlan, radius: float = RADIUS) -> bool:
 
 
 def without_leaks(plan: FloorPlan) -> FloorPlan:
-    """Return the plan with walls where its outline has none and a robot would get out; said in ``remarks``.
+    """Wall up a plan where its outline has no wall and a robot would get out; said in ``remarks``.
 
     Args:
         plan: Without doors and openings to the outside.

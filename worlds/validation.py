@@ -119,7 +119,7 @@ def _check_passages(plan: FloorPlan, where: str) -> None:
 
 
 def passage_faults(plan: FloorPlan) -> dict[int, tuple[str, str]]:
-    """Tell what is wrong with doors and openings, and what was expected, by their number among ``plan.passages``.
+    """Find what is wrong with doors and openings, by their number among ``plan.passages``; says what was expected.
 
     Args:
         plan: Its rooms and walls are as they should be.

@@ -39,18 +39,18 @@ class Edge:
         return math.dist(*self.segment)
 
     def point(self, along: float) -> Point:
-        """Return the point at ``along`` metres from the first end."""
+        """Interpolate the point at ``along`` metres from the first end."""
         (x0, y0), (x1, y1) = self.segment
         t = along / self.length
         return (x0 + t * (x1 - x0), y0 + t * (y1 - y0))
 
     def part(self, centre: float, width: float) -> Segment:
-        """Return the piece of ``width`` metres around ``centre`` metres from the first end."""
+        """Cut out ``width`` metres around ``centre`` metres from the first end."""
         return (self.point(centre - width / 2), self.point(centre + width / 2))
 
 
 def shared_edges(polygons: Sequence[Polygon]) -> list[Edge]:
-    """Return the straight edges of rooms that form a coverage (neighbours share their vertices).
+    """Find the straight edges of rooms that form a coverage (neighbours share their vertices).
 
     Returns:
         Each edge once, longest possible for its pair of rooms, in order of the pairs.
@@ -72,7 +72,7 @@ def shared_edges(polygons: Sequence[Polygon]) -> list[Edge]:
 
 
 def joined(segments: Iterable[Segment]) -> list[Segment]:
-    """Segments put together to straight runs as long as they go.
+    """Join segments to straight runs as long as they go.
 
     A run grows from piece to touching piece while all its points lie within :data:`STRAIGHT` of the line between its
     ends, so that slow bends are cut into several runs. Every piece is part of one run.
@@ -119,7 +119,7 @@ def _straight_run(points: Sequence[Point]) -> Segment | None:
 
 
 def walls_along(edges: Sequence[Edge], thickness: Callable[[Edge], float]) -> list[Wall]:
-    """Return one wall along each straight run of edges of one thickness; edges of thickness 0 carry no wall."""
+    """Build one wall along each straight run of edges of one thickness; edges of thickness 0 carry none."""
     by_thickness: defaultdict[float, list[Segment]] = defaultdict(list)
     for edge in edges:
         value = thickness(edge)
@@ -131,7 +131,7 @@ def walls_along(edges: Sequence[Edge], thickness: Callable[[Edge], float]) -> li
 
 
 def free_spans(edge: Edge, edges: Sequence[Edge], taken: Iterable[Segment], margin: float) -> list[tuple[float, float]]:
-    """Stretches of an edge, in metres from its first end, where a door may stand.
+    """List the stretches of an edge, in metres from its first end, where a door may stand.
 
     Args:
         edge: Of the wall.
@@ -170,7 +170,7 @@ def _coordinates(edge: Edge, points: FloatArray) -> tuple[FloatArray, FloatArray
 
 
 def coverage(polygons: Sequence[Polygon], *, gap: float = 0.0, snap: float = -1.0) -> list[Polygon]:
-    """Room outlines made to share their edges exactly: overlaps cut, gaps up to ``gap`` metres filled."""
+    """Make room outlines share their edges exactly: cut overlaps, fill gaps up to ``gap`` metres."""
     clean = shapely.coverage_clean  # type: ignore[attr-defined]  # since shapely 2.2; not in the stubs yet
     cleaned = clean(np.array(polygons, dtype=object), gap_width=gap, snapping_distance=snap)
     result = []
@@ -183,7 +183,7 @@ def coverage(polygons: Sequence[Polygon], *, gap: float = 0.0, snap: float = -1.
 def without_gaps(
     polygons: Sequence[Polygon], width: float, *, fixed: int = 0, branches: bool = True, touching: float = 0.0
 ) -> tuple[list[Polygon], list[Polygon]]:
-    """Rooms grown into the gaps and notches between them that are narrower than ``width`` metres.
+    """Grow rooms into the gaps and notches between them that are narrower than ``width`` metres.
 
     Args:
         polygons: Side by side.

@@ -111,11 +111,11 @@ def map_drive(
 
 
 def odometry_noise(times_medium: float) -> NoiseConfig:
-    """Return the odometry of the noise level ``medium``, errors multiplied; an ideal lidar."""
+    """Scale the odometry errors of the noise level ``medium``; the lidar is ideal."""
     medium = NOISE_LEVELS["medium"]
     return replace(
         NOISE_LEVELS["none"],
-        way=medium.way * times_medium,
+        distance=medium.distance * times_medium,
         turn_per_metre=medium.turn_per_metre * times_medium,
         turn=medium.turn * times_medium,
     )
@@ -147,7 +147,7 @@ def _drifted(truth: FloatArray, noise: NoiseConfig, seed: int) -> FloatArray:
 
 
 def furnished(plan: FloorPlan, share: float, seed: int) -> FloorPlan:
-    """Return the plan with a share of the furniture that fills it; the robot starts where it would without.
+    """Furnish a plan anew with a share of what would fill it; the robot starts where it would without.
 
     Args:
         plan: The building; its own furniture is taken out.

@@ -155,7 +155,7 @@ def _work(worlds: dict[str, str], config: RobustnessConfig, progress: Progress, 
 
 
 def sweep_world(world: tuple[str, str], config: RobustnessConfig) -> str:
-    """Return every level in one world; the reason when it failed, else nothing.
+    """Try every level in one world; the reason when it failed, else nothing.
 
     Args:
         world: The world as it was given, and its name.

@@ -83,7 +83,7 @@ class Building:
         self._closings: dict[tuple[int, Setting], Closing] = {}
 
     def rows(self, setting: Setting, keep: Path | None = None) -> list[Row]:
-        """Return a row of measures for each set of closed doors.
+        """Measure a row of figures for each set of closed doors.
 
         Args:
             setting: How much everything is disturbed.

@@ -79,7 +79,7 @@ class KeyframeGraph:
         return np.asarray(self._config.loops.point_information * (rotation.T @ hessian @ rotation))
 
     def distances(self) -> FloatArray:
-        """From the latest keyframe to each as the crow flies, shape (keyframes,) [m]."""
+        """Compute how far each keyframe is from the latest as the crow flies, shape (keyframes,) [m]."""
         pose = self.keyframes[-1].pose
         offsets = self._positions.values - (pose.x, pose.y)
         return np.asarray(np.hypot(offsets[:, 0], offsets[:, 1]))

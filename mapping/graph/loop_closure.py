@@ -124,7 +124,7 @@ def _recent(keyframes: Sequence[Keyframe], distance: float) -> Iterator[Keyframe
 
 
 def recent_points(keyframes: Sequence[Keyframe], distance: float, config: MapperConfig) -> FloatArray:
-    """Tell what was seen on the last ``distance`` [m] of one submap, in the latest keyframe's frame, a point a cell.
+    """Collect what was seen on the last ``distance`` [m] of one submap, in the latest keyframe's frame, a point a cell.
 
     One scan alone fits in many places; the surroundings of several metres do not.
     """

@@ -50,7 +50,7 @@ def read_bag(path: Path, options: BagOptions) -> RecordedRun:
 
 @contextlib.contextmanager
 def opened_bag(path: Path) -> Iterator[Any]:
-    """Return a reader of a bag of any kind.
+    """Open a bag of any kind.
 
     Raises:
         InvalidInputError: ``rosbags`` is not installed, or a broken bag.

@@ -86,7 +86,7 @@ class Search:
         self._inner = pairs(np.arange(self._small))
 
     def best(self, *, away_from: tuple[Pose2, float, float] | None = None, floor: float = -math.inf) -> Found:
-        """Return the pose of the window with the highest mean likelihood, less what the prior takes.
+        """Find the pose of the window with the highest mean likelihood, less what the prior takes.
 
         Args:
             away_from: A pose, and the distance [m] and the turn [rad] within both of which none is taken: finds its

@@ -48,32 +48,32 @@ class Growth:
         return np.asarray(self.unknown & (self.owner < 0))
 
     def layout(self, room: int) -> IntArray:
-        """Return the faces of a room."""
+        """List the faces of a room."""
         return np.flatnonzero(self.owner == room)
 
     def is_border(self, room: int) -> bool:
-        """Tell whether a room starts in a border face (paper, section 3.6)."""
+        """Check whether a room starts in a border face (paper, section 3.6)."""
         return bool(self.arrangement.border[self.entrances[room].face])
 
     def candidates(self, room: int) -> IntArray:
-        """``F_r^k``: unknown faces of no room beside the layout; border faces never."""
+        """List ``F_r^k``: unknown faces of no room beside the layout, never border faces."""
         free = self.free & ~self.arrangement.border
         beside = {g for f in self.layout(room) for g in self.arrangement.neighbours[f] if free[g]}
         return np.array(sorted(beside), dtype=np.int64)
 
     def touches(self, room: int) -> set[int]:
-        """Other rooms with a face beside this room's layout."""
+        """List the other rooms with a face beside this room's layout."""
         beside = {int(self.owner[g]) for f in self.layout(room) for g in self.arrangement.neighbours[f]}
         return beside - {-1, room}
 
     def position(self, room: int) -> tuple[float, ...]:
-        """To break ties between rooms: how far its door is from the middle of all doors, then where it is [m]."""
+        """Rank rooms that tie: by how far the door is from the middle of all doors, then by where it is [m]."""
         doors = np.array([entrance.door.midpoint for entrance in self.entrances])
         away = float(np.hypot(*(doors[room] - doors.mean(axis=0))))
         return (round(away, 6), *self.entrances[room].door.midpoint)
 
     def face_set(self, room: int, faces: IntArray, returnable: BoolArray) -> FaceSet:
-        """Return the faces that a layout of a room may be made of."""
+        """List the faces that a layout of a room may be made of."""
         return face_set(self.arrangement, faces, returnable, self.free, self.entrances[room].facing.along)
 
 

@@ -40,7 +40,7 @@ def best_subset(
     exact: int,
     max_nodes: int,
 ) -> Found:
-    """``argmax Phi(layout + F)`` over all subsets F of the candidates.
+    """Find ``argmax Phi(layout + F)`` over all subsets F of the candidates.
 
     Args:
         pool: The layout's faces and the candidates.

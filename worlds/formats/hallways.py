@@ -100,7 +100,7 @@ class JoinedRooms:
 
 
 def extend_into_rooms(points: list[Point], start: Polygon, end: Polygon) -> LineString:
-    """Return the line through points, drawn on into the rooms at its ends where it stops short of them."""
+    """Extend a line into the rooms at its ends where it stops short of them."""
     line = [*points]
     for room, at in ((start, 0), (end, len(points) + 1)):
         last = shapely.Point(points[0] if at == 0 else points[-1])

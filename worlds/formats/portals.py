@@ -68,7 +68,7 @@ class DeepDoor:
 
 
 def paired(listed: Sequence[tuple[int, Portal]], *, within: float = SAME) -> list[Portal]:
-    """Portals, each once although both of its rooms list it.
+    """Pair portals: each is one although both of its rooms list it.
 
     Args:
         listed: Index of the room that lists a portal, and the portal.

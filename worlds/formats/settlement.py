@@ -44,7 +44,7 @@ class Source:
 
 
 def settle(plan: FloorPlan, remarks: Iterable[Remark], source: Source, path: Path) -> FloorPlan:
-    """Return the plan without its bad doors, valid, with every remark on it.
+    """Leave out a plan's bad doors, validate it, and put every remark on it.
 
     Args:
         plan: As the importer made it.
@@ -71,7 +71,7 @@ def settle(plan: FloorPlan, remarks: Iterable[Remark], source: Source, path: Pat
 
 
 def merged(remarks: Iterable[Remark]) -> list[Remark]:
-    """Remarks of one kind put together, in the order of their first."""
+    """Merge remarks of one kind, in the order of their first."""
     kinds: dict[tuple[str, str, str, bool], Remark] = {}
     for remark in remarks:
         key = (remark.action, remark.what, remark.why, remark.loss)
@@ -150,7 +150,7 @@ def _odd_rooms(areas: Sequence[float]) -> list[Remark]:
 
 
 def no_rooms(expected: str, areas: Sequence[float], remarks: Sequence[Remark], path: Path) -> InvalidInputError:
-    """Return the error of a file none of whose rooms can be used, with the reason.
+    """Make the error of a file none of whose rooms can be used, with the reason.
 
     Args:
         expected: What a file of this format holds.

@@ -19,7 +19,7 @@ DOOR_MARGIN = 0.3
 
 
 def turned_sketch(sketch: Sketch, angle: float) -> Sketch:
-    """Return the sketch with shared edges, turned, its lower left corner at the origin, on a grid of 0.1 mm."""
+    """Turn a sketch, with edges shared and the lower left corner at the origin, on a grid of 0.1 mm."""
     polygons, _ = without_gaps(sketch.polygons, SLIT, fixed=1, branches=False)
     polygons = coverage(polygons, gap=SLIT, snap=0.01)
     c, s = math.cos(angle), math.sin(angle)
