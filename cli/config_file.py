@@ -8,6 +8,7 @@ from typing import Any
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import read_json, read_text
+from closedrooms.core.files.schema import check_schema
 
 # A configuration has some hundred numbers, a manifest a few for each door or sample.
 MOST_BYTES = 50_000_000
@@ -25,7 +26,8 @@ def read_settings(path: Path, command: str, config: type[Any]) -> dict[str, Any]
         config: Its configuration class.
 
     Raises:
-        InvalidInputError: The file cannot be read, holds no table, or is the manifest of another command.
+        InvalidInputError: The file cannot be read, holds no table, or is the manifest of another command or of a newer
+            version.
     """
     data = _parsed(path)
     if not isinstance(data, dict):
@@ -33,6 +35,7 @@ def read_settings(path: Path, command: str, config: type[Any]) -> dict[str, Any]
     configuration = data.get("configuration")
     if not isinstance(configuration, dict):
         return data
+    check_schema(data, path)
     maker = data.get("command", command)
     if maker != command:
         raise InvalidInputError(

@@ -12,7 +12,9 @@ from pathlib import Path
 from urllib.parse import quote
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
-from closedrooms.core.files.incoming import check_regular, is_file, is_folder
+from closedrooms.core.files.incoming import check_regular, is_file, is_folder, read_json
+from closedrooms.core.files.outgoing import MANIFEST
+from closedrooms.core.files.schema import check_schema
 from closedrooms.core.runtime.packages import require
 from closedrooms.pipeline.reporting.progress import Progress
 from closedrooms.pipeline.view_config import ViewConfig
@@ -61,7 +63,7 @@ def find_recording(folder: Path) -> Path:
         folder: A folder that we wrote, or a recording itself.
 
     Raises:
-        InvalidInputError: There is none; those in folders below are named.
+        InvalidInputError: There is none (those in folders below are named), or it is of a newer version.
     """
     if not is_folder(folder):
         check_regular(folder, "a folder with a recording, or a recording (.rrd)")
@@ -69,6 +71,8 @@ def find_recording(folder: Path) -> Path:
             return folder
         raise InvalidInputError("no recording", expected="a folder with run.rrd, or a file .rrd", where=folder)
     if is_file(folder / RECORDING):
+        if is_file(folder / MANIFEST) and isinstance(about := read_json(folder / MANIFEST, what="a manifest"), dict):
+            check_schema(about, folder / MANIFEST)
         return folder / RECORDING
     below = sorted(path.parent.name for path in folder.glob(f"*/{RECORDING}"))[:MOST_NAMED]
     hint = (

@@ -19,6 +19,7 @@ from typing import Any, BinaryIO
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files.incoming import read_json
+from closedrooms.core.files.schema import KEY, SCHEMA, check_schema
 from closedrooms.core.files.unfinished import clear_files, clear_folders, part_of_file, part_of_folder, unfinished
 from closedrooms.core.names import short_name
 
@@ -169,6 +170,7 @@ def _strange(folder: Path, command: object) -> str:
         manifest = read_json(folder / MANIFEST, what="a manifest", max_bytes=MAX_MANIFEST)
         if manifest["program"] != PROGRAM or manifest.get("command") != command:
             return MANIFEST
+        check_schema(manifest, folder / MANIFEST)
         sums = dict(manifest.get(SUMS) or manifest["checksums"])
         listed = {MANIFEST, *sums, *manifest["files"]}
         for path in _walk(folder):
@@ -259,7 +261,7 @@ def _real(folder: Path) -> Path:
 def output_folder(folder: Path, manifest: dict[str, Any]) -> Iterator[Path]:
     """Return a fresh folder to write into, that takes the place of ``folder`` when the block ends well.
 
-    The manifest ``run.json`` is completed on leaving with ``program``, ``files`` and checksums; the caller may still
+    The manifest ``run.json`` is completed on leaving with ``program``, ``schema``, ``files`` and checksums; the caller may still
     add to the dictionary inside the block. A folder of the same ``manifest["command"]`` is replaced whole. On any
     error, Ctrl-C included, ``folder`` is left as it was. What killed processes left half-written beside it is removed.
 
@@ -291,6 +293,7 @@ def output_folder(folder: Path, manifest: dict[str, Any]) -> Iterator[Path]:
 def _finish(staging: Path, manifest: dict[str, Any]) -> None:
     names = [path.relative_to(staging).as_posix() for path in _walk(staging)]
     manifest["program"] = PROGRAM
+    manifest[KEY] = SCHEMA
     manifest["files"] = names
     if "checksums" not in manifest:
         manifest[SUMS] = {name: _digest(staging / name) for name in names}

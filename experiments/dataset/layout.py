@@ -13,6 +13,7 @@ from typing import Any
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files.incoming import read_json
 from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, new_file, write_json
+from closedrooms.core.files.schema import KEY, SCHEMA, check_schema
 from closedrooms.experiments.dataset.checksums import digest
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.sample import FORMAT, NOT_CONTENT, SURVEYS
@@ -103,6 +104,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     manifest = read_json(path, what="a dataset's manifest.json")
     if not isinstance(manifest, dict) or manifest.get("program") != PROGRAM:
         raise InvalidInputError("not written by closedrooms", expected="a dataset's manifest.json", where=path)
+    check_schema(manifest, path)
     if manifest.get("format") != FORMAT:
         raise InvalidInputError(
             f"a dataset of format {manifest.get('format')!r}",
@@ -116,6 +118,7 @@ def description(config: DatasetConfig, worlds: Sequence[World]) -> dict[str, Any
     """Tell what tells one dataset from another; whoever resumes must want the same."""
     return {
         "program": PROGRAM,
+        KEY: SCHEMA,
         "format": FORMAT,
         "seed": config.seed,
         "repetitions": config.repetitions,

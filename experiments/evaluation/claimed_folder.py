@@ -5,6 +5,7 @@ from pathlib import Path
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files.incoming import read_json
 from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, write_json
+from closedrooms.core.files.schema import KEY, SCHEMA, check_schema
 
 
 def claim(folder: Path, command: str) -> None:
@@ -16,20 +17,23 @@ def claim(folder: Path, command: str) -> None:
 
     Raises:
         OutputError: The folder cannot be written, or holds something else.
+        InvalidInputError: A newer version began it.
     """
     manifest = folder / MANIFEST
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"the output is a file; expected a folder: {folder}")
     if folder.is_dir() and any(folder.iterdir()):
         try:
-            ours = read_json(manifest, what="a manifest")["command"] == command
+            about = read_json(manifest, what="a manifest")
+            ours = about["command"] == command
         except (InvalidInputError, KeyError, TypeError):
             ours = False
         if not ours:
             raise OutputError(f"the output folder holds files of something else; expected an empty one: {folder}")
+        check_schema(about, manifest)
         return
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot write ({error.strerror}): {folder}") from error
-    write_json(manifest, {"program": PROGRAM, "command": command, "files": []})
+    write_json(manifest, {"program": PROGRAM, KEY: SCHEMA, "command": command, "files": []})

@@ -12,6 +12,7 @@ from closedrooms.core.files.geojson import read_doors, read_rooms
 from closedrooms.core.files.incoming import read_json
 from closedrooms.core.files.outgoing import MANIFEST
 from closedrooms.core.files.rosmap import read_map
+from closedrooms.core.files.schema import check_schema
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.numbers import repr_of
 from closedrooms.core.room import Room
@@ -107,6 +108,7 @@ def _read_about(sample: SamplePath) -> dict[str, Any]:
     data = read_json(path, what="the manifest of a run")
     if not isinstance(data, dict):
         raise InvalidInputError("no JSON object", expected="the manifest of a run", where=path)
+    check_schema(data, path)
     if sample.digest and digest(path) != sample.digest:
         raise InvalidInputError("changed since it was written", expected="its SHA-256 in SHA256SUMS", where=path)
     if sample.listed or "checksums" in data:
