@@ -81,6 +81,8 @@ def opened(path: Path, what: str) -> Iterator[io.BufferedReader]:
             if not stat.S_ISREG(mode):
                 kind = next((name for is_kind, name in KINDS.items() if is_kind(mode)), "no regular file")
                 raise InvalidInputError(kind, expected=f"{what} in a regular file", where=path)
+            # Some files of the kernel call themselves regular and have nothing to give: an error here, ``None`` later.
+            os.pread(descriptor, 1, 0)
             file = os.fdopen(descriptor, "rb")
         except BaseException:
             os.close(descriptor)
