@@ -10,6 +10,7 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
+from closedrooms.core.room import Room
 from closedrooms.core.scan import LaserScan
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
@@ -50,11 +51,13 @@ class TourPlan:
         prediction: The completed map that the tour was planned on.
         tour: A closed tour. It begins and ends at the vertex nearest to the robot.
         doors: The doors of the predicted rooms, open by the time they are reached.
+        unsure: Rooms with a confidence below this (0..1) come first, the least sure one before the others.
     """
 
     prediction: Prediction
     tour: CoverageTour
     doors: tuple[ClosedDoor, ...]
+    unsure: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,6 +102,7 @@ class TourFollower:
         self._doors = plan.doors
         self._coverage = coverage
         self._prediction = RevisedPrediction(plan.prediction, plan.doors, predictor)
+        self._unsure = plan.unsure
         self._stops = RemainingTour(plan.tour)
         self._driver = Driver(config)
         self._map = NavigationMap(config)
@@ -114,6 +118,19 @@ class TourFollower:
     def prediction(self) -> Prediction:
         """The prediction as revised so far."""
         return self._prediction.now
+
+    def doors_first(self) -> tuple[str, ...]:
+        """Doors of the unsure rooms with stops still to visit, the least sure one first."""
+        return tuple(door for room in self._unsure_rooms() for door in room.doors)
+
+    def _unsure_rooms(self) -> list[Room]:
+        """Rooms that nobody is sure of and that still hold stops, the least sure one first."""
+        asked = [
+            (room.confidence, room.doors, room)
+            for room in self.prediction.rooms
+            if room.confidence is not None and room.confidence < self._unsure and self._stops.within(room.polygon).any()
+        ]
+        return [room for _, _, room in sorted(asked, key=lambda entry: entry[:2])]
 
     def is_waiting(self, stamp: float) -> bool:
         """Check whether the robot waits for its doors at ``stamp`` [s]."""
@@ -195,6 +212,11 @@ class TourFollower:
         goals[cells[:, 0], cells[:, 1]] = True
         path = plan_path(costmap, (pose.x, pose.y), goals, self.config)
         self._stops.begin_at(np.array([pose.x, pose.y]) if path is None else path.points[-1])
+        self._put_unsure_first()
+
+    def _put_unsure_first(self) -> None:
+        """Change the order of the tour, where that is asked for."""
+        self._stops.put_first([room.polygon for room in self._unsure_rooms()])
 
     def _next(self, pose: Pose2, grid: OccupancyGrid, now: float) -> bool:
         """Set out for the next vertex, or for home; vertices that cannot be reached are given up."""
@@ -275,6 +297,7 @@ class TourFollower:
         done = np.array(self._driven + self._unreachable).reshape(-1, 2)
         if not self._stops.solve_again(completed, here, done, self._coverage, reach=reach):
             return False
+        self._put_unsure_first()
         self._replans += 1
         self._goal, self._attempts, self._going_back = None, 0, False
         return True

@@ -108,9 +108,10 @@ def _work(samples: Sequence[SamplePath], config: EvaluateConfig) -> Iterator[Out
         out=config.out.resolve(),
         tours=config.tours,
         probability=config.probability,
+        completions=config.completions,
     )
     workers = min(config.workers, len(samples))
-    needs = ("skimage", *(("networkx", "ortools") if config.tours else ()))
+    needs = ("skimage", *(("networkx", "ortools") if config.tours or config.completions else ()))
     crew: Crew[SamplePath, Outcome] = Crew(workers, config.scheduler, needs, "closedrooms evaluate")
     for sample, outcome in crew.do(job, samples):
         yield Outcome([], {sample.name: outcome.reason}) if isinstance(outcome, Lost) else outcome

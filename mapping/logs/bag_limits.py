@@ -8,10 +8,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from closedrooms.core.archives import MAX_UNPACKED
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.incoming import is_file, is_folder
-from closedrooms.core.yaml_text import parse_yaml
+from closedrooms.core.files.archives import MAX_UNPACKED
+from closedrooms.core.files.incoming import is_file, is_folder
+from closedrooms.core.files.yaml_text import parse_yaml
 
 WHAT = "a rosbag"
 MAX_CHUNK = 200_000_000

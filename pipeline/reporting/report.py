@@ -38,6 +38,7 @@ def run_report(
         *_map_rows(manifest),
         *_room_rows(manifest),
         *tour_rows(metrics["tour"]),
+        *spread_rows(metrics.get("completions")),
         *drive_rows(metrics.get("drive")),
         *((f"time: {stage}", f"{seconds:.2f} s") for stage, seconds in durations.items()),
     ]
@@ -89,6 +90,19 @@ def tour_rows(tour: Mapping[str, Any]) -> Rows:
     rows = [(f"tour on the {text}", figure(lengths[name], "{:.1f} m")) for name, text in names.items()]
     errors = tour["errors_percent"]
     return rows + [(f"tour error, {name}", figure(error, "{:.1f} %")) for name, error in errors.items()]
+
+
+def spread_rows(spread: Mapping[str, Any] | None) -> Rows:
+    """Tell what covering the building may cost, as it is drawn from what the rooms may be."""
+    if spread is None:
+        return []
+    share, low, high = 100 * spread["interval"], spread["low_m"], spread["high_m"]
+    rows = [
+        (f"tour, {spread['count']} completions", f"{spread['mean_m']:.1f} m, {share:.0f} %: {low:.1f} to {high:.1f} m")
+    ]
+    if "true_within" in spread:
+        rows.append(("true tour within", "yes" if spread["true_within"] else "no"))
+    return rows
 
 
 def drive_rows(drive: Mapping[str, Any] | None) -> Rows:
