@@ -13,7 +13,7 @@ class Report:
     """The outcome of one use case.
 
     Attributes:
-        folder: What was written: a folder, or a single file.
+        folder: What was written: a folder, a single file, or an address.
         title: Head of the table.
         rows: Rows for people; the first is the head.
         failures: What could not be done and why, by its id; the rest is written.
@@ -21,7 +21,7 @@ class Report:
         figures: The result for programs, plain JSON values.
     """
 
-    folder: Path
+    folder: Path | str
     title: str
     rows: Sequence[Sequence[str]]
     failures: Mapping[str, str] = field(default_factory=dict)

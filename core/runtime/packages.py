@@ -19,6 +19,7 @@ BROUGHT_BY = {
     "gtsam": "'closedrooms[slam]'",
     "rosbags": "'closedrooms[bags]'",
     "nicegui": "'closedrooms[web]'",
+    "fsspec": "'closedrooms[s3]'",
 }
 
 

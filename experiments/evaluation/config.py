@@ -8,6 +8,7 @@ import tyro
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.runtime.options import check_least
+from closedrooms.experiments.places import Place
 from closedrooms.experiments.scheduler_address import check_scheduler
 from closedrooms.pipeline.config import check_completions
 from closedrooms.predictor.methods import find_method
@@ -24,9 +25,9 @@ def in_order(names: Iterable[str]) -> list[str]:
 class EvaluateConfig:
     """What is compared with what."""
 
-    datasets: tyro.conf.Positional[tuple[Path, ...]]
-    """Folders written by ``closedrooms dataset`` (with manifest.json); in any other, a sample is any folder below that
-    holds map.yaml, doors.geojson and truth.yaml."""
+    datasets: tyro.conf.Positional[tuple[Place, ...]]
+    """Folders that ``closedrooms dataset`` wrote (with manifest.json), or the address of shards; in any other folder, a
+    sample is any folder below that holds map.yaml, doors.geojson and truth.yaml."""
 
     out: Path
     """Folder to write; the same command again goes on where it stopped."""

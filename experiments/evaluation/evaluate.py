@@ -36,7 +36,10 @@ def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Rep
     progress = progress or Silent()
     require("pyarrow", "matplotlib", by="closedrooms evaluate")
     # Workers of a cluster stand in other folders.
-    samples = [replace(sample, folder=sample.folder.resolve()) for sample in find_samples(config.datasets)]
+    samples = [
+        sample if sample.shard else replace(sample, folder=sample.folder.resolve())
+        for sample in find_samples(config.datasets)
+    ]
     claim(config.out, "evaluate")
     with only_writer(config.out):
         return _evaluate(samples, config, progress)

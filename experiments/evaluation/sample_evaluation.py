@@ -20,7 +20,7 @@ from closedrooms.core.files.rosmap import write_raw_map
 from closedrooms.experiments.dataset.checksums import digest
 from closedrooms.experiments.evaluation.cost import score_cost
 from closedrooms.experiments.evaluation.listing import SamplePath
-from closedrooms.experiments.evaluation.samples import Sample, read_sample
+from closedrooms.experiments.evaluation.samples import Sample, at_hand, read_sample, renamed
 from closedrooms.experiments.evaluation.scores import (
     added_rooms,
     hidden_area,
@@ -106,13 +106,22 @@ def evaluate_sample(
     Raises:
         OutputError: The result cannot be written.
     """
-    outcome = Outcome()
     if sample.problem:
-        outcome.problems[sample.name] = sample.problem
-        return outcome
+        return Outcome(problems={sample.name: sample.problem})
+    try:
+        with at_hand(sample) as here:
+            outcome = _evaluate(here, methods, out, Extras(tours, probability, completions))
+            problems = {name: renamed(why, here.folder, sample) for name, why in outcome.problems.items()}
+            return Outcome(outcome.scores, problems)
+    except InvalidInputError as error:
+        return Outcome(problems={sample.name: reason(error)})
+
+
+def _evaluate(sample: SamplePath, methods: Sequence[str], out: Path, extras: Extras) -> Outcome:
+    """Scores of some methods on one sample in a folder."""
+    outcome = Outcome()
     wanted = [*methods, *([AUTHORS] if (sample.folder / "authors.yaml").is_file() else [])]
     content = _content(sample.folder)
-    extras = Extras(tours, probability, completions)
     keys = {method: _fingerprint(content, method, extras) for method in wanted}
     kept = {method: _kept(out / method / sample.name / RESULT, keys[method]) for method in wanted}
     if any(scores is None for scores in kept.values()):
