@@ -227,13 +227,13 @@ def directions(angle_min: float, increment: float, beams: int) -> tuple[FloatArr
     return np.column_stack((np.cos(angles), np.sin(angles))), np.column_stack((np.cos(half), np.sin(half)))
 
 
-def thin(points: FloatArray, spacing: float, most: int) -> FloatArray:
+def thin_points(points: FloatArray, spacing: float, most: int) -> FloatArray:
     """Thin the points of a scan, shape (n, 2), in beam order, to ``most`` at most, about ``spacing`` [m] apart."""
     return points[spaced(points, np.array([len(points)]), spacing, most)]
 
 
 def spaced(points: FloatArray, counts: IntArray, spacing: float, most: int) -> BoolArray:
-    """Mark the points of each scan that :func:`thin` keeps, shape (..., n).
+    """Mark the points of each scan that :func:`thin_points` keeps, shape (..., n).
 
     Args:
         points: In beam order, shape (..., n, 2) [m]; what stands after the first ``counts`` of a scan does not count.

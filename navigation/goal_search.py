@@ -12,7 +12,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.navigation.config import RobotNavigation
 from closedrooms.navigation.costmap import Costmap, NavigationMap, pooled, traversable
 from closedrooms.navigation.frontiers import Frontiers, find_frontiers, seen_from
-from closedrooms.navigation.planner import Path, Search, reachable_cells, start_cell
+from closedrooms.navigation.planner import Path, PathSearch, reachable_cells, start_cell
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,7 +109,7 @@ class GoalSearch:
         is_large = found.unknown_area[found.labels] >= config.large_area
         large = _goal_cells(found.within(distance, is_large), costmap) & component
         small = _goal_cells(found.within(distance, ~is_large), costmap) & component
-        search = Search.begin(costmap, here, config)
+        search = PathSearch.begin(costmap, here, config)
         if search is None or not (large.any() or small.any()):
             return None
         search.run(large, limit=math.inf if large.any() else config.worth * config.large_area)

@@ -135,14 +135,7 @@ class TourFollower:
         grid: Callable[[], OccupancyGrid],
         bumps: Sequence[float] = (),
     ) -> tuple[float, float]:
-        """Decide on speed [m/s] and turn rate [rad/s] for now; (0, 0) once ``status`` is set.
-
-        Args:
-            pose: ``map_T_robot`` as estimated.
-            scan: What the robot sees now.
-            grid: Returns the map as estimated; only called when something is decided on it.
-            bumps: Directions from which something presses, robot frame [rad].
-        """
+        """Decide on speed [m/s] and turn rate [rad/s] for now; see ``Decider.command``. It waits for doors first."""
         now, driver = scan.stamp, self._driver
         self._started_at = now if self._started_at is None else self._started_at
         if self.status is not None or self.is_waiting(now):

@@ -12,7 +12,7 @@ from closedrooms.core.door import Segment
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.geometry import areal, wall_area
 from closedrooms.worlds.plan import FloorPlan, Wall
-from closedrooms.worlds.wall_assembly import joined
+from closedrooms.worlds.wall_assembly import join_segments
 
 # The smallest robot that must not get out [m].
 RADIUS = 0.15
@@ -51,7 +51,7 @@ def without_leaks(plan: FloorPlan) -> FloorPlan:
     for line in shapely.get_parts(bare):
         points = [(round(x, 4), round(y, 4)) for x, y in shapely.get_coordinates(line).tolist()]
         segments += [(a, b) for a, b in itertools.pairwise(points) if a != b]
-    runs = [run for run in joined(segments) if math.dist(*run) >= SHORTEST]
+    runs = [run for run in join_segments(segments) if math.dist(*run) >= SHORTEST]
     if not runs:
         return plan
     thickness = round(float(np.median([wall.thickness for wall in plan.walls])), 4)
