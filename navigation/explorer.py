@@ -142,7 +142,7 @@ class Explorer:
         self._driver.follow(goal.path.points, now)
 
     def _look(self, pose: Pose2, grid: Callable[[], OccupancyGrid], now: float) -> tuple[float, float]:
-        """At the goal: face what is still unknown, and give it up when it stays so."""
+        """Face what is still unknown at the goal, and give it up when it stays so."""
         goal, since = self.goal, self._facing_since
         assert goal is not None
         assert since is not None
@@ -165,7 +165,7 @@ class Explorer:
         self._driver.stop()
 
     def _count(self, place: Point) -> int:
-        """How often this place has been chosen, this time included."""
+        """Count how often this place has been chosen, this time included."""
         for i, (other, count) in enumerate(self._chosen):
             if math.dist(place, other) < SAME_PLACE:
                 self._chosen[i] = (other, count + 1)

@@ -197,7 +197,7 @@ def straighten(points: FloatArray, costmap: Costmap, config: RobotNavigation) ->
 def _is_clear(
     points: FloatArray, clearance: Field, start: int, end: int, costmap: Costmap, config: RobotNavigation
 ) -> bool:
-    """Whether the straight line between two path points is as clear as the part of the path it would replace."""
+    """Check whether a straight line between two path points is as clear as the stretch it would replace."""
     if end == start + 1:
         return True
     needed = min(float(clearance[start + 1 : end + 1].min()), config.open_clearance)

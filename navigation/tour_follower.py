@@ -168,7 +168,7 @@ class TourFollower:
             self._goal, self._arrived = None, True
 
     def _arrive(self) -> None:
-        """At the end of a path: as near to the vertex as one gets."""
+        """Count a vertex as visited at the end of a path: it is as near as one gets."""
         if self._going_back:
             self._going_back = False
         elif len(self._stops):
@@ -246,7 +246,7 @@ class TourFollower:
                 self._goal = None
 
     def _was_at(self, door_id: str) -> bool:
-        """Whether the robot has come close to a door."""
+        """Check whether the robot has come close to a door."""
         places = [door.midpoint for door in self._doors if door.id == door_id]
         return any(math.dist(place, at) <= AT_DOOR for place in places for at in self._driven)
 

@@ -18,7 +18,7 @@ from closedrooms.worlds.wall_assembly import join_segments
 RADIUS = 0.15
 # Rooms closer together than this face each other and not the outside [m].
 FACING = 0.6
-# Pieces of outline shorter than this are no way out [m].
+# Pieces of outline shorter than this let nobody out [m].
 SHORTEST = 0.01
 
 
