@@ -17,7 +17,7 @@ OUTLIER_GAP = 0.30
 lidar) is not believed."""
 SURROUNDINGS = 2
 """Beams to each side whose median says how far one can see: two outliers in a row, at 1 % of them one scan in ten,
-still open no way through a wall."""
+still open no gap in a wall."""
 ON_WALL = (4.0, 3.0, 3.0, 3.0)
 """Standard deviations by which the mean of the next pair of neighbours may leave that of the beams within, from the
 innermost pair on: beams far off their wall need the averaging most, corners must end it. A wall is drawn through as
@@ -227,13 +227,13 @@ def directions(angle_min: float, increment: float, beams: int) -> tuple[FloatArr
     return np.column_stack((np.cos(angles), np.sin(angles))), np.column_stack((np.cos(half), np.sin(half)))
 
 
-def thin(points: FloatArray, spacing: float, most: int) -> FloatArray:
+def thin_points(points: FloatArray, spacing: float, most: int) -> FloatArray:
     """Thin the points of a scan, shape (n, 2), in beam order, to ``most`` at most, about ``spacing`` [m] apart."""
     return points[spaced(points, np.array([len(points)]), spacing, most)]
 
 
 def spaced(points: FloatArray, counts: IntArray, spacing: float, most: int) -> BoolArray:
-    """Mark the points of each scan that :func:`thin` keeps, shape (..., n).
+    """Mark the points of each scan that :func:`thin_points` keeps, shape (..., n).
 
     Args:
         points: In beam order, shape (..., n, 2) [m]; what stands after the first ``counts`` of a scan does not count.
@@ -243,9 +243,9 @@ def spaced(points: FloatArray, counts: IntArray, spacing: float, most: int) -> B
     """
     number = np.arange(points.shape[-2])
     steps = np.hypot(np.diff(points[..., 0]), np.diff(points[..., 1]))
-    way = np.zeros(points.shape[:-1])
-    np.cumsum(np.where(number[1:] < counts, np.minimum(steps, spacing), 0.0), axis=-1, out=way[..., 1:])
-    ticks = np.floor(way / np.maximum(spacing, way[..., -1:] / most))
+    along = np.zeros(points.shape[:-1])
+    np.cumsum(np.where(number[1:] < counts, np.minimum(steps, spacing), 0.0), axis=-1, out=along[..., 1:])
+    ticks = np.floor(along / np.maximum(spacing, along[..., -1:] / most))
     keep: BoolArray = (number < counts) & (counts < 3)
     keep[..., :1] = counts > 0
     keep[..., 1:] |= ticks[..., 1:] > ticks[..., :-1]

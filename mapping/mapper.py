@@ -12,7 +12,7 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.beams import Beams, clean, hit_points, matched_range, thin
+from closedrooms.mapping.beams import Beams, clean, hit_points, matched_range, thin_points
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.door_fusion import fuse_doors
 from closedrooms.mapping.graph.keyframe import Keyframe
@@ -24,7 +24,7 @@ from closedrooms.mapping.mapping_events import Event, EventLog
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.relocalisation import relocalise
 from closedrooms.mapping.matching.scan_matcher import ADVANTAGE, Match, match_scan
-from closedrooms.mapping.motion import Motion
+from closedrooms.mapping.motion import UncertainMotion
 from closedrooms.mapping.motion_prediction import MotionPrediction
 from closedrooms.mapping.scan_preparation import Sweep
 from closedrooms.mapping.sweep_motion import SweepMotion
@@ -58,7 +58,7 @@ class Mapper:
         self._evidence = EvidenceGrid(self._config)
         self._pose = Pose2()
         self._prediction = MotionPrediction(self._config.recovery, self._events)
-        self._motion = Motion()
+        self._motion = UncertainMotion()
         self._measured = True
         self._last_odometry: Pose2 | None = None
         self._usual_score = 0.0
@@ -112,7 +112,7 @@ class Mapper:
         else:
             reach = matched_range(scan, max_range=max_range, margin=matcher.range_margin)
             hits = hit_points(scan, max_range=reach, motion=motion)
-            points = thin(hits, matcher.point_spacing, matcher.max_points)
+            points = thin_points(hits, matcher.point_spacing, matcher.max_points)
 
         @functools.cache
         def beams() -> Beams:

@@ -60,7 +60,17 @@ class Decider(Protocol):
         grid: Callable[[], OccupancyGrid],
         bumps: Sequence[float] = (),
     ) -> tuple[float, float]:
-        """Decide on speed [m/s] and turn rate [rad/s] for now."""
+        """Decide on speed [m/s] and turn rate [rad/s] for now.
+
+        Args:
+            pose: ``map_T_robot`` as estimated.
+            scan: What the robot sees now.
+            grid: Returns the map as estimated; only called when something is decided on it.
+            bumps: Directions from which something presses, robot frame [rad].
+
+        Returns:
+            The command; (0, 0) once ``status`` is set.
+        """
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -94,7 +94,7 @@ def find_frontiers(
 
 
 def _edge(free: Image, blocked: Image, resolution: float) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float32]]:
-    """Free cells beside unknown ones, and the area of the largest unknown patch that each is beside.
+    """Find free cells beside unknown ones, and the area of the largest unknown patch that each is beside.
 
     Returns:
         Cells ``(row, col)`` in their order, shape (n, 2), and areas [m2], shape (n,).

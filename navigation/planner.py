@@ -75,7 +75,7 @@ def plan_path(costmap: Costmap, start: Point, goals: BoolArray, config: RobotNav
     Returns:
         The path, or ``None`` when no goal can be reached.
     """
-    search = Search.begin(costmap, start, config)
+    search = PathSearch.begin(costmap, start, config)
     if search is None:
         return None
     search.run(goals)
@@ -83,7 +83,7 @@ def plan_path(costmap: Costmap, start: Point, goals: BoolArray, config: RobotNav
     return None if cell is None else search.path(cell)
 
 
-class Search:
+class PathSearch:
     """Dijkstra's algorithm over the planning grid from one start (scikit-image's minimum cost path).
 
     A metre costs 1 in the open and up to ``1 + clearance_weight`` beside an obstacle. The search begins in a window
@@ -97,7 +97,7 @@ class Search:
         self._search: Any = None
 
     @classmethod
-    def begin(cls, costmap: Costmap, start: Point, config: RobotNavigation) -> "Search | None":
+    def begin(cls, costmap: Costmap, start: Point, config: RobotNavigation) -> "PathSearch | None":
         """Begin a search at ``start`` (map frame), ``None`` when the robot does not fit anywhere near."""
         first = start_cell(costmap, traversable(costmap, config), start)
         return None if first is None else cls(costmap, start, first, config)
@@ -197,7 +197,7 @@ def straighten(points: FloatArray, costmap: Costmap, config: RobotNavigation) ->
 def _is_clear(
     points: FloatArray, clearance: Field, start: int, end: int, costmap: Costmap, config: RobotNavigation
 ) -> bool:
-    """Whether the straight line between two path points is as clear as the part of the path it would replace."""
+    """Check whether a straight line between two path points is as clear as the stretch it would replace."""
     if end == start + 1:
         return True
     needed = min(float(clearance[start + 1 : end + 1].min()), config.open_clearance)

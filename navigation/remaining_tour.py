@@ -156,7 +156,7 @@ def open_tour(distances: FloatArray, config: CoverageConfig) -> list[int]:
 
 
 def _was_near(vertex: FloatArray, done: FloatArray, distance: float, grid: OccupancyGrid) -> bool:
-    """Whether some of the places ``done``, shape (n, 2) [m], lies within a distance [m] of a vertex, in free sight."""
+    """Check whether some of the places ``done``, shape (n, 2) [m], lies near a vertex [m], in free sight."""
     close = done[np.hypot(*(done - vertex).T) <= distance]
     if len(close) == 0:
         return False

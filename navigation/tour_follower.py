@@ -152,14 +152,7 @@ class TourFollower:
         grid: Callable[[], OccupancyGrid],
         bumps: Sequence[float] = (),
     ) -> tuple[float, float]:
-        """Decide on speed [m/s] and turn rate [rad/s] for now; (0, 0) once ``status`` is set.
-
-        Args:
-            pose: ``map_T_robot`` as estimated.
-            scan: What the robot sees now.
-            grid: Returns the map as estimated; only called when something is decided on it.
-            bumps: Directions from which something presses, robot frame [rad].
-        """
+        """Decide on speed [m/s] and turn rate [rad/s] for now; see ``Decider.command``. It waits for doors first."""
         now, driver = scan.stamp, self._driver
         self._started_at = now if self._started_at is None else self._started_at
         if self.status is not None or self.is_waiting(now):
@@ -192,7 +185,7 @@ class TourFollower:
             self._goal, self._arrived = None, True
 
     def _arrive(self) -> None:
-        """At the end of a path: as near to the vertex as one gets."""
+        """Count a vertex as visited at the end of a path: it is as near as one gets."""
         if self._going_back:
             self._going_back = False
         elif len(self._stops):
@@ -275,7 +268,7 @@ class TourFollower:
                 self._goal = None
 
     def _was_at(self, door_id: str) -> bool:
-        """Whether the robot has come close to a door."""
+        """Check whether the robot has come close to a door."""
         places = [door.midpoint for door in self._doors if door.id == door_id]
         return any(math.dist(place, at) <= AT_DOOR for place in places for at in self._driven)
 

@@ -13,7 +13,7 @@ from closedrooms.core.room import Room
 from closedrooms.core.shapes import Shape
 from closedrooms.predictor.config import FacesConfig
 from closedrooms.predictor.inpainting import complete_map
-from closedrooms.predictor.paper.arrangement import joined
+from closedrooms.predictor.paper.arrangement import unite_faces
 from closedrooms.predictor.paper.initial_layouts import Start, Started, start_rooms
 from closedrooms.predictor.prediction import Prediction
 
@@ -153,7 +153,7 @@ def _faces_in_sight(start: Start, room: int) -> Shape:
             if _in_sight(crossed, eye, arrangement.faces[other]):
                 seen.append(other)
                 queue.append(other)
-    return joined([arrangement.faces[face] for face in sorted(seen)])
+    return unite_faces([arrangement.faces[face] for face in sorted(seen)])
 
 
 def _in_sight(inner: shapely.STRtree, eye: FloatArray, face: Polygon) -> bool:

@@ -87,7 +87,7 @@ class Obstacles:
         return [*fixed, *(edge for name in leaves for edge in self._leaves[name])]
 
     def _cells_near(self, edge: Sequence[float]) -> Iterable[tuple[int, int]]:
-        """Cells from which ``edge`` can be within reach."""
+        """List the cells from which ``edge`` can be within reach."""
         ax, ay, bx, by = edge
         box = (min(ax, bx), min(ay, by), max(ax, bx), max(ay, by))
         x0, y0, x1, y1 = (math.floor(v / CELL) for v in _grown(box, self.reach))
@@ -156,7 +156,7 @@ def move_disc(x: float, y: float, dx: float, dy: float, radius: float, edges: Se
 def _free_share(
     x: float, y: float, dx: float, dy: float, limit: float, edges: Sequence[Edge]
 ) -> tuple[float, tuple[float, float] | None]:
-    """A share of the motion that is surely free, and the normal of an edge that stops it right here."""
+    """Find the share of the motion that is surely free, and the normal of an edge that stops it right here."""
     share = 1.0
     contact = None
     deepest = TOUCH
@@ -176,7 +176,7 @@ def _free_share(
 
 
 def _along(dx: float, dy: float, normals: list[tuple[float, float]]) -> tuple[float, float]:
-    """What is left of a motion beside the edges it touches: along the last one, nothing in a corner."""
+    """Turn a motion along the last edge that it touches; nothing of it is left in a corner."""
     nx, ny = normals[-1]
     inward = dx * nx + dy * ny
     dx, dy = dx - inward * nx, dy - inward * ny

@@ -92,7 +92,7 @@ class Drive:
             left -= time
 
     def _piece(self, v: float, w: float, left: float) -> float:
-        """How long to go on with one arc: until a ramp ends, and never too far."""
+        """Choose how long to go on with one arc: until a ramp ends, and never too far [s]."""
         time = left
         for now, wanted, rate in (
             (self.v, v, self.config.max_acceleration),
@@ -117,7 +117,7 @@ class Drive:
         return self._arc_beside(length, turn, edges)
 
     def _arc_beside(self, length: float, turn: float, edges: Sequence[Edge]) -> Motion:
-        """An arc that may meet something, chord by chord."""
+        """Drive an arc that may meet something, chord by chord."""
         x0, y0, theta0 = self.x, self.y, self.theta
         chords = max(math.ceil(abs(length) / CHORD_LENGTH), math.ceil(abs(turn) / CHORD_TURN), 1)
         step_x, step_y = chord(length / chords, turn / chords)

@@ -99,7 +99,7 @@ def door_leaves(plan: FloorPlan, door: PlanDoor, solids: Solids, swing: float) -
 
 
 def _opening_side(plan: FloorPlan, door: PlanDoor) -> FloatArray:
-    """Unit normal of the door towards the side that it opens into, shape (2,)."""
+    """Find the unit normal of the door towards the side that it opens into, shape (2,)."""
     a, b = np.array(door.segment)
     along = (b - a) / door.width
     normal = np.array([-along[1], along[0]])
@@ -136,7 +136,7 @@ def _hinged_leaf(
 
 
 def _free_travel(leaf: Leaf, trials: FloatArray, solids: Solids) -> float:
-    """The last position before the leaf touches ``solids`` on its travel through ``trials``."""
+    """Find the last position before the leaf touches ``solids`` on its travel through ``trials``."""
     shapely.prepare(solids)
     touches = shapely.intersects(solids, shapely.polygons(leaf.at(trials)))
     if not touches.any():
@@ -155,7 +155,7 @@ def _free_travel(leaf: Leaf, trials: FloatArray, solids: Solids) -> float:
 
 
 def _sliding_leaves(plan: FloorPlan, door: PlanDoor, half: float) -> tuple[Leaf, ...]:
-    """The panels of a sliding door: towards the hinge's end, the other, or parting, whatever opens it furthest."""
+    """Make the panels of a sliding door: to the hinge's end, the other, or parting, whatever opens it furthest."""
     near, far = np.array(door.segment) if door.hinge == 0 else np.array(door.segment[::-1])
     middle = (near + far) / 2
     walls = wall_area(plan)
@@ -172,7 +172,7 @@ def _sliding_leaves(plan: FloorPlan, door: PlanDoor, half: float) -> tuple[Leaf,
 
 
 def _panels(jamb: FloatArray, end: FloatArray, half: float, count: int, pocket: float) -> Iterator[Leaf]:
-    """Panels from ``jamb`` to ``end`` that telescope into a pocket of depth ``pocket`` [m] behind the jamb."""
+    """Make panels from ``jamb`` to ``end`` that telescope into a pocket of depth ``pocket`` [m] behind the jamb."""
     step = (end - jamb) / count
     width = _length(step)
     for number in range(count):
@@ -188,7 +188,7 @@ def _panels(jamb: FloatArray, end: FloatArray, half: float, count: int, pocket: 
 
 
 def _pocket(jamb: FloatArray, outward: FloatArray, length: float, half: float, walls: Solids) -> float:
-    """How far a panel can slide past ``jamb`` and stay inside the wall, up to ``length`` [m]."""
+    """Measure how far a panel can slide past ``jamb`` and stay inside the wall, up to ``length`` [m]."""
     direction = outward / _length(outward)
     depths = np.arange(1, math.ceil(length / TRIAL) + 1) * (length / math.ceil(length / TRIAL))
     strips = [_rectangle(jamb, jamb + depth * direction, half - min(PROUD, half / 2)) for depth in depths]
@@ -198,7 +198,7 @@ def _pocket(jamb: FloatArray, outward: FloatArray, length: float, half: float, w
 
 
 def _rectangle(a: FloatArray, b: FloatArray, half: float) -> FloatArray:
-    """Corners, shape (4, 2), of the strip of half width ``half`` from ``a`` to ``b``."""
+    """Compute the corners, shape (4, 2), of the strip of half width ``half`` from ``a`` to ``b``."""
     corners: FloatArray = rectangles(np.array([[a, b]]), np.array([half]))[0]
     return corners
 

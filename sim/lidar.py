@@ -74,13 +74,13 @@ class Lidar:
         return distances, bodies
 
     def _rays(self, world_T_robot: Pose2) -> tuple[FloatArray, FloatArray, float]:
-        """Where the sensor is, shape (2,) [m], the beams' directions, shape (beams, 2), and its heading [rad]."""
+        """Compute the sensor's place, shape (2,) [m], beams' directions, shape (beams, 2), and its heading [rad]."""
         sensor = world_T_robot @ self._mount
         angles = self._angles + sensor.theta
         return np.array([sensor.x, sensor.y]), np.column_stack((np.cos(angles), np.sin(angles))), sensor.theta
 
     def _rolling_rays(self, poses: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-        """As :meth:`_rays` with a place of the sensor for each beam, shape (beams, 2) [m]."""
+        """Compute what :meth:`_rays` does with a place of the sensor for each beam, shape (beams, 2) [m]."""
         headings = poses[:, 2]
         c, s = np.cos(headings), np.sin(headings)
         x, y = self._mount.x, self._mount.y
@@ -94,7 +94,7 @@ class Lidar:
         return stamp + np.linspace(first, last, self.config.beams)
 
     def _expected(self, heading: float) -> FloatArray:
-        """How far to cast each ray at first [m], shape (beams,)."""
+        """Estimate how far to cast each ray at first [m], shape (beams,)."""
         longest = self.config.range_max
         if self._last is None:
             return np.full(self.config.beams, longest)
@@ -118,7 +118,7 @@ class Lidar:
     def _behind_glass(
         self, start: FloatArray, directions: FloatArray, distances: FloatArray, bodies: IntArray
     ) -> tuple[FloatArray, IntArray]:
-        """Distances and bodies with the beams that panes before them return."""
+        """Replace distances and bodies of the beams that panes before them return."""
         starts = np.full((*start.shape[:-1], 3), self.config.height)
         starts[..., :2] = start
         ends = np.full((len(directions), 3), self.config.height)
@@ -158,7 +158,7 @@ class Lidar:
         return scan, np.where(measured, bodies, -1)
 
     def _disturbed(self, distances: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Measured ranges [m] and which of them are measurements of what the ray hit."""
+        """Disturb the ranges [m]; says which of them are measurements of what the ray hit."""
         noise, config = self._noise, self.config
         ranges = distances
         if noise.range_sd > 0:

@@ -51,7 +51,7 @@ class Odometry:
         self._theta += turn
 
     def _disturbed(self, motion: Motion) -> tuple[float, float, float, float]:
-        """The motion as the odometry counts it, and the error of its first turn [rad]."""
+        """Disturb a motion as the odometry counts it; returns the error of its first turn [rad] too."""
         alpha1, alpha2, alpha3, alpha4 = self._alphas
         noise = self._noise
         travelled, turned = math.hypot(motion.dx, motion.dy), abs(motion.turn)

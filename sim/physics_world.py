@@ -315,7 +315,7 @@ class PhysicsWorld:
         return fractions, bodies, found
 
     def _visual(self, vertices: FloatArray, triangles: IntArray, colour: Colour) -> int:
-        """What is drawn of a mesh, flat faces from both sides; -1, nothing, where nobody looks."""
+        """Make what is drawn of a mesh, flat faces from both sides; -1, nothing, where nobody looks."""
         if not self.visible:
             return -1
         # Every face has corners and a normal of its own, and once more turned round.
@@ -368,7 +368,7 @@ def check_display() -> None:
 
 
 def _volume(part: MovingPart) -> float:
-    """Of the upright prism that a part is [m^3]; its triangles are its sides alone."""
+    """Compute the volume of the upright prism that a part is [m^3]; its triangles are its sides alone."""
     a, b, c = (part.vertices[part.triangles[:, i]] for i in range(3))
     # The divergence of (x, y, 0) is 2, and top and bottom do not count.
     flux = np.cross(b - a, c - a) * (a + b + c)

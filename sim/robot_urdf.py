@@ -173,7 +173,7 @@ def check_description(path: Path) -> None:
 
 
 def _check_tree(root: Any, path: Path) -> None:
-    """Links and joints must make one tree: PyBullet crashes on anything else."""
+    """Check that links and joints make one tree: PyBullet crashes on anything else."""
     links = [link.get("name") for link in root.findall("link")]
     pairs = []
     for joint in root.findall("joint"):
@@ -207,7 +207,7 @@ def _check_loads(path: Path) -> None:
 
 
 def _joints(physics: PhysicsWorld, path: Path) -> tuple[list[Joint], tuple[FloatArray, FloatArray]]:
-    """Every joint, and the corners of the box around the base, of the robot with its base frame at the origin."""
+    """List the joints, and the corners of the box around the base, of the robot with its base at the origin."""
     bullet, client = physics.bullet, physics.client
     with quiet():
         flags = bullet.URDF_USE_INERTIA_FROM_FILE
@@ -242,7 +242,7 @@ def _box(physics: PhysicsWorld, body: int, link: int, place: Any) -> tuple[Float
 
 
 def _find_wheels(joints: list[Joint], named: str | None, path: Path) -> tuple[tuple[Wheel, ...], float]:
-    """The driven wheels and the direction in which they roll [rad]."""
+    """Find the driven wheels and the direction in which they roll [rad]."""
     by_name = {joint.name: joint for joint in joints}
     if named is not None:
         names = [name.strip() for name in named.split(",") if name.strip()]
@@ -294,7 +294,7 @@ def _find_wheels(joints: list[Joint], named: str | None, path: Path) -> tuple[tu
 
 
 def _above(joint: Joint, joints: list[Joint]) -> list[Joint]:
-    """The joints between a link and the base that can turn."""
+    """List the joints between a link and the base that can turn."""
     found, parent = [], joint.parent
     while parent >= 0:
         above = joints[parent]
@@ -305,7 +305,7 @@ def _above(joint: Joint, joints: list[Joint]) -> list[Joint]:
 
 
 def _calibrated(model: RobotModel, robot: RobotConfig, path: Path) -> tuple[RobotModel, RobotConfig]:
-    """Model and limits by which the robot drives as it is told: wheel radius, track, and accelerations that do not tip.
+    """Calibrate wheel radius, track and accelerations so that the robot drives as it is told and does not tip.
 
     Raises:
         InvalidInputError: It does not get on, does not turn or tips, however gently it is driven.
@@ -362,7 +362,7 @@ def _ignore(_: Motion) -> None:
 def _lidar_mount(
     joints: list[Joint], middle: FloatArray, heading: float, floor: float
 ) -> tuple[float, float, float, float] | None:
-    """Where the lidar sits, ``(x, y, theta)`` in the robot frame, and its height [m]; ``None`` where no link says."""
+    """Find the lidar, ``(x, y, theta)`` in the robot frame, and its height [m]; ``None`` where no link says."""
     for word in LIDAR_NAMES:
         for joint in joints:
             if word in joint.link.lower():

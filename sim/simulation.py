@@ -150,13 +150,13 @@ class Simulation:
         return Observation(whole, faults.odometry(odometry, self._time), sightings if whole is scan else (), bumps)
 
     def _odometry_noise(self) -> NoiseConfig:
-        """The noise with what unequal wheels add: a curve where the wheels turn alike."""
+        """Add to the noise what unequal wheels do: a curve where the wheels turn alike."""
         noise, unequal = self.config.noise, self.config.faults.unequal_wheels
         track = TRACK_SHARE * self.config.robot.radius if self._model is None else self._model.track
         return replace(noise, bias_turn_per_metre=noise.bias_turn_per_metre + unequal / track)
 
     def _let_in(self, physics: PhysicsWorld) -> list[Person | MovedBox]:
-        """People and boxes, none at the robot's start."""
+        """Let in people and boxes, none at the robot's start."""
         config, start, building = self.config, self.world_T_map, self._building
         if not config.people + config.clutter:
             return []
@@ -172,7 +172,7 @@ class Simulation:
         return movers
 
     def _beam_poses(self) -> FloatArray | None:
-        """Where the robot was at each beam of a rolling sweep, shape (beams, 3), building frame."""
+        """Interpolate the robot's pose at each beam of a rolling sweep, shape (beams, 3), building frame."""
         if not self._rolls:
             return None
         stamps, poses = self._path[:, 0], self._path[:, 1:]

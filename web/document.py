@@ -193,7 +193,7 @@ def _rounded(door: ClosedDoor) -> ClosedDoor:
 
 
 def _drawn(name: str, segment: Segment, width: float | None) -> ClosedDoor:
-    """A door from jamb to jamb.
+    """Place a door from jamb to jamb.
 
     Raises:
         InvalidInputError: Too far away, too narrow or too wide.

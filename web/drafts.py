@@ -114,7 +114,7 @@ def state_folder() -> Path:
 
 
 def _places(value: Any) -> frozenset[tuple[float, float]]:
-    """Points of a file; what is none is left out: a dismissed proposal comes back then."""
+    """Read the points of a file; what is none is left out: a dismissed proposal comes back then."""
     found = value if isinstance(value, list) else []
     return frozenset(
         (float(place[0]), float(place[1]))

@@ -37,7 +37,7 @@ def wall_area(plan: FloorPlan) -> Polygon | MultiPolygon:
     passages = plan.passages
     if not passages:
         return walls
-    lines = WallLines(plan)
+    lines = WallAxes(plan)
     gaps = shapely.union_all([lines.gap(passage.segment) for passage in passages])
     return _without_twins(shapely.difference(walls, gaps))
 
@@ -98,7 +98,7 @@ def _mitre(node: FloatArray, a1: float, h1: float, a2: float, h2: float) -> Base
     return Polygon(corners).convex_hull
 
 
-class WallLines:
+class WallAxes:
     """Centre lines of a plan's walls, to look up the wall under a door."""
 
     def __init__(self, plan: FloorPlan) -> None:
@@ -128,7 +128,7 @@ class WallLines:
 
 def wall_thickness_at(plan: FloorPlan, door: PlanDoor | Opening) -> float:
     """Look up the thickness [m] of the wall that ``door`` stands in; of a bare gap where there is no wall."""
-    thickness = WallLines(plan).thickness(door.segment)
+    thickness = WallAxes(plan).thickness(door.segment)
     return BARE_GAP if thickness is None else thickness
 
 

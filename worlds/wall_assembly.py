@@ -22,8 +22,8 @@ STRAIGHT = 2e-3
 
 
 @dataclass(frozen=True, slots=True)
-class Edge:
-    """A straight piece of the boundary between two rooms, or of the outside (``rooms[1]`` is ``None``).
+class RoomEdge:
+    """A straight stretch of the border between two rooms, or to the outside (``rooms[1]`` is ``None``).
 
     Attributes:
         segment: Building frame [m].
@@ -49,7 +49,7 @@ class Edge:
         return (self.point(centre - width / 2), self.point(centre + width / 2))
 
 
-def shared_edges(polygons: Sequence[Polygon]) -> list[Edge]:
+def shared_edges(polygons: Sequence[Polygon]) -> list[RoomEdge]:
     """Find the straight edges of rooms that form a coverage (neighbours share their vertices).
 
     Returns:
@@ -68,10 +68,10 @@ def shared_edges(polygons: Sequence[Polygon]) -> list[Edge]:
         if first != second:
             by_pair[first, second].append(segment)
     ordered = sorted(by_pair.items(), key=lambda item: (item[0][0], -1 if item[0][1] is None else item[0][1]))
-    return [Edge(segment, pair) for pair, segments in ordered for segment in joined(segments)]
+    return [RoomEdge(segment, pair) for pair, segments in ordered for segment in join_segments(segments)]
 
 
-def joined(segments: Iterable[Segment]) -> list[Segment]:
+def join_segments(segments: Iterable[Segment]) -> list[Segment]:
     """Join segments to straight runs as long as they go.
 
     A run grows from piece to touching piece while all its points lie within :data:`STRAIGHT` of the line between its
@@ -118,19 +118,21 @@ def _straight_run(points: Sequence[Point]) -> Segment | None:
     return (start, end) if aside <= STRAIGHT else None
 
 
-def walls_along(edges: Sequence[Edge], thickness: Callable[[Edge], float]) -> list[Wall]:
+def walls_along(edges: Sequence[RoomEdge], thickness: Callable[[RoomEdge], float]) -> list[Wall]:
     """Build one wall along each straight run of edges of one thickness; edges of thickness 0 carry none."""
     by_thickness: defaultdict[float, list[Segment]] = defaultdict(list)
     for edge in edges:
         value = thickness(edge)
         if value > 0.0:
             by_thickness[value].append(edge.segment)
-    runs = [(segment, value) for value in sorted(by_thickness) for segment in joined(by_thickness[value])]
+    runs = [(segment, value) for value in sorted(by_thickness) for segment in join_segments(by_thickness[value])]
     runs.sort()
     return [Wall(f"w{number:03d}", segment, value) for number, (segment, value) in enumerate(runs)]
 
 
-def free_spans(edge: Edge, edges: Sequence[Edge], taken: Iterable[Segment], margin: float) -> list[tuple[float, float]]:
+def free_spans(
+    edge: RoomEdge, edges: Sequence[RoomEdge], taken: Iterable[Segment], margin: float
+) -> list[tuple[float, float]]:
     """List the stretches of an edge, in metres from its first end, where a door may stand.
 
     Args:
@@ -160,7 +162,7 @@ def free_spans(edge: Edge, edges: Sequence[Edge], taken: Iterable[Segment], marg
     return spans
 
 
-def _coordinates(edge: Edge, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _coordinates(edge: RoomEdge, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """How far along an edge and how far from its line points, shape (..., 2), lie [m]."""
     start = np.array(edge.segment[0])
     direction = (np.array(edge.segment[1]) - start) / edge.length

@@ -39,10 +39,10 @@ def disturbed_doors(
             continue
         x, y = door.midpoint
         angle = math.radians(turn) * (1.0 if side < 0.5 else -1.0)
-        way = 2.0 * math.pi * direction
+        heading = 2.0 * math.pi * direction
         # Turned about its middle, then shifted.
         moved = door.moved(Pose2(-x, -y)).moved(Pose2(0.0, 0.0, angle))
-        found.append(moved.moved(Pose2(x + shift * math.cos(way), y + shift * math.sin(way))))
+        found.append(moved.moved(Pose2(x + shift * math.cos(heading), y + shift * math.sin(heading))))
     return found
 
 

@@ -35,7 +35,7 @@ START_CLEAR = 0.6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Drive:
+class RecordedDrive:
     """What ideal sensors saw on one exploration with all doors open.
 
     Attributes:
@@ -55,7 +55,7 @@ class Drive:
 
 def record_drive(
     plan: FloorPlan, sim: SimConfig, mapper: MapperConfig, navigation: NavigationConfig, seed: int
-) -> Drive:
+) -> RecordedDrive:
     """Explore a building with all doors open and ideal sensors.
 
     Args:
@@ -72,11 +72,11 @@ def record_drive(
     with Simulation(plan, (), ideal, seed) as world:
         log = RunLog(world, Silent(), keep_scans=True)
         survey = survey_building(log, Mapper(mapper), navigation)
-        return Drive(plan, ideal, log.recorded(), world.world_T_map, survey.exploration.status)
+        return RecordedDrive(plan, ideal, log.recorded(), world.world_T_map, survey.exploration.status)
 
 
 def map_drive(
-    drive: Drive, noise: NoiseConfig, mapper: MapperConfig, seed: int, faults: FaultConfig | None = None
+    drive: RecordedDrive, noise: NoiseConfig, mapper: MapperConfig, seed: int, faults: FaultConfig | None = None
 ) -> OpenSurvey:
     """Map a drive again as worse sensors would have seen it.
 

@@ -13,7 +13,7 @@ from closedrooms.mapping.graph.pose_graph import Edge, PoseGraph, optimise
 from closedrooms.mapping.growing_array import GrowingArray
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
-from closedrooms.mapping.motion import Motion
+from closedrooms.mapping.motion import UncertainMotion
 
 
 class KeyframeGraph:
@@ -65,7 +65,7 @@ class KeyframeGraph:
             sigmas = recovery.break_distance, recovery.break_angle
         else:
             turn = abs(wrap_angle(keyframe.pose.theta - previous.pose.theta))
-            motion = Motion(distance=keyframe.travelled - previous.travelled, turn=turn)
+            motion = UncertainMotion(distance=keyframe.travelled - previous.travelled, turn=turn)
             if not measured:
                 motion = motion.without_odometry(previous.pose.distance(keyframe.pose), turn)
             sigmas = motion.sigmas(self._config.matcher)

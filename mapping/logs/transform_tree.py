@@ -133,7 +133,7 @@ class TransformTree:
             lidar: Frame of the scans.
 
         Raises:
-            InvalidInputError: No constant way from one to the other, or a lidar that is not level.
+            InvalidInputError: No constant transforms from one to the other, or a lidar that is not level.
         """
         start, goal = self.find(base, beside=lidar), self.find(lidar, beside=base)
         if clean_name(base) == clean_name(lidar) or (start is not None and start == goal):
@@ -155,7 +155,7 @@ class TransformTree:
         return Mount(Pose2(*_planar(matrix)), upside_down=bool(matrix[2, 2] < 0.0))
 
     def _joined(self, start: str, goal: str) -> bool:
-        """Whether there is a way over moving transforms too."""
+        """Check whether moving transforms lead there too."""
         reached, waiting = {start}, deque([start])
         while waiting:
             name = waiting.popleft()

@@ -71,7 +71,7 @@ def arrange(lines: Sequence[Line], boundary: Sequence[Line]) -> Arrangement:
     return _connect((*lines, *boundary), faces, box)
 
 
-def joined(faces: Sequence[Polygon]) -> Polygon | MultiPolygon:
+def unite_faces(faces: Sequence[Polygon]) -> Polygon | MultiPolygon:
     """Unite faces to one valid area.
 
     Where three lines cross in nearly one point, two faces may end at corners a rounding error apart; their union then

@@ -9,7 +9,7 @@ from closedrooms.core.arrays import BoolArray, IntArray
 from closedrooms.predictor.config import PaperConfig
 from closedrooms.predictor.paper.arrangement import Arrangement
 from closedrooms.predictor.paper.initial_faces import Entrance
-from closedrooms.predictor.paper.layout_score import FaceSet, evaluate, face_set
+from closedrooms.predictor.paper.layout_score import FaceSet, face_set, score_layouts
 from closedrooms.predictor.paper.subsets import best_subset
 
 
@@ -144,4 +144,4 @@ def _score(growth: Growth, room: int, config: PaperConfig) -> None:
     pool = growth.face_set(room, layout, np.zeros(layout.size, dtype=np.bool_))
     growth.dependent[room] = bool(growth.touches(room))
     terms = pool.terms(np.ones((1, layout.size), dtype=np.bool_))
-    growth.scores[room] = float(evaluate(terms, config.weights, config.phi, dependent=growth.dependent[room])[0])
+    growth.scores[room] = float(score_layouts(terms, config.weights, config.phi, dependent=growth.dependent[room])[0])

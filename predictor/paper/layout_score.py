@@ -42,7 +42,7 @@ def free_faces_penalty(terms: Terms, phi: Phi) -> FloatArray:
     return terms.two_free + (5.0 if phi == "as-run" else 1.0) * terms.more_free
 
 
-def evaluate(terms: Terms, weights: Weights, phi: Phi, *, dependent: bool) -> FloatArray:
+def score_layouts(terms: Terms, weights: Weights, phi: Phi, *, dependent: bool) -> FloatArray:
     """Compute ``Phi_dep`` or ``Phi_ind`` of each layout, shape (k,).
 
     ``as-run`` counts free edges a face where the text takes the ratio of lengths, subtracts the penalty for free

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.geometry import WallLines, wall_area
+from closedrooms.worlds.geometry import WallAxes, wall_area
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
 from closedrooms.worlds.validation import passage_faults, validate
 
@@ -120,7 +120,7 @@ def _lost_walls(plan: FloorPlan, source: Source) -> list[Remark]:
     if source.walls is not None:
         near = shapely.union_all([*lines, *passages]).buffer(source.within, quad_segs=4)
         lost.append(("in the file but not in the plan", source.walls.difference(near).length))
-    gaps = WallLines(plan)
+    gaps = WallAxes(plan)
     solid = shapely.union_all([wall_area(plan), *(gaps.gap(passage.segment) for passage in plan.passages)])
     bare = shapely.union_all(lines).difference(solid).length
     lost.append(("in the plan but not among the solids that block robot and rays", bare))

@@ -90,7 +90,7 @@ def measures(rng: np.random.Generator, kind: str, size: str) -> Measures:
     )
 
 
-def fill(rng: np.random.Generator, kind: str, length: float, counts: dict[str, int]) -> list[tuple[Bay, float]]:
+def draw_bays(rng: np.random.Generator, kind: str, length: float, counts: dict[str, int]) -> list[tuple[Bay, float]]:
     """Draw bays whose widths add up to ``length``.
 
     Args:
