@@ -261,9 +261,10 @@ def _real(folder: Path) -> Path:
 def output_folder(folder: Path, manifest: dict[str, Any]) -> Iterator[Path]:
     """Return a fresh folder to write into, that takes the place of ``folder`` when the block ends well.
 
-    The manifest ``run.json`` is completed on leaving with ``program``, ``schema``, ``files`` and checksums; the caller may still
-    add to the dictionary inside the block. A folder of the same ``manifest["command"]`` is replaced whole. On any
-    error, Ctrl-C included, ``folder`` is left as it was. What killed processes left half-written beside it is removed.
+    The manifest ``run.json`` is completed on leaving with ``program``, ``schema``, ``files`` and checksums; the caller
+    may still add to the dictionary inside the block. A folder of the same ``manifest["command"]`` is replaced whole. On
+    any error, Ctrl-C included, ``folder`` is left as it was. What killed processes left half-written beside it is
+    removed.
 
     Args:
         folder: Where the result shall be.
