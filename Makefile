@@ -8,7 +8,7 @@ PAPER ?= paper
 
 FUZZ ?= 600
 
-.PHONY: run test test-slow fuzz mutants lint format paper paper-quick clean
+.PHONY: run test test-slow fuzz mutants lint format paper paper-quick docs clean
 
 run: $(VENV)/.ready  ## The main job on a bundled world; writes runs/<world>-0
 	$(BIN)/closedrooms run $(ARGS)
@@ -34,6 +34,11 @@ paper-quick: $(VENV)/.ready  ## A tenth of it, in minutes: two orders of closing
 	$(BIN)/closedrooms dataset all --repetitions 2 --max-closed 11 --out $(PAPER)-quick/dataset
 	$(BIN)/closedrooms evaluate $(PAPER)-quick/dataset --out $(PAPER)-quick/evaluation
 
+docs: $(VENV)/.ready  ## The site, into docs/_build/html; warnings are errors, and nothing in it asks the network
+	$(BIN)/python docs/render_results.py
+	$(BIN)/sphinx-build -W --keep-going -q -b html -d docs/_build/doctrees docs docs/_build/html
+	$(BIN)/python docs/check_offline.py docs/_build/html
+
 lint: $(VENV)/.ready  ## Style and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
@@ -48,4 +53,4 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 	@touch $@
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info
+	rm -rf $(VENV) build dist *.egg-info docs/_build

@@ -1,4 +1,4 @@
-"""Drive the planned tour on several worlds: the table and the picture of docs/coverage.md.
+"""Drive the planned tour on several worlds: the table and the picture of docs/results/tours.md.
 
     python benchmarks/drives.py --out DIR [WORLD[:SEED] ...] [--noise medium] [--close 5] [--picture PNG]
 

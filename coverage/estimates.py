@@ -39,9 +39,9 @@ def compare_tours(
         closed: Tour on M.
         predicted: Tour on M_pred.
         truth: Tour on M_GT.
-        n_rooms: |R|, the rooms that the robot observed: true rooms seen where truth is known, else
+        n_rooms: ``|R|``, the rooms that the robot observed: true rooms seen where truth is known, else
             :func:`closedrooms.coverage.room_count.count_rooms` of M. At least 1: a map that holds a tour holds a room.
-        n_doors: |D|, the closed doors in M.
+        n_doors: ``|D|``, the closed doors in M.
 
     Raises:
         InvalidInputError: Tours of different methods.

@@ -20,7 +20,7 @@ GRAIN = 0.10
 
 
 def count_rooms(grid: OccupancyGrid, config: GraphConfig | None = None) -> int:
-    """Count rooms of a segmentation of free space, for |R| where the true rooms are not known (paper, section 5.2).
+    """Count rooms of a segmentation of free space, for ``|R|`` where the true rooms are not known (paper, section 5.2).
 
     A watershed of the distance to the next obstacle, followed from the walls inwards: what falls apart where it gets
     narrow counts as two rooms when both sides are much wider than the neck.

@@ -12,7 +12,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import read_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.names import plot_text
-from closedrooms.experiments.evaluation.curves import save_figure
+from closedrooms.experiments.evaluation.curves import same_extent, same_scale, save_figure
 from closedrooms.experiments.evaluation.listing import SamplePath
 from closedrooms.experiments.evaluation.sample_evaluation import predict_with
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
@@ -55,6 +55,8 @@ def draw_worst(path: Path, scores: Sequence[Scores], samples: Mapping[str, Sampl
             continue
         _show_case(place, sample, rooms)
         place.set_title(f"{plot_text(score['sample'])}\n{method}: {np.mean(score['matched']):.2f}", fontsize=8)
+    for line in axes:
+        same_scale(line)
     figure.suptitle("worst cases: true free space hidden from the map (orange), predicted rooms (blue outline)")
     save_figure(figure, path)
     return True
@@ -111,6 +113,7 @@ def draw_extremes(
         _outline(line[1], [room.polygon for room in prediction.rooms], OUTLINE)
         _outline(line[2], [room.polygon for room in sample.rooms], OUTLINE)
         _dots(line[0], sample)
+        same_extent(line)
     save_figure(figure, rooms_path)
     if not all("tour" in score for score, _, _ in read):
         return 1
@@ -129,6 +132,7 @@ def draw_extremes(
             _show_tour(place, plan_tour(grid, doors))
             place.set_title(f"{title}, tour {tour[name]['length_m']:.0f} m", fontsize=9)
         _dots(line[0], sample)
+        same_extent(line)
     save_figure(figure, tours_path)
     return 2
 

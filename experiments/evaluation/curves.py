@@ -84,7 +84,8 @@ def _draw(path: Path, panels: Sequence[tuple[str, list[tuple[str, Series]]]], la
 
     figure = Figure(figsize=(6.5 * len(panels), 4.3), layout="constrained")
     FigureCanvasAgg(figure)
-    all_axes = np.atleast_1d(figure.subplots(1, len(panels), sharey=True))
+    all_axes = np.atleast_1d(figure.subplots(1, len(panels), sharex=True, sharey=True))
+    numbers = [door for _, curves in panels for _, (doors, _, _) in curves for door in doors]
     for axes, (title, curves) in zip(all_axes, panels, strict=True):
         drawn = [(name, series) for name, series in curves if series[0]]
         for number, (name, (doors, means, spread)) in enumerate(drawn):
@@ -95,8 +96,7 @@ def _draw(path: Path, panels: Sequence[tuple[str, list[tuple[str, Series]]]], la
             )  # fmt: skip
         axes.set(title=title, xlabel="closed doors")
         axes.set_ylim(0.0, top)
-        numbers = [door for _, (doors, _, _) in drawn for door in doors]
-        if numbers:
+        if drawn:
             axes.set_xlim(min(numbers) - 0.6, max(numbers) + 0.6)
             axes.legend(fontsize=8)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -176,6 +176,32 @@ def draw_costs(path: Path, scores: Sequence[Row], methods: Sequence[str]) -> boo
     panels[0].set_ylabel("cost of coverage / true cost: interval and mean")
     save_figure(figure, path)
     return True
+
+
+def same_extent(panels: Sequence[Any]) -> None:
+    """Give the panels of one row, pictures of one building, the extent that holds them all."""
+    drawn = [panel for panel in panels if panel.images]
+    if drawn:
+        (x0, x1), (y0, y1) = (_span([getattr(panel, get)() for panel in drawn]) for get in ("get_xlim", "get_ylim"))
+        for panel in drawn:
+            panel.set(xlim=(x0, x1), ylim=(y0, y1))
+
+
+def same_scale(panels: Sequence[Any]) -> None:
+    """Give the panels of one row, pictures of different buildings, extents of one size about their middles."""
+    drawn = [panel for panel in panels if panel.images]
+    if not drawn:
+        return
+    for get, name in (("get_xlim", "xlim"), ("get_ylim", "ylim")):
+        limits = [getattr(panel, get)() for panel in drawn]
+        half = max(high - low for low, high in limits) / 2.0
+        for panel, (low, high) in zip(drawn, limits, strict=True):
+            middle = (low + high) / 2.0
+            panel.set(**{name: (middle - half, middle + half)})
+
+
+def _span(limits: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    return min(low for low, _ in limits), max(high for _, high in limits)
 
 
 def save_figure(figure: Any, path: Path) -> None:

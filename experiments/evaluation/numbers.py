@@ -41,10 +41,9 @@ def number_rows(scores: Sequence[Scores], chosen: Sequence[Scores], tests: Seque
     for test in tests:
         if (test["first"], test["second"]) == ("paper", "rose") and test["measure"] in {measure, "error"}:
             where, name = ("5.3", "coverage error [%]") if test["measure"] == "error" else ("4.2", title)
-            ours = (
-                f"{test['difference']:+.3f} ({test['low']:+.3f} to {test['high']:+.3f}), "
-                f"p {test['p_worlds']:.2g} over buildings, {test['p_samples']:.2g} over samples"
-            )
+            ours = f"{test['difference']:+.3f} ({test['low']:+.3f} to {test['high']:+.3f})"
+            if test["p_worlds"] is not None:
+                ours += f", p {test['p_worlds']:.2g} over buildings, {test['p_samples']:.2g} over samples"
             row(where, f"{name}, ROSE minus 3.1: mean (95 %)", "no noticeable difference", ours)
     _coverage(row, chosen, "subset")
     _coverage(row, scores, "all")

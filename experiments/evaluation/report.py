@@ -10,7 +10,7 @@ from closedrooms.experiments.evaluation.cost import cost_rows
 from closedrooms.experiments.evaluation.curves import draw_costs, draw_errors, draw_iou, draw_reliability
 from closedrooms.experiments.evaluation.listing import SamplePath
 from closedrooms.experiments.evaluation.numbers import number_rows
-from closedrooms.experiments.evaluation.page import Section, write_page
+from closedrooms.experiments.evaluation.page import Section, Table, write_page
 from closedrooms.experiments.evaluation.summary import (
     WITHOUT_PREDICTION,
     coverage_rows,
@@ -90,21 +90,26 @@ def write_report(
     first = Section(
         "Numbers of the text",
         f"{len(samples)} samples of {len({s['world'] for s in scores})} buildings. {INTERVALS}",
-        tables=[_table(numbers), _iou_table(overall)],
+        tables=[_table(numbers), *_iou_tables(overall)],
+        files=["numbers.csv", "summary.csv"],
     )
     tested = Section(
         "Paired tests",
         "Second minus first on the same samples; Wilcoxon's signed-rank test over the means of buildings, and over "
-        "samples, which takes samples of one building as independent. The interval draws buildings. "
-        "Measure error: coverage error of the prediction in percent.",
-        tables=[_table(tests)] if tests else [],
+        "samples, which takes samples of one building as independent; no p on fewer than six buildings. The interval "
+        "draws buildings. Measure error: coverage error of the prediction in percent.",
+        tables=[_table(tests)],
+        files=["tests.csv"] if tests else [],
     )
     surely = []
     if draw_reliability(folder / "reliability.png", reliability_rows(scores), in_order({r["method"] for r in sure})):
-        surely = [Section("How sure", SURENESS, folder / "reliability.png", [_table(sure)])]
+        files = ["sureness.csv", "reliability.csv"]
+        surely = [Section("How sure", SURENESS, folder / "reliability.png", [_table(sure)], files)]
     if draw_costs(folder / "completions.png", scores, in_order(row["method"] for row in costs)):
-        surely.append(Section("Cost of coverage", COSTS, folder / "completions.png", [_table(costs)]))
-    by_world = Section("Buildings (table 1: most closed doors)", tables=[_table(worlds)])
+        surely.append(
+            Section("Cost of coverage", COSTS, folder / "completions.png", [_table(costs)], ["completions.csv"])
+        )
+    by_world = Section("Buildings (table 1: most closed doors)", tables=[_table(worlds)], files=["worlds.csv"])
     tail = [_failure_section(failures)] if failures else []
     title = f"closedrooms evaluate: {len(samples)} samples"
     write_page(folder / "report.html", title, [first, *surely, *sections, tested, by_world, *tail])
@@ -124,73 +129,73 @@ def _sections(
     measure = headline(scores)
     sections: list[Section] = []
 
-    def add(heading: str, text: str, name: str, *tables: Sequence[Sequence[Any]], drawn: bool) -> None:
+    def add(heading: str, text: str, name: str, *tables: Table, csv: str, drawn: bool) -> None:
         if drawn:
-            sections.append(Section(heading, text, folder / name, list(tables)))
+            sections.append(Section(heading, text, folder / name, tables, [csv]))
 
     every = [name for name in (*in_order(set(present) - {"authors"}), "authors") if name in present]
     drawn = draw_iou(folder / "iou.png", iou, every, ("matched", "by_door"))
     add("All methods: IoU by number of closed doors", "Both ways to compare a room with the truth.", "iou.png",
-        _doors_table(iou, "method", every, measure), drawn=drawn)  # fmt: skip
+        _doors_table(iou, "method", every, measure), csv="summary.csv", drawn=drawn)  # fmt: skip
     names = [name for name in ("paper", "line-of-sight", "geometric") if name in present]
     drawn = draw_iou(folder / "figure-05.png", iou, names, (measure,))
-    add("Figure 5: IoU of the method and both baselines", "", "figure-05.png", drawn=drawn)
+    add("Figure 5: IoU of the method and both baselines", "", "figure-05.png", csv="summary.csv", drawn=drawn)
     names = [name for name in ("paper", "rose") if name in present]
     drawn = draw_iou(folder / "figure-09.png", iou, names, (measure,))
-    add("Figure 9: IoU with two ways to find structure", "", "figure-09.png", drawn=drawn)
+    add("Figure 9: IoU with two ways to find structure", "", "figure-09.png", csv="summary.csv", drawn=drawn)
     names = [name for name in in_order(present) if any(row["estimate"] == name for row in coverage)]
     shown = [*WITHOUT_PREDICTION, *names[:1]]
     drawn = draw_errors(folder / "figure-12.png", coverage, shown)
     table = [row for row in coverage if row["part"] == "all"]
-    add("Figure 12: errors of the coverage cost", "", "figure-12.png",
-        _doors_table(table, "estimate", [*WITHOUT_PREDICTION, *names], "error"), drawn=drawn)  # fmt: skip
+    errors = _doors_table(table, "estimate", [*WITHOUT_PREDICTION, *names], "error")
+    add("Figure 12: errors of the coverage cost", "", "figure-12.png", errors, csv="coverage.csv", drawn=drawn)
     drawn = draw_errors(folder / "figure-14.png", coverage, names)
-    add("Figure 14: errors of the coverage cost by prediction", "", "figure-14.png", drawn=drawn)
+    add("Figure 14: errors of the coverage cost by prediction", "", "figure-14.png", csv="coverage.csv", drawn=drawn)
     method = next(iter(in_order(set(present) - {"authors"})), None)
     if method is not None:
         cases = extreme_cases(scores, method)
         count = draw_extremes(folder / "figure-07.png", folder / "figure-13.png", cases, samples)
         add("Figure 7: much predicted from little", "Of the tenth of the maps that show least: the one whose coverage "
             "cost is estimated best, and the one of another building where it is estimated worst.", "figure-07.png",
-            drawn=count > 0)  # fmt: skip
-        add("Figure 13: graphs of the same maps", "", "figure-13.png", drawn=count > 1)
+            csv="samples.csv", drawn=count > 0)  # fmt: skip
+        add("Figure 13: graphs of the same maps", "", "figure-13.png", csv="samples.csv", drawn=count > 1)
         worst = "best" if "best" in present else method
         drawn = draw_worst(folder / "worst.png", scores, samples, worst, config.worst)
-        add("Worst cases", "By mean IoU of matched rooms.", "worst.png", drawn=drawn)
+        add("Worst cases", "By mean IoU of matched rooms.", "worst.png", csv="samples.csv", drawn=drawn)
     return sections
 
 
-def _table(rows: Sequence[Row]) -> list[list[Any]]:
+def _table(rows: Sequence[Row], caption: str = "") -> Table:
     if not rows:
-        return [[]]
+        return Table([[]])
     head = list(rows[0])
-    return [[name.replace("_", " ") for name in head], *([row.get(name) for name in head] for row in rows)]
+    body = [[row.get(name) for name in head] for row in rows]
+    return Table([[name.replace("_", " ") for name in head], *body], caption)
 
 
-def _iou_table(rows: Sequence[Row]) -> list[list[Any]]:
-    head: list[Any] = ["method", "samples", "rooms", "not seen"]
-    measures = {"by_door": "IoU by door", "matched": "IoU matched", "area": "IoU whole area", "with_unseen": "by door, "
-                "unseen 0"}  # fmt: skip
-    head += [f"{name}: mean (sd; low to high; world low to world high)" for name in measures.values()]
-    table = [head]
-    for row in rows:
-        line: list[Any] = [row["method"], row["samples"], row["rooms"], row["not_seen"]]
-        for name in measures:
-            keys = ("mean", "sd", "low", "high", "world_low", "world_high")
-            figures = [row[f"{name}_{key}"] for key in keys]
-            text = "{:.3f} ({:.3f}; {:.3f} to {:.3f}; {:.3f} to {:.3f})"
-            line.append(None if None in figures else text.format(*figures))
-        table.append(line)
-    return table
+def _iou_tables(rows: Sequence[Row]) -> list[Table]:
+    """A table a measure: means, standard deviations, and both intervals in columns of their own."""
+    measures = {"by_door": "IoU by door", "matched": "IoU matched one-to-one", "area": "IoU of the whole area",
+                "with_unseen": "IoU by door, doors that were not seen as 0"}  # fmt: skip
+    counts, keys = ("samples", "rooms", "not_seen"), ("mean", "sd", "low", "high", "world_low", "world_high")
+    tables = []
+    for name, caption in measures.items():
+        figures = [
+            {"method": row["method"]} | {key: row[f"{name}_{key}"] for key in keys} | {key: row[key] for key in counts}
+            for row in rows
+            if row[f"{name}_mean"] is not None
+        ]
+        tables.append(_table(figures, caption))
+    return tables
 
 
-def _doors_table(rows: Sequence[Row], key: str, names: Sequence[str], measure: str) -> list[list[Any]]:
+def _doors_table(rows: Sequence[Row], key: str, names: Sequence[str], measure: str) -> Table:
     """Means by number of closed doors: a line a number, a column a method."""
     numbers = sorted({row["closed_doors"] for row in rows if row["closed_doors"] != "all"})
     means = {(row[key], row["closed_doors"]): row[f"{measure}_mean"] for row in rows}
-    return [["closed doors", *names], *([n, *(means.get((name, n)) for name in names)] for n in numbers)]
+    return Table([["closed doors", *names], *([n, *(means.get((name, n)) for name in names)] for n in numbers)])
 
 
 def _failure_section(failures: Mapping[str, str]) -> Section:
     table = [["sample", "why"], *([name, why] for name, why in sorted(failures.items()))]
-    return Section("What failed", tables=[table])
+    return Section("What failed", tables=[Table(table)])

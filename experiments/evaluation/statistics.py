@@ -71,6 +71,10 @@ def rounded(value: Any) -> float:
     return round(float(value), 6) + 0.0
 
 
+# With five buildings the smallest p that the test can give is 0.06: it says nothing.
+LEAST_WORLDS = 6
+
+
 @dataclass(frozen=True, slots=True)
 class PairedTest:
     """A method against another on the same samples.
@@ -82,7 +86,7 @@ class PairedTest:
         low: Lower end of its 95 % interval, buildings drawn.
         high: Upper end.
         p_samples: Wilcoxon's signed-rank test over samples, which takes them as independent: too small where a building
-            has many.
+            has many. ``None`` on fewer than :data:`LEAST_WORLDS` buildings.
         p_worlds: The same over the means of the buildings, which are independent.
     """
 
@@ -91,8 +95,8 @@ class PairedTest:
     difference: float
     low: float
     high: float
-    p_samples: float
-    p_worlds: float
+    p_samples: float | None
+    p_worlds: float | None
 
 
 def paired(
@@ -116,9 +120,9 @@ def paired(
     assert low is not None, "there is a sample"
     assert high is not None, "there is a sample"
     means = np.array([group.mean() for group in groups])
-    return PairedTest(
-        len(common), len(groups), rounded(differences.mean()), low, high, _wilcoxon(differences), _wilcoxon(means)
-    )
+    enough = len(groups) >= LEAST_WORLDS
+    p_samples, p_worlds = (_wilcoxon(values) if enough else None for values in (differences, means))
+    return PairedTest(len(common), len(groups), rounded(differences.mean()), low, high, p_samples, p_worlds)
 
 
 def _wilcoxon(differences: FloatArray) -> float:

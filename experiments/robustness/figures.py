@@ -11,7 +11,7 @@ from shapely.geometry import Polygon
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import read_doors, read_rooms
 from closedrooms.core.files.rosmap import read_map
-from closedrooms.experiments.evaluation.curves import save_figure
+from closedrooms.experiments.evaluation.curves import same_extent, save_figure
 from closedrooms.experiments.robustness.config import Factor
 from closedrooms.experiments.robustness.levels import UNITS, Case
 from closedrooms.experiments.robustness.onset import LevelResult, Onset
@@ -118,6 +118,8 @@ def draw_maps(path: Path, folder: Path, wanted: Sequence[Case]) -> bool:
             continue
         axes.set_title(f"{case.factor} {case.level:g}", fontsize=9)
         drawn = True
+    for line in grid:
+        same_extent(line)
     if drawn:
         save_figure(figure, path)
     return drawn

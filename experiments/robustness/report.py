@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from closedrooms.experiments.evaluation.page import Section, write_page
+from closedrooms.experiments.evaluation.page import Section, Table, write_page
 from closedrooms.experiments.evaluation.tables import write_table
 from closedrooms.experiments.robustness.config import RobustnessConfig
 from closedrooms.experiments.robustness.figures import draw_curves, draw_maps
@@ -43,21 +43,22 @@ def write_report(config: RobustnessConfig, rows: Sequence[Row], failures: Mappin
     draw_curves(folder / "curves.png", results, found)
     worlds = list(dict.fromkeys(row["world"] for row in rows))
     sections = [
-        Section("Where the prediction starts to suffer", METHOD, tables=[_cells(table)]),
+        Section("Where the prediction starts to suffer", METHOD, tables=[_cells(table)], files=["onsets.csv"]),
         Section(
             "Against each level",
             "Lines: means. Bars: 95 % interval of the difference to the first level. Dotted: first to suffer.",
             folder / "curves.png",
+            files=["levels.csv"],
         ),
-        Section("Levels", tables=[_cells([_short(result) for result in results])]),
+        Section("Levels", tables=[_cells([_short(result) for result in results])], files=["levels.csv", "trials.csv"]),
     ]
     for world in worlds[:2]:
         picture = folder / f"maps-{world}.png"
         if draw_maps(picture, folder / "cells" / world, cases(config)):
             text = "Map, detected doors (red), true rooms (orange), predicted rooms (blue)."
-            sections.append(Section(f"Maps of {world}", text, picture))
+            sections.append(Section(f"Maps of {world}", text, picture, files=["trials.csv"]))
     if failures:
-        sections.append(Section("What failed", tables=[[["world", "why"], *failures.items()]]))
+        sections.append(Section("What failed", tables=[Table([["world", "why"], *failures.items()])]))
     title = f"closedrooms robustness: {len(worlds)} worlds"
     write_page(Path(folder / "report.html"), title, sections)
     return found
@@ -77,7 +78,9 @@ def _short(result: LevelResult) -> Row:
     names = ("ate_m", "walls_m", "doors_m", "free_iou", "iou", "iou_seen", "error_predicted")
     row: Row = {"factor": result.factor, "level": result.level} | {name: result.means.get(name) for name in names}
     change = result.differences.get("iou")
-    row["change of IoU"] = None if change is None else f"{change.mean:+.3f} ({change.low:+.3f} to {change.high:+.3f})"
+    row["change of IoU"] = None if change is None else round(change.mean, 3)
+    row["low"] = None if change is None else round(change.low, 3)
+    row["high"] = None if change is None else round(change.high, 3)
     for stage in STAGES:
         share = result.shares.get(stage)
         row[f"lost by {stage}"] = None if share is None else round(share.mean, 3)
@@ -101,6 +104,6 @@ def _onset_row(onset: Onset) -> Row:
     }
 
 
-def _cells(rows: Sequence[Row]) -> list[list[Any]]:
+def _cells(rows: Sequence[Row]) -> Table:
     head = list(rows[0])
-    return [[name.replace("_", " ") for name in head], *([row[name] for name in head] for row in rows)]
+    return Table([[name.replace("_", " ") for name in head], *([row[name] for name in head] for row in rows)])

@@ -4,7 +4,7 @@ The weights were found on 182 rooms of 29 of the authors' maps (2, 5, 8, 11 and 
 rooms of the 20 bundled worlds (five closed doors each, noise medium) and 54 rooms of ideal maps of 6 other real floor
 plans: those of a log-linear model that expects the largest IoU (L-BFGS, ridge of 0.1 towards a guess by hand), mixed
 0.7 to 0.3 with the previous weights, which were tuned on all 88 of the authors' maps and 18 other plans, then
-coordinate search on the IoU after the joint choice. Those maps are therefore in sample; docs/prediction-failures.md
+coordinate search on the IoU after the joint choice. Those maps are therefore in sample; docs/results/failures.md
 gives the figures with whole buildings held out. The three of symmetric buildings were set by hand, with one of the
 authors' buildings in view; halves and doubles of them were tried on 55 maps of other floors. Features are shares or
 logarithms, so that weights have no unit.

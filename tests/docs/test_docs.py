@@ -1,0 +1,130 @@
+"""The pages say what the CSV files of figures hold, README keeps its size, the notebook runs."""
+
+import importlib.util
+import json
+import re
+import shutil
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from closedrooms.cli.table import COMMANDS
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+CSV = "# command: c\n# commit: 1234567\n# date: d\n# machine: m\nmethod,IoU\npaper,0.5\nbest,0.75\n"
+
+
+def load(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"docs_{name}", DOCS / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+results = load("render_results")
+offline = load("check_offline")
+notebook_page = load("notebook_page")
+
+
+@pytest.mark.parametrize("page", results.pages(), ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_the_tables_of_a_page_are_those_of_the_csv_files(page: Path) -> None:
+    text = page.read_text()
+    assert results.render(text, page.parent) == text, "python docs/render_results.py"
+
+
+def test_every_csv_says_how_it_was_made_and_stands_in_a_page() -> None:
+    shown = "".join(page.read_text() for page in results.pages())
+    for path in sorted(results.RESULTS.glob("*.csv")):
+        assert results.read_table(path.stem).rows
+        assert re.search(f"<!-- results: {path.stem} [-|]", shown), f"{path.name} is shown nowhere"
+
+
+@pytest.fixture
+def figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(results, "RESULTS", tmp_path)
+    (tmp_path / "ious.csv").write_text(CSV)
+    return tmp_path
+
+
+def test_a_figure_that_is_changed_by_hand_is_noticed(figures: Path) -> None:
+    page = results.render("<!-- results: ious -->\n<!-- /results -->\n", figures)
+    assert "| best | 0.75 |" in page
+    assert "Commit `1234567`" in page
+    assert results.render(page, figures) == page
+    assert results.render(page.replace("0.75", "0.85"), figures) == page
+
+
+def test_a_table_without_its_commit_is_refused(figures: Path) -> None:
+    (figures / "ious.csv").write_text(CSV.replace("# commit: 1234567\n", ""))
+    with pytest.raises(ValueError, match="does not say its commit"):
+        results.read_table("ious")
+
+
+def test_a_figure_stands_in_one_file_and_is_referred_to(figures: Path) -> None:
+    head = CSV.partition("method")[0]
+    (figures / "short.csv").write_text(head + "what,figure,at\nb,=ious[method=best].IoU,=ious[method=best].commit\n")
+    assert results.read_table("short").rows == [["b", "0.75", "1234567"]]
+    (figures / "short.csv").write_text(head + "what,figure\nb,=ious[method=worst].IoU\n")
+    with pytest.raises(ValueError, match="names 0 rows"):
+        results.read_table("short")
+
+
+def test_numbers_stand_to_the_right_and_words_to_the_left(figures: Path) -> None:
+    assert list(results.table_lines(results.read_table("ious"), "bare", figures))[1] == "| --- | ---: |"
+
+
+def test_readme_is_short_and_its_links_lead_somewhere() -> None:
+    lines = (ROOT / "README.md").read_text().splitlines()
+    assert len(lines) <= 120
+    assert max(map(len, lines)) <= 120
+    for target in re.findall(r"\]\(([^)#]+)\)", "\n".join(lines)):
+        assert (ROOT / target).exists(), target
+
+
+def test_commands_of_readme_are_commands() -> None:
+    text = (ROOT / "README.md").read_text()
+    named = set(re.findall(r"^    closedrooms (\w+)", text, re.M))
+    assert named <= {command.name.split()[0] for command in COMMANDS}
+    assert {"run", "predict", "doors", "edit", "cover"} <= named
+
+
+@pytest.mark.parametrize(
+    ("page", "found"),
+    [
+        ('<script src="https://cdn.example/x.js"></script>', 1),
+        ('<link rel="stylesheet" href="//fonts.example/a.css">', 1),
+        ('<style>@import "https://fonts.example/a.css"; a {background: url(http://x.example/b.png)}</style>', 2),
+        ('<a href="https://example.org">a link</a><img src="a.png"><link rel="next" href="https://x.example">', 0),
+    ],
+)
+def test_what_a_page_loads_from_elsewhere_is_found(tmp_path: Path, page: str, found: int) -> None:
+    (tmp_path / "a.html").write_text(page)
+    assert len(list(offline.remote_resources(tmp_path))) == found
+
+
+def test_the_notebook_has_ten_cells_of_code_and_becomes_a_page(tmp_path: Path) -> None:
+    cells = json.loads(notebook_page.NOTEBOOK.read_text())["cells"]
+    assert sum(cell["cell_type"] == "code" for cell in cells) == 10
+    shutil.copy(notebook_page.NOTEBOOK, tmp_path)
+    notebook_page.write_page(tmp_path)
+    page = (tmp_path / "notebook.md").read_text()
+    assert "5 rooms, 0 doors without one" in page
+    assert all((tmp_path / name).is_file() for name in re.findall(r"\]\((notebook-\d+\.png)\)", page))
+
+
+# What jupyter's libraries warn of is not ours.
+@pytest.mark.filterwarnings("ignore")
+def test_the_notebook_runs_and_says_what_it_says_in_the_page(tmp_path: Path) -> None:
+    pytest.importorskip("nbclient")
+    folder = shutil.copytree(notebook_page.NOTEBOOK.parent, tmp_path / "tutorial")
+    again = notebook_page.execute(folder / notebook_page.NOTEBOOK.name)
+    kept = json.loads(notebook_page.NOTEBOOK.read_text())
+    for new, old in zip(again.cells, kept["cells"], strict=True):
+        said = ["".join(output.get("text", "")) for output in old.get("outputs", [])]
+        assert ["".join(output.get("text", "")) for output in new.get("outputs", [])] == said
