@@ -46,7 +46,10 @@ def _believe(scene: Scene, choice: Choice, openings: Sequence[Doorway | None]) -
             others.append(Alternative(shape, float(share)))
     turned = scene.turned[choice.options.angle]
     spread = _spread(turned, boxes, weights, in_cells(scene.walls.least))
-    evidence = (*_measure_doubt(choice), *choice.options.measured[choice.index].tolist())
+    evidence = (
+        *_measure_doubt(choice, overlap[: len(choice.weights), choice.index]),
+        *choice.options.measured[choice.index].tolist(),
+    )
     return Belief(float(overlap[choice.index] @ weights), tuple(others), spread, evidence)
 
 
@@ -62,16 +65,15 @@ def _weigh_all(choice: Choice) -> tuple[IntArray, FloatArray, FloatArray]:
     )
 
 
-def _measure_doubt(choice: Choice) -> tuple[float, float, float, float]:
-    """Measure how clear a choice is.
+def _measure_doubt(choice: Choice, overlap: FloatArray) -> tuple[float, float, float, float]:
+    """Measure how clear a choice is, whose rectangle has these overlaps with all that it could be, shape (n,).
 
     Its score by itself; how much better it is than what overlaps with it by less than :data:`OTHER`; how far areas are
     spread (standard deviation of the logarithm); entropy of the probabilities.
     """
     options, weights = choice.options, choice.weights
-    overlap = overlaps_of(options.boxes)
     score = float(options.scores[choice.index])
-    apart = overlap[:, choice.index] < OTHER
+    apart = overlap < OTHER
     margin = score - float(options.scores[apart].max() if apart.any() else options.scores.min())
     areas = np.log((options.boxes[:, 2:] - options.boxes[:, :2]).prod(axis=-1))
     spread = float(np.sqrt(weights @ (areas - weights @ areas) ** 2))

@@ -1,6 +1,6 @@
 """What a door's frame says about every possible side of a room, as tables (method ``best``)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -70,14 +70,17 @@ def _widen_across(frame: DoorFrame, window: Window, side: str, reach: int) -> Wi
     return window.grown(*((reach, 0) if side == "top" else (0, reach)), frame.known.shape)
 
 
-def gather(frame: DoorFrame, window: Window, seen: dict[str, FloatArray]) -> Evidence:
+def gather(frame: DoorFrame, window: Window, doors: tuple[float, float], seen: dict[str, FloatArray]) -> Evidence:
     """Make the tables for the rectangles in a window of a frame.
 
     Args:
         frame: Seen from the doors.
         window: Where the rectangles lie.
+        doors: The first and the last of the doors along their walls [cells]: left sides lie left of the last one.
         seen: Of the whole frame, from :func:`rate_sizes`.
     """
+    first, last = max(int(doors[0]), window.u0), min(int(doors[1]) + 2, window.u1)
+    places = {"right": replace(window, u0=first), "left": replace(window, u1=last), "top": window}
     thickness = frame.thickness
     closed: dict[str, Table] = {}
     sliver: dict[str, Table] = {}
@@ -85,13 +88,14 @@ def gather(frame: DoorFrame, window: Window, seen: dict[str, FloatArray]) -> Evi
     tight, same, outer = {}, {}, {}
     for side, opposite in (("right", "left"), ("left", "right"), ("top", "bottom")):
         # What lies behind a side is asked of the rectangles' own sides; walls in line go on beyond them.
-        wide = _widen_across(frame, window, side, thickness + GAP)
+        place = places[side]
+        wide = _widen_across(frame, place, side, thickness + GAP)
         known = lay_out(_orient(frame.known[wide.of], side))
         near, strip = _find_known(known, thickness + SLACK), _find_known(known, thickness + SLIVER)
         apart = _find_known(known, thickness + GAP) & ~strip
         for tables, edges in ((closed, near), (sliver, strip & ~near), (gap, apart)):
-            tables[side] = _tabulate(edges, side, window, wide)
-        line = widen_in_line(frame, window, side)
+            tables[side] = _tabulate(edges, side, place, wide)
+        line = widen_in_line(frame, place, side)
         wide = _widen_across(frame, line, side, thickness + OUTER)
         known = lay_out(_orient(frame.known[wide.of], side))
         own, other = (_orient(frame.faces(name, wide), side) for name in (side, opposite))

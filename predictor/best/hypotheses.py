@@ -120,7 +120,8 @@ def _propose_all(
     rates = rate_sizes(frame)
     found: dict[tuple[int, Doors], Scored] = {}
     for window, together in _share_windows(frame, entries, largest):
-        evidence = gather(frame, window, rates)
+        along = [entries[i].u for i in together]
+        evidence = gather(frame, window, (min(along), max(along)), rates)
         for i in together:
             others = seen.without(i)
             boxes, shared = propose(frame, evidence, entries[i], others, smallest, largest)
