@@ -56,7 +56,7 @@ class UncertainMotion:
         return replace(self, unmeasured=(before[0] + distance, before[1] + turn))
 
     def corrected(self, distance: float, angle: float, config: MatcherConfig) -> "UncertainMotion":
-        """Remember by how much, ``distance`` [m] and ``angle`` [rad], a match moved the prediction: it was less sure."""
+        """Remember how far, ``distance`` [m] and ``angle`` [rad], a match was from the prediction: it was less sure."""
         surprise = tuple(
             max(off if off > SURPRISE * sigma else 0.0, FADING * last if last > negligible else 0.0)
             for off, sigma, last, negligible in zip(
