@@ -135,7 +135,8 @@ def _sections(
     drawn = draw_errors(folder / "figure-12.png", coverage, shown)
     table = [row for row in coverage if row["part"] == "all"]
     add("Figure 12: errors of the coverage cost", "", "figure-12.png",
-        _doors_table(table, "estimate", [*WITHOUT_PREDICTION, *names], "error"), csv="coverage.csv", drawn=drawn)  # fmt: skip
+        _doors_table(table, "estimate", [*WITHOUT_PREDICTION, *names], "error"), csv="coverage.csv",
+        drawn=drawn)  # fmt: skip
     drawn = draw_errors(folder / "figure-14.png", coverage, names)
     add("Figure 14: errors of the coverage cost by prediction", "", "figure-14.png", csv="coverage.csv", drawn=drawn)
     method = next(iter(in_order(set(present) - {"authors"})), None)
