@@ -36,7 +36,7 @@ def chosen(config: DatasetConfig) -> list[Variant]:
     """Four samples of each world: one door, a third, two thirds and all of the doors closed."""
     variants = []
     for world in find_worlds(config):
-        order = find_variants(world, config)
+        order = list(find_variants(world, config))
         counts = [1, *(max(round(len(order) * share / 3), 1) for share in (1, 2, 3))]
         variants += [order[count - 1] for count in counts]
     return variants

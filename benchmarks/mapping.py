@@ -28,7 +28,7 @@ from odometry_faults import bench_faults, yag_slam
 import closedrooms.mapping.graph.keyframe_graph as graph_module
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2, wrap_angle
-from closedrooms.mapping.beams import clean, hit_points, thin
+from closedrooms.mapping.beams import clean, hit_points, thin_points
 from closedrooms.mapping.config import LoopConfig, MapperConfig
 from closedrooms.mapping.graph.pose_graph import Edge, Solution, optimise
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
@@ -215,7 +215,7 @@ def bench_parts(run: RecordedRun) -> None:
     scans = run.scans[: min(400, len(run.scans))]
     field = LikelihoodField(config.resolution, config.matcher)
     field.add(hit_points(scans[0], max_range=config.max_range))
-    points = [thin(hit_points(s, max_range=config.max_range), 0.1, config.matcher.max_points) for s in scans]
+    points = [thin_points(hit_points(s, max_range=config.max_range), 0.1, config.matcher.max_points) for s in scans]
     evidence = EvidenceGrid(config)
     jobs: dict[str, Callable[[int], object]] = {
         "refinements": lambda i: refine(field, points[0], Pose2(0.02, -0.02, 0.01 * (i % 3))),

@@ -98,7 +98,7 @@ def in_one_wall(a: ClosedDoor, b: ClosedDoor) -> bool:
 @contextmanager
 def no_joining() -> Iterator[None]:
     """Every door has a room of its own."""
-    with mock.patch.object(shared, "MARGIN", math.inf):
+    with mock.patch.object(shared, "SHARED", math.inf):
         yield
 
 

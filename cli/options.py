@@ -129,13 +129,13 @@ def _same(value: Any) -> Any:
 
 
 def configured(options: Any) -> Any:
-    """Return the configuration in the options of a command."""
+    """Build the configuration from the options of a command."""
     config = load(options.about["command"].config)
     return config(**{item.name: getattr(options, item.name) for item in fields(config) if item.init})
 
 
 def option_names(options: type[Any]) -> list[str]:
-    """Return every option of a class of options, as it is typed."""
+    """List every option of a class of options, as it is typed."""
     names = []
     hints = get_type_hints(options)
     for item in fields(options):

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, cast, get_args, get_
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.nearest import unknown
+from closedrooms.experiments.places import Url, read_place
 
 Config = TypeVar("Config")
 
@@ -87,6 +88,8 @@ def _converted(hint: Any, value: Any, key: str, current: Any) -> Any:
         if not isinstance(value, Mapping):
             raise _wrong(key, value, "a table of settings")
         return overlaid(start, value, key=key)
+    if Url in options and isinstance(value, str) and value:
+        return read_place(value)
     if get_origin(plain) is tuple:
         return _sequence(plain, value, key)
     if get_origin(plain) is Literal:

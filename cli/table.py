@@ -162,7 +162,7 @@ def _naming_the_file(words: Sequence[str], options: type[Any] | None) -> Iterato
 
 
 def named_command(words: Sequence[str]) -> Command | None:
-    """Return the command that a line begins with."""
+    """Find the command that a line begins with."""
     for command in COMMANDS:
         parts = command.name.split()
         if list(words[: len(parts)]) == parts:

@@ -38,7 +38,7 @@ class Place:
 
 
 def explain(event: Any, place: Place) -> str | None:
-    """Tell a failure to parse in one line; ``None`` where tyro's own words have to do.
+    """Explain a failure to parse in one line; ``None`` where tyro's own words have to do.
 
     Args:
         event: A ``ParseErrorEvent`` of tyro; its module is private, so nothing but the fields read here is relied on.
@@ -91,15 +91,27 @@ def _unknown_word(word: str, place: Place) -> str:
         return f"--{option} is gone; use {GONE[option]}"
     if place.commands:
         return f"{word} before a command; expected one of {', '.join(place.commands)} first"
-    known: Sequence[str] = place.options
-    what = f"unknown option {word.partition('=')[0]}"
+    what, near = f"unknown option {word.partition('=')[0]}", _nearest_option(option, place.options)
     if place.method is not None and option.startswith("predictor."):
-        known = [name for name in known if name.startswith("predictor.")]
         what = f"the method {place.method} does not read --{option}"
-    # `--radius` means `--sim.robot.radius`, and so does `--radios`.
-    by_end = {name.rpartition(".")[2]: name for name in reversed(known)}
-    near = nearest(option, known) or by_end.get(nearest(option.rpartition(".")[2], by_end))
+        near = _nearest_option(option, [name for name in place.options if name.startswith("predictor.")])
     return f"{what}; did you mean --{near}?" if near else f"{what}; {place.prog} --help-all lists what there is"
+
+
+def _nearest_option(option: str, known: Sequence[str]) -> str:
+    """Find the option that was meant; empty where none is near.
+
+    Names are compared without the groups that they share: all options of a method would be near each other by
+    ``predictor.``. ``--radius`` means ``--sim.robot.radius``, and so does ``--radios``.
+    """
+    shared = option[: option.rfind(".") + 1]
+    group = [name.removeprefix(shared) for name in known if name.startswith(shared)]
+    near = nearest(option.removeprefix(shared), group)
+    if near:
+        return shared + near
+    by_end = {name.rpartition(".")[2]: name for name in reversed(known)}
+    by_name = "" if group else nearest(option, known)
+    return by_name or by_end.get(nearest(option.rpartition(".")[2], by_end), "")
 
 
 def _strange(place: Place) -> list[str]:

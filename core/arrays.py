@@ -12,7 +12,7 @@ CellArray: TypeAlias = npt.NDArray[np.int8]
 
 
 def handed_over(cells: CellArray) -> CellArray:
-    """Hand over cells read-only: :func:`frozen` then takes them as they are, without a copy of a large map.
+    """Make cells read-only: :func:`frozen` then takes them as they are, without a copy of a large map.
 
     Args:
         cells: That nobody else holds.

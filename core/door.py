@@ -51,7 +51,7 @@ class ClosedDoor:
             raise InvalidInputError(f"door {self.id} of width {self.width}", expected="a width above 0 m")
 
     def moved(self, b_T_a: Pose2) -> "ClosedDoor":
-        """Return the same door expressed in frame b."""
+        """Transform the door to frame b."""
 
         def move(point: Point) -> Point:
             pose = b_T_a @ Pose2(point[0], point[1])

@@ -37,7 +37,7 @@ class OutputError(ClosedroomsError):
 
 
 def reason(error: Exception) -> str:
-    """Tell why one of many jobs failed, in one line, for work that goes on with the next.
+    """Say in one line why one of many jobs failed, for work that goes on with the next.
 
     A defect of the program that one map or building brings out is told with the place where it showed; it must not cost
     the thousands of others.

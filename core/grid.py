@@ -57,27 +57,27 @@ class GridFrame:
         )
 
     def to_cells(self, points: FloatArray) -> IntArray:
-        """Cells ``(row, col)`` that hold map points ``(x, y)``, shape (..., 2); may lie outside the grid."""
+        """Convert map points ``(x, y)`` to cells ``(row, col)``, shape (..., 2); they may lie outside the grid."""
         points = np.asarray(points, dtype=np.float64)
         cols = np.floor((points[..., 0] - self.origin_x) / self.resolution)
         rows = np.floor((points[..., 1] - self.origin_y) / self.resolution)
         return np.stack((rows, cols), axis=-1).astype(np.int64)
 
     def to_points(self, cells: IntArray) -> FloatArray:
-        """Centres ``(x, y)`` [m] of cells ``(row, col)``, shape (..., 2)."""
+        """Convert cells ``(row, col)``, shape (..., 2), to their centres ``(x, y)`` [m]."""
         cells = np.asarray(cells)
         x = self.origin_x + (cells[..., 1] + 0.5) * self.resolution
         y = self.origin_y + (cells[..., 0] + 0.5) * self.resolution
         return np.stack((x, y), axis=-1).astype(np.float64)
 
     def to_corners(self, points: FloatArray) -> FloatArray:
-        """Map points ``(x, y)``, shape (..., 2), in continuous cell units ``(col, row)`` from the lower-left corner."""
+        """Convert map points ``(x, y)`` to continuous cells ``(col, row)`` from the lower-left corner, (..., 2)."""
         origin = np.array([self.origin_x, self.origin_y])
         corners: FloatArray = (np.asarray(points, dtype=np.float64) - origin) / self.resolution
         return corners
 
     def contains(self, cells: IntArray) -> BoolArray:
-        """Tell which cells ``(row, col)``, shape (..., 2), lie in the grid."""
+        """Check which cells ``(row, col)``, shape (..., 2), lie in the grid."""
         cells = np.asarray(cells)
         inside: BoolArray = (
             (cells[..., 0] >= 0) & (cells[..., 0] < self.rows) & (cells[..., 1] >= 0) & (cells[..., 1] < self.cols)
@@ -95,7 +95,7 @@ class GridFrame:
         )
 
     def covering(self, x_min: float, y_min: float, x_max: float, y_max: float) -> "GridFrame":
-        """This frame grown by whole cells until it holds the given bounds [m]."""
+        """Grow the frame by whole cells until it holds the given bounds [m]."""
         low = self.to_cells(np.array([x_min, y_min]))
         high = np.ceil(self.to_corners(np.array([x_max, y_max])) - 1e-9).astype(int)
         row, col = min(int(low[0]), 0), min(int(low[1]), 0)
@@ -103,13 +103,13 @@ class GridFrame:
 
 
 def is_free(cells: CellArray) -> BoolArray:
-    """Tell which of some cells of a map, int8 of any shape, are known to be free."""
+    """Mark the cells of a map, int8 of any shape, that are known to be free."""
     # Without a sign unknown is 255: one comparison of bytes, six times as quick as two of numbers.
     return np.less(cells.view(np.uint8), math.ceil(FREE_BELOW))
 
 
 def is_occupied(cells: CellArray) -> BoolArray:
-    """Tell which of some cells of a map, int8 of any shape, are known to be occupied."""
+    """Mark the cells of a map, int8 of any shape, that are known to be occupied."""
     return np.greater(cells, OCCUPIED_ABOVE)
 
 
@@ -154,7 +154,7 @@ class OccupancyGrid:
         return np.logical_or(free, self.occupied, out=free)
 
     def known_bounds(self) -> tuple[int, int, int, int] | None:
-        """Window ``(row, col, rows, cols)`` of the known cells, ``None`` when all is unknown."""
+        """Find the window ``(row, col, rows, cols)`` of the known cells, ``None`` when all is unknown."""
         known = self.known
         rows, cols = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
         if rows.size == 0:
@@ -162,7 +162,7 @@ class OccupancyGrid:
         return (int(rows[0]), int(cols[0]), int(rows[-1] - rows[0] + 1), int(cols[-1] - cols[0] + 1))
 
     def on(self, frame: GridFrame) -> "OccupancyGrid":
-        """Return the same cells in a window ``frame`` of the same lattice; what lies outside this grid is unknown.
+        """Take the cells in a window ``frame`` of the same lattice; what lies outside this grid is unknown.
 
         Raises:
             InvalidInputError: ``frame`` has another resolution or is not shifted by whole cells.
@@ -170,7 +170,7 @@ class OccupancyGrid:
         return self if frame == self.frame else OccupancyGrid(frame, handed_over(self.cells_on(frame)))
 
     def cells_on(self, frame: GridFrame) -> CellArray:
-        """Return a copy to draw in of the cells that :meth:`on` gives, int8, shape ``frame.shape``."""
+        """Copy the cells that :meth:`on` gives to draw in them, int8, shape ``frame.shape``."""
         shift = np.array([self.frame.origin_x - frame.origin_x, self.frame.origin_y - frame.origin_y])
         cells_shift = shift / frame.resolution
         if (

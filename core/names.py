@@ -23,7 +23,7 @@ MARKDOWN = re.compile(r"([\\`*_{}\[\]()<>#|!~$&])")
 
 
 def shown(text: object, *, longest: int = LONGEST_SHOWN) -> str:
-    """Return a text as a terminal, a log or an axis may show it: one line, no control characters, of bounded length.
+    """Clean a text for a terminal, a log or an axis: one line, no control characters, of bounded length.
 
     What cannot be shown stands as its escape (``x1b`` behind a backslash), so that nobody takes one name for another.
     """
@@ -39,7 +39,7 @@ def _escaped(character: str) -> str:
 
 
 def file_name(text: object, *, otherwise: str = "unnamed") -> str:
-    """Return one name of a file or folder: no separators, no leading dot, of bounded length; never empty, never ``..``.
+    """Clean a name for a file or folder: no separators, no leading dot, bounded; never empty, never ``..``.
 
     Two long texts that differ give two names.
 
@@ -55,7 +55,7 @@ def file_name(text: object, *, otherwise: str = "unnamed") -> str:
 
 
 def short_name(name: str) -> str:
-    """Return a file name that leaves room for our endings; the cut part is told apart by its digest."""
+    """Shorten a file name to leave room for our endings; the cut part is told apart by its digest."""
     encoded = name.encode("utf-8", "surrogateescape")
     if len(encoded) <= LONGEST_FILE_NAME:
         return name
@@ -64,7 +64,7 @@ def short_name(name: str) -> str:
 
 
 def plot_text(text: object) -> str:
-    """Return a text for matplotlib, which reads what stands between two ``$`` as a formula."""
+    """Escape a text for matplotlib, which reads what stands between two ``$`` as a formula."""
     return shown(text).replace("$", r"\$")
 
 
@@ -74,21 +74,21 @@ def xml_text(text: object) -> str:
 
 
 def stage_text(text: object) -> str:
-    """Return a text between the quotes of a Stage world, which knows no escapes."""
+    """Clean a text to stand between the quotes of a Stage world, which knows no escapes."""
     return shown(text).replace('"', "'").replace("\\", "/")
 
 
 def markdown_text(text: object) -> str:
-    """Return a text as plain words of a Markdown page: its own characters are escaped."""
+    """Escape a text to stand as plain words on a Markdown page."""
     return MARKDOWN.sub(r"\\\1", shown(text))
 
 
 def is_name(text: object, *, longest: int = LONGEST_NAME) -> TypeGuard[str]:
-    """Tell whether something can be a name: a text, not empty, not endless, without half characters."""
+    """Check whether something can be a name: a text, not empty, not endless, without half characters."""
     return isinstance(text, str) and 0 < len(text) <= longest and not any(unicodedata.category(c) == "Cs" for c in text)
 
 
 def is_path(text: str) -> bool:
-    """Tell whether a name leads to another folder: absolute, with a drive, or upwards."""
+    """Check whether a name leads to another folder: absolute, with a drive, or upwards."""
     parts = re.split(r"[/\\]", text)
     return ".." in parts or (len(parts) > 1 and (not parts[0] or parts[0] == "~" or parts[0].endswith(":")))

@@ -8,7 +8,7 @@ MOST_LISTED = 12
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Return the name that was meant; empty where none is near."""
+    """Find the name that was meant; empty where none is near."""
     return next(iter(difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)), "")
 
 

@@ -19,12 +19,12 @@ MAX_ROOMS = 100_000
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
-    """Tell whether a value is a finite number (no bool) that a float holds, whatever its number of digits."""
+    """Check whether a value is a finite number (no bool) that a float holds, whatever its number of digits."""
     return isinstance(value, int | float) and not isinstance(value, bool) and -1e308 < value < 1e308
 
 
 def bounded(value: object, low: float, high: float, *, name: str, unit: str = "", where: str | Path = "") -> float:
-    """Return a number between two bounds, both included.
+    """Check that a number lies between two bounds, both included.
 
     Args:
         value: Anything.
@@ -56,7 +56,7 @@ def check_count(count: int, most: int, what: str, where: str | Path = "") -> Non
 
 
 def repr_of(value: object) -> str:
-    """``repr`` that stays short, also of whole numbers with more digits than Python prints and of deep lists."""
+    """Write a value as ``repr``, kept short, also of whole numbers longer than Python prints and of deep lists."""
     import reprlib
 
     short = reprlib.Repr()

@@ -10,7 +10,7 @@ from closedrooms.core.errors import InvalidInputError
 
 
 def wrap_angle(angle: float) -> float:
-    """Return the same angle [rad] in [-pi, pi)."""
+    """Wrap an angle [rad] to [-pi, pi)."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
@@ -41,28 +41,28 @@ class Pose2:
         )
 
     def inverse(self) -> "Pose2":
-        """``b_T_a`` of this ``a_T_b``."""
+        """Invert the pose: ``b_T_a`` of this ``a_T_b``."""
         c, s = math.cos(self.theta), math.sin(self.theta)
         return Pose2(-c * self.x - s * self.y, s * self.x - c * self.y, -self.theta)
 
     def transform(self, points: FloatArray) -> FloatArray:
-        """Points of frame b, shape (..., 2) in metres, expressed in frame a."""
+        """Transform points of frame b, shape (..., 2) in metres, to frame a."""
         c, s = math.cos(self.theta), math.sin(self.theta)
         rotation = np.array([[c, s], [-s, c]])
         moved: FloatArray = np.asarray(points, dtype=np.float64) @ rotation + np.array([self.x, self.y])
         return moved
 
     def matrix(self) -> FloatArray:
-        """Return the homogeneous 3 x 3 matrix."""
+        """Write the pose as a homogeneous 3 x 3 matrix."""
         c, s = math.cos(self.theta), math.sin(self.theta)
         return np.array([[c, -s, self.x], [s, c, self.y], [0.0, 0.0, 1.0]])
 
     def distance(self, other: "Pose2") -> float:
-        """Euclidean distance of the two origins [m]."""
+        """Compute the Euclidean distance of the two origins [m]."""
         return math.hypot(self.x - other.x, self.y - other.y)
 
     def as_tuple(self) -> tuple[float, float, float]:
-        """``(x, y, theta)``."""
+        """List the pose as ``(x, y, theta)``."""
         return (self.x, self.y, self.theta)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def stream(seed: int, *names: str) -> np.random.Generator:
-    """Return a generator that depends on the run's seed and on the name of what it is for, and on nothing else.
+    """Make a generator that depends on the run's seed and on the name of what it is for, and on nothing else.
 
     Changing how often one source draws leaves the others' draws alone.
     """

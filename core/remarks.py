@@ -43,7 +43,7 @@ class Remark:
         return f"{self.action} {number}{self.what}{f' ({named})' if named else ''}: {self.why}"
 
     def as_json(self) -> dict[str, Any]:
-        """Return the entry of ``run.json`` (key ``remarks``)."""
+        """Write the entry of ``run.json`` (key ``remarks``)."""
         return {
             "action": self.action,
             "what": self.what,
@@ -55,6 +55,6 @@ class Remark:
 
 
 def remark_rows(remarks: Iterable[Remark]) -> list[tuple[str, str]]:
-    """Rows of a table of results, losses first."""
+    """List the rows of a table of results, losses first."""
     ordered = sorted(remarks, key=lambda remark: not remark.loss)
     return [("remark", str(remark)) for remark in ordered]

@@ -13,7 +13,7 @@ class Report:
     """The outcome of one use case.
 
     Attributes:
-        folder: What was written: a folder, or a single file.
+        folder: What was written: a folder, a single file, or an address.
         title: Head of the table.
         rows: Rows for people; the first is the head.
         failures: What could not be done and why, by its id; the rest is written.
@@ -21,7 +21,7 @@ class Report:
         figures: The result for programs, plain JSON values.
     """
 
-    folder: Path
+    folder: Path | str
     title: str
     rows: Sequence[Sequence[str]]
     failures: Mapping[str, str] = field(default_factory=dict)
@@ -34,13 +34,13 @@ class Report:
         return bool(self.failures) or any(remark.loss for remark in self.remarks)
 
     def table(self) -> list[tuple[str, ...]]:
-        """Rows and remarks, all as wide as the head."""
+        """List rows and remarks, all as wide as the head."""
         width = len(self.rows[0])
         rows = [*map(tuple, self.rows), *remark_rows(self.remarks)]
         return [(*row, *[""] * (width - len(row))) for row in rows]
 
     def as_json(self) -> dict[str, Any]:
-        """Return the object that ``--json`` prints."""
+        """Write the object that ``--json`` prints."""
         return {
             "title": self.title,
             "written": str(self.folder),

@@ -32,7 +32,7 @@ class Room:
         score: Value of the evaluation function (paper, section 3.4); ``None`` where none was computed.
         bounded: A search limit cut something while the room was found.
         confidence: Expected IoU with the true room, 0..1; ``None`` where nothing tells.
-        alternatives: Up to three other shapes, the most probable one first.
+        alternatives: Up to three other shapes; the first few are the best choice of so many (``confidence.belief``).
     """
 
     polygon: Polygon | MultiPolygon

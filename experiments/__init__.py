@@ -1,4 +1,4 @@
-"""Ground-truth datasets, evaluation, robustness, and the workers that they share.
+"""Ground-truth datasets, evaluation, robustness and training, and the workers that they share.
 
 ``dataset.dataset.dataset`` and ``robustness.sweep.robustness`` are named like their packages and so stand there.
 """

@@ -193,6 +193,7 @@ def _prepared(function: Callable[[Job], Outcome], needs: tuple[str, ...], by: st
 def _make_ready(needs: tuple[str, ...], by: str) -> None:
     require(*needs, by=by)
     one_thread()
+    keep_memory()
 
 
 # What the numeric libraries ask when they are loaded.
@@ -210,6 +211,25 @@ def one_thread() -> None:
     os.environ.update(dict.fromkeys(THREADS, "1"))
     threadpool_limits(1)
     cv2.setNumThreads(1)
+
+
+# Of <malloc.h>: what is returned to the system at the end of the heap, and what is asked from it by itself [bytes].
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
+KEPT, OWN = 64 << 20, 32 << 20
+
+
+def keep_memory() -> None:
+    """Let this process keep the memory that it frees: the next map takes it again.
+
+    Dask's nanny starts workers with ``MALLOC_TRIM_THRESHOLD_=65536``, which also ends glibc's habit to raise both
+    limits by itself: every array above 128 kB is then asked from the system, zeroed page by page and given back at
+    once. Measured on 18 maps of school-01: 250,000 page faults against 76,000 without that variable and 5,700 with
+    this function, and a quarter less processor time.
+    """
+    adjust = getattr(ctypes.CDLL(None), "mallopt", None)
+    if adjust is not None:  # another C library has no such limits
+        adjust(M_MMAP_THRESHOLD, OWN)
+        adjust(M_TRIM_THRESHOLD, KEPT)
 
 
 def _begin(parent: int) -> None:

@@ -1,7 +1,8 @@
 """SLAM and nothing else: scans and odometry in, poses, the map and closed doors out; ``mapper`` is where to begin.
 
 - A scan: ``beams``, ``scan_preparation``, ``visibility``; where it fits: ``matching/``.
-- Motion: ``motion``, ``motion_prediction``, ``scan_odometry`` (robots that recorded none), ``mapping_events``.
+- Motion: ``motion``, ``motion_prediction``, ``sweep_motion``, ``scan_odometry`` (robots that recorded none),
+  ``mapping_events``.
 - Surroundings: ``local_map``, ``lattice``, ``growing_array``; poses of keyframes: ``graph/``.
 - The map: ``log_odds_grid``, ``door_fusion``, ``trajectory``.
 - Recorded runs: ``logs/`` reads them (rosbags too), ``map_builder`` maps them.

@@ -17,7 +17,7 @@ OUTLIER_GAP = 0.30
 lidar) is not believed."""
 SURROUNDINGS = 2
 """Beams to each side whose median says how far one can see: two outliers in a row, at 1 % of them one scan in ten,
-still open no way through a wall."""
+still open no gap in a wall."""
 ON_WALL = (4.0, 3.0, 3.0, 3.0)
 """Standard deviations by which the mean of the next pair of neighbours may leave that of the beams within, from the
 innermost pair on: beams far off their wall need the averaging most, corners must end it. A wall is drawn through as
@@ -59,7 +59,7 @@ def hit_points(scan: LaserScan, *, max_range: float, motion: SweepMotion | None 
 
 
 def matched_range(scan: LaserScan, *, max_range: float, margin: float) -> float:
-    """Range up to which points are matched [m]: ``margin`` [m] less than the sensor sees, or ``max_range``.
+    """Compute the range up to which points are matched [m]: ``margin`` less than the sensor sees, or ``max_range``.
 
     Of a short-sighted sensor at most a tenth of its range is left out.
     """
@@ -86,7 +86,7 @@ def clean(scan: LaserScan, *, max_range: float, motion: SweepMotion | None = Non
 
 
 def clean_alike(scans: Sequence[LaserScan], *, max_range: float, motion: SweepMotion | None = None) -> list[Beams]:
-    """As :func:`clean`, for several scans that differ in ranges and stamps only."""
+    """Clean, as :func:`clean`, several scans that differ in ranges and stamps only."""
     # Arrays below are of shape (scans, beams).
     first = scans[0]
     reach, increment = min(max_range, first.range_max), first.angle_increment
@@ -139,7 +139,7 @@ def clean_alike(scans: Sequence[LaserScan], *, max_range: float, motion: SweepMo
 
 
 def steadied(ranges: FloatArray, increment: float, *, wrap: bool) -> FloatArray:
-    """Ranges less their noise, as far as neighbouring beams show a straight wall.
+    """Reduce the noise of ranges as far as neighbouring beams show a straight wall.
 
     Along a straight wall 1/r is a cosine of the angle, so that the mean of two beams at equal angles to either side,
     divided by the cosine of that angle, gives 1/r between them, however slanted the wall. Pairs are taken from the
@@ -161,7 +161,7 @@ def steadied(ranges: FloatArray, increment: float, *, wrap: bool) -> FloatArray:
     padded = _padded(inverse, reach, wrap=wrap)
 
     def between(step: int) -> FloatArray:
-        """1/r between the two beams ``step`` to either side."""
+        """Interpolate 1/r between the two beams ``step`` to either side."""
         low, high = padded[..., reach - step :][..., :n], padded[..., reach + step :][..., :n]
         return np.asarray((low + high) / (2.0 * math.cos(step * increment)))
 
@@ -221,19 +221,19 @@ def _median(around: Sequence[FloatArray]) -> FloatArray:
 
 @functools.lru_cache(maxsize=8)
 def directions(angle_min: float, increment: float, beams: int) -> tuple[FloatArray, FloatArray]:
-    """Unit vectors of the beams and of the directions half-way to the next ones, shape (beams, 2) each."""
+    """Compute unit vectors of the beams and half-way to the next ones, shape (beams, 2) each."""
     angles = angle_min + increment * np.arange(beams)
     half = angles + increment / 2.0
     return np.column_stack((np.cos(angles), np.sin(angles))), np.column_stack((np.cos(half), np.sin(half)))
 
 
-def thin(points: FloatArray, spacing: float, most: int) -> FloatArray:
-    """Points of a scan, shape (n, 2), in beam order, at about ``spacing`` [m] along it and at most ``most`` of them."""
+def thin_points(points: FloatArray, spacing: float, most: int) -> FloatArray:
+    """Thin the points of a scan, shape (n, 2), in beam order, to ``most`` at most, about ``spacing`` [m] apart."""
     return points[spaced(points, np.array([len(points)]), spacing, most)]
 
 
 def spaced(points: FloatArray, counts: IntArray, spacing: float, most: int) -> BoolArray:
-    """Tell which points of each scan :func:`thin` keeps, shape (..., n).
+    """Mark the points of each scan that :func:`thin_points` keeps, shape (..., n).
 
     Args:
         points: In beam order, shape (..., n, 2) [m]; what stands after the first ``counts`` of a scan does not count.
@@ -243,9 +243,9 @@ def spaced(points: FloatArray, counts: IntArray, spacing: float, most: int) -> B
     """
     number = np.arange(points.shape[-2])
     steps = np.hypot(np.diff(points[..., 0]), np.diff(points[..., 1]))
-    way = np.zeros(points.shape[:-1])
-    np.cumsum(np.where(number[1:] < counts, np.minimum(steps, spacing), 0.0), axis=-1, out=way[..., 1:])
-    ticks = np.floor(way / np.maximum(spacing, way[..., -1:] / most))
+    along = np.zeros(points.shape[:-1])
+    np.cumsum(np.where(number[1:] < counts, np.minimum(steps, spacing), 0.0), axis=-1, out=along[..., 1:])
+    ticks = np.floor(along / np.maximum(spacing, along[..., -1:] / most))
     keep: BoolArray = (number < counts) & (counts < 3)
     keep[..., :1] = counts > 0
     keep[..., 1:] |= ticks[..., 1:] > ticks[..., :-1]

@@ -81,11 +81,11 @@ class LoopConfig:
     """Close loops."""
 
     horizon: float = 20.0
-    """Way along the pose graph [m] within which keyframes are taken as consistent with the present: only they are
-    matched against, what lies beyond is a candidate for a loop."""
+    """Path length along the pose graph [m] within which keyframes are taken as consistent with the present: only they
+    are matched against, what lies beyond is a candidate for a loop."""
 
     interval: float = 1.0
-    """Way between two attempts to close a loop [m]."""
+    """Travelled distance between two attempts to close a loop [m]."""
 
     window: float = 0.30
     """Half width of the search window without any drift [m]."""
@@ -202,7 +202,7 @@ class MapperConfig:
     """Cell size of the map [m]."""
 
     keyframe_distance: float = 0.35
-    """Way after which a scan becomes a keyframe and enters the map [m]."""
+    """Travelled distance after which a scan becomes a keyframe and enters the map [m]."""
 
     keyframe_angle: float = 0.40
     """Turn after which a scan becomes a keyframe and enters the map [rad]."""
@@ -211,7 +211,7 @@ class MapperConfig:
     """How many times farther than usual the robot moves before a keyframe is taken at a pose that fits poorly."""
 
     max_range: float = 25.0
-    """Longest range that is mapped [m]; longer ones clear the way up to here."""
+    """Longest range that is mapped [m]; longer ones clear the cells up to here."""
 
     log_odds_hit: float = 3.2
     """Evidence of one hit for a cell being occupied (natural log-odds): more than two passes, less than three."""

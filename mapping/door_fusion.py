@@ -13,7 +13,7 @@ NEAR = 1.0
 
 
 def fuse_doors(keyframes: Sequence[Keyframe]) -> list[ClosedDoor]:
-    """Closed doors at the keyframes' present poses, sorted by id.
+    """Fuse sightings to closed doors at the keyframes' present poses, sorted by id.
 
     The jambs are weighted medians over the sightings: a heading error moves a far door more than a near one, so a
     sighting weighs inversely to its squared distance, and a few wrong poses move nothing.

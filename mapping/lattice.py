@@ -38,12 +38,12 @@ class Lattice:
         )
 
     def cells(self, points: FloatArray) -> tuple[IntArray, IntArray]:
-        """Rows and columns in the window, shape (n,) each, of map points, shape (n, 2)."""
+        """Convert map points, shape (n, 2), to rows and columns in the window, shape (n,) each."""
         cells = np.floor(points * (1.0 / self.resolution)).astype(np.int64)
         return cells[:, 1] - self.row0, cells[:, 0] - self.col0
 
     def holds(self, middle: tuple[float, float], reach: float) -> bool:
-        """Tell whether the window holds all that is within ``reach`` of a place ``(x, y)``; both in cells."""
+        """Check whether the window holds all that is within ``reach`` of a place ``(x, y)``; both in cells."""
         (x, y), right, top = middle, self.col0 + self.cols, self.row0 + self.rows
         return self.col0 <= x - reach and x + reach < right and self.row0 <= y - reach and y + reach < top
 
@@ -72,7 +72,7 @@ class Lattice:
 def grown(
     values: np.ndarray[Any, np.dtype[Scalar]], padding: Padding, fill: int = 0
 ) -> np.ndarray[Any, np.dtype[Scalar]]:
-    """Return the array of a window that grew by ``padding``; quicker than NumPy's ``pad``, which serves every case."""
+    """Grow a window's array by ``padding``; quicker than NumPy's ``pad``, which serves every case."""
     (below, above), (left, right) = padding
     rows, cols = values.shape
     shape = (below + rows + above, left + cols + right)

@@ -142,7 +142,7 @@ class EvidenceGrid:
             self._dirty = (row + padding[0][0], col + padding[1][0], rows, cols)
 
     def grid(self) -> OccupancyGrid:
-        """Return the map: probability in percent where anything was observed, else unknown."""
+        """Draw the map: probability in percent where anything was observed, else unknown."""
         if self._dirty is None and self._grid is not None:
             return self._grid
         if self._dirty is not None:

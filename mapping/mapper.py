@@ -12,7 +12,7 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.beams import Beams, clean, hit_points, matched_range, thin
+from closedrooms.mapping.beams import Beams, clean, hit_points, matched_range, thin_points
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.door_fusion import fuse_doors
 from closedrooms.mapping.graph.keyframe import Keyframe
@@ -24,7 +24,7 @@ from closedrooms.mapping.mapping_events import Event, EventLog
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.relocalisation import relocalise
 from closedrooms.mapping.matching.scan_matcher import ADVANTAGE, Match, match_scan
-from closedrooms.mapping.motion import Motion
+from closedrooms.mapping.motion import UncertainMotion
 from closedrooms.mapping.motion_prediction import MotionPrediction
 from closedrooms.mapping.scan_preparation import Sweep
 from closedrooms.mapping.sweep_motion import SweepMotion
@@ -58,7 +58,7 @@ class Mapper:
         self._evidence = EvidenceGrid(self._config)
         self._pose = Pose2()
         self._prediction = MotionPrediction(self._config.recovery, self._events)
-        self._motion = Motion()
+        self._motion = UncertainMotion()
         self._measured = True
         self._last_odometry: Pose2 | None = None
         self._usual_score = 0.0
@@ -112,7 +112,7 @@ class Mapper:
         else:
             reach = matched_range(scan, max_range=max_range, margin=matcher.range_margin)
             hits = hit_points(scan, max_range=reach, motion=motion)
-            points = thin(hits, matcher.point_spacing, matcher.max_points)
+            points = thin_points(hits, matcher.point_spacing, matcher.max_points)
 
         @functools.cache
         def beams() -> Beams:
@@ -301,7 +301,7 @@ class Mapper:
         self._drawn = 0
 
     def grid(self) -> OccupancyGrid:
-        """Return the map so far, from the keyframes' present poses."""
+        """Draw the map so far, from the keyframes' present poses."""
         moved = [keyframe for keyframe in self.keyframes[self._drawn :] if _outdated(keyframe)]
         self._evidence.add_all([(k.beams, k.drawn) for k in moved if k.drawn is not None], sign=-1)
         self._evidence.add_all([(k.beams, k.pose) for k in moved])
@@ -311,11 +311,11 @@ class Mapper:
         return self._evidence.grid()
 
     def doors(self) -> list[ClosedDoor]:
-        """Closed doors seen so far, map frame, sorted by id."""
+        """Fuse the closed doors seen so far, map frame, sorted by id."""
         return fuse_doors(self.keyframes)
 
     def trajectory(self) -> tuple[FloatArray, FloatArray]:
-        """Stamps [s], shape (n,), and poses ``(x, y, theta)``, shape (n, 3), at the keyframes' present poses."""
+        """List stamps [s], shape (n,), and poses ``(x, y, theta)``, shape (n, 3), at the keyframes' present poses."""
         poses = [(self.keyframes[i].pose @ relative).as_tuple() for i, relative in self._references]
         return np.array(self._stamps, dtype=np.float64), np.array(poses, dtype=np.float64).reshape(-1, 3)
 

@@ -40,7 +40,7 @@ class EventLog:
         return len(self._times.get(event, ()))
 
     def remarks(self) -> tuple[Remark, ...]:
-        """Return one remark a kind; its names are the times of the events."""
+        """Make one remark of each kind of event; its names are the times of the events."""
         return tuple(
             Remark(
                 action=event.action,

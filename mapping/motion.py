@@ -16,7 +16,7 @@ NEGLIGIBLE = (0.01, 0.005)
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class UncertainMotion:
     """Motion since the last match and its uncertainty.
 
     Attributes:
@@ -36,12 +36,12 @@ class Motion:
     surprise: tuple[float, float] = (0.0, 0.0)
     unmeasured: tuple[float, float] | None = None
 
-    def then(self, distance: float, turn: float) -> "Motion":
-        """After one more step.
+    def then(self, distance: float, turn: float) -> "UncertainMotion":
+        """Add one more step of the odometry.
 
         What moved a moment ago hardly stands still: a noisy odometry may read zero by chance in the middle of a turn.
         """
-        return Motion(
+        return UncertainMotion(
             self.distance + distance,
             self.turn + turn,
             max(distance, FADING * self.recent_distance),
@@ -50,13 +50,13 @@ class Motion:
             self.unmeasured,
         )
 
-    def without_odometry(self, distance: float, turn: float) -> "Motion":
-        """After a step of about ``distance`` [m] and ``turn`` [rad] that no odometry measured."""
+    def without_odometry(self, distance: float, turn: float) -> "UncertainMotion":
+        """Add a step of about ``distance`` [m] and ``turn`` [rad] that no odometry measured."""
         before = self.unmeasured or (0.0, 0.0)
         return replace(self, unmeasured=(before[0] + distance, before[1] + turn))
 
-    def corrected(self, distance: float, angle: float, config: MatcherConfig) -> "Motion":
-        """After a match that moved the prediction by ``distance`` [m] and ``angle`` [rad]."""
+    def corrected(self, distance: float, angle: float, config: MatcherConfig) -> "UncertainMotion":
+        """Start again after a match that moved the prediction by ``distance`` [m] and ``angle`` [rad]."""
         surprise = tuple(
             max(off if off > SURPRISE * sigma else 0.0, FADING * last if last > negligible else 0.0)
             for off, sigma, last, negligible in zip(
@@ -65,9 +65,9 @@ class Motion:
         )
         return replace(self, surprise=(surprise[0], surprise[1]))
 
-    def matched(self) -> "Motion":
-        """From a match on."""
-        return Motion(0.0, 0.0, self.recent_distance, self.recent_turn, self.surprise)
+    def matched(self) -> "UncertainMotion":
+        """Start again at a match."""
+        return UncertainMotion(0.0, 0.0, self.recent_distance, self.recent_turn, self.surprise)
 
     @property
     def still(self) -> bool:
@@ -79,7 +79,7 @@ class Motion:
         )
 
     def sigmas(self, config: MatcherConfig) -> tuple[float, float]:
-        """Standard deviations of the predicted position [m] and heading [rad]."""
+        """Compute the standard deviations of the predicted position [m] and heading [rad]."""
         distance, angle = self._odometry_sigmas(config)
         unmeasured = self.unmeasured or (0.0, 0.0)
         return math.hypot(distance, self.surprise[0], unmeasured[0]), math.hypot(angle, self.surprise[1], unmeasured[1])

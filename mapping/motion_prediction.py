@@ -26,7 +26,7 @@ UNKNOWN_STEP = (0.1, 0.1)
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class PredictedStep:
     """Predicted motion to the present scan.
 
     Attributes:
@@ -64,8 +64,8 @@ class MotionPrediction:
             abs(self._last.theta) + UNKNOWN_STEP[1],
         )
 
-    def step(self, odometry: Pose2 | None, stamp: float) -> Step:
-        """Return the motion since the scan before.
+    def step(self, odometry: Pose2 | None, stamp: float) -> PredictedStep:
+        """Predict the motion since the scan before.
 
         Args:
             odometry: ``odom_T_robot``, ``None`` without one.
@@ -77,21 +77,21 @@ class MotionPrediction:
         if odometry is not None:
             self._odometry = odometry
         if first:
-            return Step(Pose2())
+            return PredictedStep(Pose2())
         gap = self._usual_time > 0.0 and seconds > max(SHORTEST_GAP, LONG_GAP * self._usual_time)
         if not gap:
             self._usual_time += (TIME_MEMORY if self._usual_time > 0.0 else 1.0) * (seconds - self._usual_time)
         if odometry is None or before is None:
             self._events.note(Event.SILENT, stamp)
-            return Step(self._last, self.possible)
+            return PredictedStep(self._last, self.possible)
         motion = before.inverse() @ odometry
         if not self._config.enabled:
-            return Step(motion)
+            return PredictedStep(motion)
         if odometry == before:
             return self._without_change(stamp)
         return self._judged(motion, seconds, stamp, gap=gap)
 
-    def _judged(self, motion: Pose2, seconds: float, stamp: float, *, gap: bool) -> Step:
+    def _judged(self, motion: Pose2, seconds: float, stamp: float, *, gap: bool) -> PredictedStep:
         """The step of an odometry that may jump, or catch up after it stood still."""
         distance, turn = math.hypot(motion.x, motion.y), abs(motion.theta)
         resumed, self._silent = self._silent, False
@@ -99,23 +99,23 @@ class MotionPrediction:
         seconds = max(seconds, SHORTEST_TIME) if seconds > 0.0 else UNKNOWN_TIME
         if distance > self._config.max_speed * seconds or turn > self._config.max_turn_rate * seconds:
             self._events.note(Event.JUMP, stamp)
-            return Step(self._last, self.possible)
+            return PredictedStep(self._last, self.possible)
         if gap and (distance > GAP_MOTION[0] or turn > GAP_MOTION[1]):
             self._events.note(Event.GAP, stamp)
         if resumed:
-            return Step(motion, self.possible, unreported.inverse() @ motion)
-        return Step(motion)
+            return PredictedStep(motion, self.possible, unreported.inverse() @ motion)
+        return PredictedStep(motion)
 
-    def _without_change(self, stamp: float) -> Step:
+    def _without_change(self, stamp: float) -> PredictedStep:
         moving = math.hypot(self._last.x, self._last.y) > MOVING[0] or abs(self._last.theta) > MOVING[1]
         if not moving:
             self._silent = False
-            return Step(Pose2())
+            return PredictedStep(Pose2())
         again, self._silent = self._silent, True
         if not again:
-            return Step(Pose2(), self.possible)
+            return PredictedStep(Pose2(), self.possible)
         self._events.note(Event.SILENT, stamp)
-        return Step(self._last, self.possible)
+        return PredictedStep(self._last, self.possible)
 
     def moved(self, motion: Pose2) -> None:
         """Remember the step as it was estimated."""

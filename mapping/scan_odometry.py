@@ -8,7 +8,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.matching.correlative_matcher import Search, Window
+from closedrooms.mapping.matching.correlative_matcher import SearchWindow, WindowSearch
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 
@@ -22,7 +22,7 @@ WINDOW_SIGMAS = 2.0
 """Half width of the first search in standard deviations."""
 MOST_DISTANCE, MOST_ANGLE = 1.2, 0.8
 """Largest half width of the first search ([m], [rad]); where the scan does not fit there, all headings are searched."""
-FAR = Window(1.5, math.pi)
+FAR = SearchWindow(1.5, math.pi)
 FITS = 0.8
 """Share of the usual score from which a scan fits."""
 LEAST_SCORE = 0.25
@@ -92,10 +92,10 @@ class ScanOdometry:
             min(max(rate * duration, least), most)
             for rate, least, most in zip((DISTANCE_RATE, ANGLE_RATE), LEAST_SIGMAS, MOST_SIGMAS, strict=True)
         )
-        near = Window(min(WINDOW_SIGMAS * distance, MOST_DISTANCE), min(WINDOW_SIGMAS * angle, MOST_ANGLE))
+        near = SearchWindow(min(WINDOW_SIGMAS * distance, MOST_DISTANCE), min(WINDOW_SIGMAS * angle, MOST_ANGLE))
         best_score, best = 0.0, guess
         for window in (near, FAR):
-            found = Search(self._field, points, guess, window, prior_sigmas=(distance, angle)).best()
+            found = WindowSearch(self._field, points, guess, window, prior_sigmas=(distance, angle)).best()
             refined = self._refined(points, found.pose if found.score > 0.0 else guess, distance, angle)
             if refined[0] > best_score:
                 best_score, best = refined

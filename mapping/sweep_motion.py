@@ -60,6 +60,6 @@ class SweepMotion:
 
 
 def beam_ages(scan: LaserScan) -> FloatArray:
-    """Tell how long before the last one each beam was measured, shape (beams,) [s]."""
+    """Compute how long before the last one each beam was measured, shape (beams,) [s]."""
     share = np.linspace(0.0, 1.0, scan.ranges.size)
     return abs(scan.sweep) * (1.0 - share if scan.sweep >= 0.0 else share)

@@ -7,7 +7,7 @@ from closedrooms.core.errors import InvalidInputError
 
 
 def ate(estimated: FloatArray, truth: FloatArray) -> tuple[float, float]:
-    """Absolute trajectory error after the best rigid alignment, without scale (Sturm et al., IROS 2012).
+    """Compute the absolute trajectory error after the best rigid alignment, without scale (Sturm et al., IROS 2012).
 
     Args:
         estimated: Poses ``(x, y, theta)``, shape (n, 3), metres and radians.
@@ -29,7 +29,7 @@ def ate(estimated: FloatArray, truth: FloatArray) -> tuple[float, float]:
 
 
 def align(estimated: FloatArray, truth: FloatArray) -> FloatArray:
-    """``estimated`` moved rigidly so that its positions are nearest to ``truth`` (Umeyama 1991 without scale, in 2D).
+    """Move ``estimated`` rigidly to where it is nearest to ``truth`` (Umeyama 1991 without scale, in 2D).
 
     Args:
         estimated: Poses, shape (n, 3).

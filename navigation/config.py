@@ -110,7 +110,7 @@ class NavigationConfig:
             raise InvalidInputError(f"navigation braking_reserve {self.braking_reserve}", expected="a number from 1 on")
 
     def for_robot(self, robot: RobotConfig) -> "RobotNavigation":
-        """These settings together with the robot that drives by them."""
+        """Combine these settings with the robot that drives by them."""
         settings = {item.name: getattr(self, item.name) for item in fields(NavigationConfig)}
         return RobotNavigation(**settings, robot=robot)
 

@@ -43,7 +43,7 @@ class MapMaker(Protocol):
         """Take in one scan; returns ``map_T_robot``."""
 
     def grid(self) -> OccupancyGrid:
-        """Return the map so far."""
+        """Draw the map so far."""
 
 
 class Decider(Protocol):
@@ -60,7 +60,17 @@ class Decider(Protocol):
         grid: Callable[[], OccupancyGrid],
         bumps: Sequence[float] = (),
     ) -> tuple[float, float]:
-        """Speed [m/s] and turn rate [rad/s] for now."""
+        """Decide on speed [m/s] and turn rate [rad/s] for now.
+
+        Args:
+            pose: ``map_T_robot`` as estimated.
+            scan: What the robot sees now.
+            grid: Returns the map as estimated; only called when something is decided on it.
+            bumps: Directions from which something presses, robot frame [rad].
+
+        Returns:
+            The command; (0, 0) once ``status`` is set.
+        """
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -192,13 +202,13 @@ class Limits:
         self._begun = process_time()
 
     def grid(self) -> OccupancyGrid:
-        """Return the map so far, and note its size."""
+        """Draw the map so far, and note its size."""
         grid = self._mapper.grid()
         self._cells = grid.frame.rows * grid.frame.cols
         return grid
 
     def check(self, step: Step) -> Stop | None:
-        """Tell whether a limit is met by now."""
+        """Check whether a limit is met by now."""
         config = self._config
         self._begun_at = step.stamp if self._begun_at is None else self._begun_at
         seconds = step.stamp - self._begun_at

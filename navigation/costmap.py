@@ -39,7 +39,7 @@ class Costmap:
     factor: int
 
     def anchors(self, cells: IntArray) -> FloatArray:
-        """Return the roomiest place inside each coarse cell ``(row, col)``, shape (n, 2), as map points (n, 2) [m]."""
+        """Find the roomiest place inside coarse cells ``(row, col)``, shape (n, 2), as map points (n, 2) [m]."""
         f = self.factor
         rows = cells[:, 0, None] * f + np.repeat(np.arange(f), f)
         cols = cells[:, 1, None] * f + np.tile(np.arange(f), f)
@@ -48,7 +48,7 @@ class Costmap:
         return self.fine_frame.to_points(np.stack((rows[index, best], cols[index, best]), axis=-1))
 
     def clearance_at(self, points: FloatArray) -> Field:
-        """Clearance of map points, shape (n, 2), as (n,) [m]; 0 where not known to be free."""
+        """Look up the clearance of map points, shape (n, 2), as (n,) [m]; 0 where not known to be free."""
         cells = self.fine_frame.to_cells(points)
         inside = self.fine_frame.contains(cells)
         values = np.zeros(len(points), dtype=np.float32)
@@ -86,7 +86,7 @@ class NavigationMap:
         return Costmap(coarse, self._coarse, fine, self._fine, self._factors[1])
 
     def add_obstacles(self, points: FloatArray) -> None:
-        """Places where the robot met something that the map does not show, shape (n, 2) [m]; they stay."""
+        """Remember where the robot met something that the map does not show, shape (n, 2) [m]."""
         self._obstacles.append(points)
         self._grid_frame = None
 
@@ -164,7 +164,7 @@ class NavigationMap:
 
 
 def clearance_field(free: Image, blocked: Image, resolution: float) -> Field:
-    """Distance of every free cell's centre from the nearest occupied cell's edge [m], 0 where not free."""
+    """Compute the distance of free cells' centres from the nearest occupied cell's edge [m]; 0 elsewhere."""
     field: Any = cv2.distanceTransform(1 - blocked, cv2.DIST_L2, 5)
     # The transform measures centre to centre; half a cell of that belongs to the obstacle.
     field = np.maximum(field - np.float32(0.5), np.float32(0.0)) * np.float32(resolution)
@@ -173,7 +173,7 @@ def clearance_field(free: Image, blocked: Image, resolution: float) -> Field:
 
 
 def pooled(values: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:
-    """Return the largest value of each ``factor`` x ``factor`` block; the shape must be a multiple of ``factor``."""
+    """Pool the largest value of each ``factor`` x ``factor`` block; the shape must be a multiple of ``factor``."""
     by_row = values[::factor]
     for i in range(1, factor):
         by_row = np.maximum(by_row, values[i::factor])
@@ -184,7 +184,7 @@ def pooled(values: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:
 
 
 def traversable(costmap: Costmap, config: RobotNavigation) -> BoolArray:
-    """Coarse cells where the robot fits."""
+    """Mark the coarse cells where the robot fits."""
     fits: BoolArray = costmap.clearance >= config.required_clearance
     return fits
 

@@ -83,7 +83,7 @@ class Driver:
         self.recoveries = 0
 
     def command(self, pose: Pose2, scan: LaserScan, stamp: float, bumps: Sequence[float] = ()) -> tuple[float, float]:
-        """Speed [m/s] and turn rate [rad/s] for now; ``state`` says what they are about.
+        """Choose speed [m/s] and turn rate [rad/s] for now; ``state`` says what they are about.
 
         Args:
             pose: ``map_T_robot`` as estimated.
@@ -130,7 +130,7 @@ class Driver:
         return None if abs(error) < tolerance else (0.0, turn_rate(error, self.config))
 
     def _turning_time(self, wish: Steering) -> float:
-        """A turn in place is allowed the time of half a turn on top."""
+        """Compute the time that a turn in place is allowed on top [s]: that of half a turn."""
         return math.pi / self.config.robot.max_turn_rate if wish.v == 0.0 else 0.0
 
     def _recover(self, pose: Pose2, scan: LaserScan, stamp: float, bumps: Sequence[float]) -> tuple[float, float]:
@@ -155,5 +155,5 @@ class Driver:
 
 
 def _is_ahead(bump: float) -> bool:
-    """Whether a bump is on the front half [rad]."""
+    """Check whether a bump is on the front half [rad]."""
     return math.cos(bump) > 0.0

@@ -69,17 +69,7 @@ class Explorer:
         grid: Callable[[], OccupancyGrid],
         bumps: Sequence[float] = (),
     ) -> tuple[float, float]:
-        """Speed [m/s] and turn rate [rad/s] for now.
-
-        Args:
-            pose: ``map_T_robot`` as estimated.
-            scan: What the robot sees now.
-            grid: Returns the map as estimated; only called when something is decided on it.
-            bumps: Directions from which something presses, robot frame [rad].
-
-        Returns:
-            The command; (0, 0) once ``status`` is set.
-        """
+        """Decide on speed [m/s] and turn rate [rad/s] for now, see ``Decider.command``."""
         now = scan.stamp
         driver = self._driver
         if self.status is not None:
@@ -152,7 +142,7 @@ class Explorer:
         self._driver.follow(goal.path.points, now)
 
     def _look(self, pose: Pose2, grid: Callable[[], OccupancyGrid], now: float) -> tuple[float, float]:
-        """At the goal: face what is still unknown, and give it up when it stays so."""
+        """Face what is still unknown at the goal, and give it up when it stays so."""
         goal, since = self.goal, self._facing_since
         assert goal is not None
         assert since is not None
@@ -175,7 +165,7 @@ class Explorer:
         self._driver.stop()
 
     def _count(self, place: Point) -> int:
-        """How often this place has been chosen, this time included."""
+        """Count how often this place has been chosen, this time included."""
         for i, (other, count) in enumerate(self._chosen):
             if math.dist(place, other) < SAME_PLACE:
                 self._chosen[i] = (other, count + 1)

@@ -35,7 +35,7 @@ class Frontiers:
     free: Image
 
     def within(self, distance: float, chosen: BoolArray) -> BoolArray:
-        """Free cells that lie within a path of ``distance`` [m] from a chosen point; ``chosen`` has shape (n,)."""
+        """Mark free cells within a path of ``distance`` [m] from a chosen point; ``chosen`` has shape (n,)."""
         near = np.zeros(self.frame.shape, dtype=np.bool_)
         cells = self.frame.to_cells(self.points[chosen])
         if len(cells) == 0:
@@ -56,7 +56,7 @@ class Frontiers:
 def find_frontiers(
     navigation: NavigationMap, config: NavigationConfig, *, given_up: FloatArray | None = None
 ) -> Frontiers:
-    """Borders between free and unknown space that are worth a visit.
+    """Find the borders between free and unknown space that are worth a visit.
 
     Args:
         navigation: The map, as of its last update.
@@ -94,7 +94,7 @@ def find_frontiers(
 
 
 def _edge(free: Image, blocked: Image, resolution: float) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float32]]:
-    """Free cells beside unknown ones, and the area of the largest unknown patch that each is beside.
+    """Find free cells beside unknown ones, and the area of the largest unknown patch that each is beside.
 
     Returns:
         Cells ``(row, col)`` in their order, shape (n, 2), and areas [m2], shape (n,).
@@ -122,7 +122,7 @@ def _edge(free: Image, blocked: Image, resolution: float) -> tuple[npt.NDArray[n
 
 
 def seen_from(navigation: NavigationMap, place: tuple[float, float], points: FloatArray, reach: float) -> FloatArray:
-    """Return the frontier points within ``reach`` [m] of a place that connect with it through free space close by.
+    """Select the frontier points within ``reach`` [m] of a place that connect with it through free space close by.
 
     Args:
         navigation: The map, as of its last update.
@@ -149,7 +149,7 @@ def seen_from(navigation: NavigationMap, place: tuple[float, float], points: Flo
 
 
 def still_unknown(grid: OccupancyGrid, points: FloatArray, config: NavigationConfig) -> float:
-    """Tell how much of a frontier is still one [m]: cells of ``points`` that have unknown map cells around them.
+    """Measure how much of a frontier is still one [m]: cells of ``points`` with unknown map cells around them.
 
     Looks at the window around the points only, so that it costs the same on any map.
 

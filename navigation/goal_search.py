@@ -12,7 +12,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.navigation.config import RobotNavigation
 from closedrooms.navigation.costmap import Costmap, NavigationMap, pooled, traversable
 from closedrooms.navigation.frontiers import Frontiers, find_frontiers, seen_from
-from closedrooms.navigation.planner import Path, Search, reachable_cells, start_cell
+from closedrooms.navigation.planner import Path, PathSearch, reachable_cells, start_cell
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +84,7 @@ class GoalSearch:
         return None
 
     def _is_joined(self, component: BoolArray | None, origin: Point) -> bool:
-        """Whether the place where the search began is among the cells that the robot can reach.
+        """Check whether the place where the search began is among the cells that the robot can reach.
 
         A robot that squeezed through a gap may see it closed by a cell afterwards: walls thicken a little as they are
         seen again. It has come through, so that it goes back with less room.
@@ -109,7 +109,7 @@ class GoalSearch:
         is_large = found.unknown_area[found.labels] >= config.large_area
         large = _goal_cells(found.within(distance, is_large), costmap) & component
         small = _goal_cells(found.within(distance, ~is_large), costmap) & component
-        search = Search.begin(costmap, here, config)
+        search = PathSearch.begin(costmap, here, config)
         if search is None or not (large.any() or small.any()):
             return None
         search.run(large, limit=math.inf if large.any() else config.worth * config.large_area)
@@ -139,7 +139,7 @@ class GoalSearch:
 
 
 def _looked_at(goal: Goal, found: Frontiers) -> BoolArray:
-    """Which frontiers a goal looks at, by label."""
+    """Mark the frontiers that a goal looks at, by label."""
     mine = (found.points[:, None, :] == goal.frontier[None, :, :]).all(axis=2).any(axis=1)
     chosen = np.zeros(len(found.unknown_area), dtype=np.bool_)
     chosen[found.labels[mine]] = True
@@ -147,6 +147,6 @@ def _looked_at(goal: Goal, found: Frontiers) -> BoolArray:
 
 
 def _goal_cells(mask: BoolArray, costmap: Costmap) -> BoolArray:
-    """The cells of the planning grid that hold a cell of ``mask`` on the frontier grid."""
+    """Mark the cells of the planning grid that hold a cell of ``mask`` on the frontier grid."""
     cells: BoolArray = pooled(mask, mask.shape[0] // costmap.frame.rows)
     return cells

@@ -1,6 +1,7 @@
 """The map after doors have opened: what it held of their leaves no longer holds."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from closedrooms.core.door import ClosedDoor, DoorSighting
@@ -26,6 +27,23 @@ class KeyframeMap(MapMaker, Protocol):
         """The scans that make the map, oldest first."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Opening:
+    """Doors that opened at one time, and what was seen since.
+
+    Attributes:
+        doors: The doors.
+        first: Number of keyframes before.
+        since: Evidence of the later ones.
+        drawn: Where these had their poses when they were counted in, by their index.
+    """
+
+    doors: tuple[ClosedDoor, ...]
+    first: int
+    since: EvidenceGrid
+    drawn: dict[int, Pose2] = field(default_factory=dict)
+
+
 class ReopenedMap:
     """A mapper with a map in which doorways hold only what was seen since their doors opened.
 
@@ -34,45 +52,58 @@ class ReopenedMap:
     known to have changed, older evidence is void.
     """
 
-    def __init__(self, mapper: KeyframeMap, doors: Sequence[ClosedDoor], config: MapperConfig | None = None) -> None:
+    def __init__(
+        self,
+        mapper: KeyframeMap,
+        doors: Sequence[ClosedDoor],
+        config: MapperConfig | None = None,
+        *,
+        waiting: Collection[str] = (),
+    ) -> None:
         """Begin when the doors open.
 
         Args:
             mapper: Makes the map; goes on doing so.
-            doors: Doors that open now, as detected.
+            doors: Doors that open, as detected.
             config: Weights of hits and passes, as in the mapper.
+            waiting: Ids of those that open later (:meth:`note_opened`); by then their doorways are unknown.
         """
         self._mapper = mapper
         self._doors = tuple(doors)
-        self._first = len(mapper.keyframes)
         self._config = config or MapperConfig(resolution=mapper.grid().frame.resolution)
-        self._since = EvidenceGrid(self._config)
-        self._drawn: dict[int, Pose2] = {}
+        self._openings: list[_Opening] = []
+        self.note_opened([door.id for door in doors if door.id not in waiting])
+
+    def note_opened(self, doors: Collection[str]) -> None:
+        """Note that doors open now, by their ids."""
+        opening = tuple(door for door in self._doors if door.id in doors)
+        if opening:
+            self._openings.append(_Opening(opening, len(self._mapper.keyframes), EvidenceGrid(self._config)))
 
     def process(self, scan: LaserScan, odometry: Pose2, sightings: Sequence[DoorSighting] = ()) -> Pose2:
         """Take in one scan; returns ``map_T_robot``."""
         return self._mapper.process(scan, odometry, sightings)
 
     def grid(self) -> OccupancyGrid:
-        """Return the map so far; leaves that no later scan has seen or passed are unknown."""
+        """Draw the map so far; leaves that no later scan has seen or passed are unknown."""
         grid = self._mapper.grid()
         if not self._doors:
             return grid
-        self._draw()
-        since = self._since.grid().on(grid.frame)
-        doorways = mark_doorways(self._doors, grid.frame, reach=LEAF_REACH)
         cells = grid.cells.copy()
-        cells[doorways & ~grid.free] = UNKNOWN
-        fresh = doorways & since.known
-        cells[fresh] = since.cells[fresh]
+        cells[mark_doorways(self._doors, grid.frame, reach=LEAF_REACH) & ~grid.free] = UNKNOWN
+        for opening in self._openings:
+            self._draw(opening)
+            since = opening.since.grid().on(grid.frame)
+            fresh = mark_doorways(opening.doors, grid.frame, reach=LEAF_REACH) & since.known
+            cells[fresh] = since.cells[fresh]
         return OccupancyGrid(grid.frame, cells)
 
-    def _draw(self) -> None:
-        """Count in the keyframes since the doors opened, where the mapper has them now."""
-        for keyframe in self._mapper.keyframes[self._first :]:
-            drawn = self._drawn.get(keyframe.index)
+    def _draw(self, opening: _Opening) -> None:
+        """Count in the keyframes since doors opened, where the mapper has them now."""
+        for keyframe in self._mapper.keyframes[opening.first :]:
+            drawn = opening.drawn.get(keyframe.index)
             if drawn != keyframe.pose:
                 if drawn is not None:
-                    self._since.add(keyframe.beams, drawn, sign=-1)
-                self._since.add(keyframe.beams, keyframe.pose)
-                self._drawn[keyframe.index] = keyframe.pose
+                    opening.since.add(keyframe.beams, drawn, sign=-1)
+                opening.since.add(keyframe.beams, keyframe.pose)
+                opening.drawn[keyframe.index] = keyframe.pose

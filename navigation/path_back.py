@@ -50,7 +50,7 @@ def path_back(
 
 
 def cells_near(place: Point, costmap: Costmap) -> BoolArray:
-    """Return the cells of the planning grid within ``GOAL_RADIUS`` of a place, map frame [m]."""
+    """List the cells of the planning grid within ``GOAL_RADIUS`` of a place, map frame [m]."""
     goals = np.zeros(costmap.frame.shape, dtype=np.bool_)
     row, col = (int(v) for v in costmap.frame.to_cells(np.array(place)))
     span = math.ceil(GOAL_RADIUS / costmap.frame.resolution)

@@ -9,7 +9,7 @@ from closedrooms.navigation.costmap import clearance_field
 
 
 def fits_along(grid: OccupancyGrid, points: FloatArray, config: RobotNavigation) -> bool:
-    """Tell whether the robot still fits at all points of a path.
+    """Check whether the robot still fits at all points of a path.
 
     Args:
         grid: The map as known now; what is unknown counts as free.

@@ -55,7 +55,7 @@ class Track:
 
     @classmethod
     def of(cls, points: FloatArray) -> "Track":
-        """Return the track over path corners, shape (n, 2) [m]."""
+        """Prepare path corners, shape (n, 2) [m], for following."""
         along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
         return cls(tuple(points[:, 0].tolist()), tuple(points[:, 1].tolist()), tuple(along.tolist()))
 
@@ -65,7 +65,7 @@ class Track:
         return self.along[-1]
 
     def at(self, distance: float) -> tuple[float, float]:
-        """Return the point at a distance along the path [m]."""
+        """Interpolate the point at a distance along the path [m]."""
         i = min(max(bisect.bisect_right(self.along, distance) - 1, 0), len(self.along) - 1)
         if i == len(self.along) - 1 or self.along[i + 1] <= self.along[i]:
             return (self.xs[i], self.ys[i])
@@ -73,7 +73,7 @@ class Track:
         return (self.xs[i] + t * (self.xs[i + 1] - self.xs[i]), self.ys[i] + t * (self.ys[i + 1] - self.ys[i]))
 
     def project(self, place: tuple[float, float], progress: float, window: float) -> float:
-        """Distance along the path of the place's nearest point, from ``progress`` to ``progress + window`` [m]."""
+        """Find how far along the path a place's nearest point lies, ``progress`` to ``progress + window`` [m]."""
         x, y = place
         best, best_distance = progress, math.inf
         for i in range(max(bisect.bisect_right(self.along, progress) - 1, 0), len(self.along) - 1):
@@ -93,7 +93,7 @@ class Track:
 
 
 def steer(track: Track, pose: Pose2, progress: float, config: RobotNavigation) -> Steering:
-    """Pure pursuit (Coulter, CMU-RI-TR-92-01) with turns in place where the path leaves the heading.
+    """Steer by pure pursuit (Coulter, CMU-RI-TR-92-01), turning in place where the path leaves the heading.
 
     Args:
         track: The path.
@@ -128,12 +128,12 @@ def turn_rate(error: float, config: RobotNavigation) -> float:
 
 
 def horizon(config: RobotNavigation) -> float:
-    """Tell how far off obstacles are looked at [m]."""
+    """Compute the distance up to which obstacles are looked at [m]."""
     return max(HORIZON, config.required_clearance + HORIZON_AHEAD)
 
 
 def near_points(scan: LaserScan, config: RobotNavigation) -> FloatArray:
-    """Tell what the scan shows close to the robot, robot frame, shape (n, 2) [m].
+    """Select what the scan shows close to the robot, robot frame, shape (n, 2) [m].
 
     A median over five beams leaves out lone outliers and halves the noise: the nearest of a hundred noisy points would
     otherwise always lie too close.
@@ -150,7 +150,7 @@ def near_points(scan: LaserScan, config: RobotNavigation) -> FloatArray:
 
 
 def free_distance(points_robot: FloatArray, v: float, w: float, config: RobotNavigation) -> float:
-    """Tell how far the robot can drive along the arc of a command before it touches a scan point [m].
+    """Compute how far the robot can drive along the arc of a command before it touches a scan point [m].
 
     Args:
         points_robot: Obstacles in the robot frame, shape (n, 2) [m].
@@ -181,7 +181,7 @@ def free_distance(points_robot: FloatArray, v: float, w: float, config: RobotNav
 
 
 def limit_speed(command: Steering, points_robot: FloatArray, config: RobotNavigation) -> Steering:
-    """Return the same arc, slow enough to stop before what the scan shows; turning in place is always possible."""
+    """Slow a command down on its arc to stop before what the scan shows; turning in place is always possible."""
     if command.v <= 0.0:
         return command
     distance = free_distance(points_robot, command.v, command.w, config)

@@ -36,7 +36,7 @@ class Path:
 
 
 def reachable_cells(costmap: Costmap, start: Point, config: RobotNavigation) -> BoolArray | None:
-    """Coarse cells that the robot can reach from ``start`` (map frame), ``None`` when it is enclosed."""
+    """Mark the coarse cells reachable from ``start`` (map frame); ``None`` when the robot is enclosed."""
     import cv2
 
     fits = traversable(costmap, config)
@@ -49,7 +49,7 @@ def reachable_cells(costmap: Costmap, start: Point, config: RobotNavigation) -> 
 
 
 def start_cell(costmap: Costmap, fits: BoolArray, start: Point) -> tuple[int, int] | None:
-    """Return the coarse cell nearest to ``start`` where the robot fits, ``None`` when there is none close by."""
+    """Find the coarse cell nearest to ``start`` where the robot fits, ``None`` when there is none close by."""
     reach = math.ceil(START_RADIUS / costmap.frame.resolution)
     row, col = (int(v) for v in costmap.frame.to_cells(np.array(start)))
     r0, c0 = max(row - reach, 0), max(col - reach, 0)
@@ -75,7 +75,7 @@ def plan_path(costmap: Costmap, start: Point, goals: BoolArray, config: RobotNav
     Returns:
         The path, or ``None`` when no goal can be reached.
     """
-    search = Search.begin(costmap, start, config)
+    search = PathSearch.begin(costmap, start, config)
     if search is None:
         return None
     search.run(goals)
@@ -83,7 +83,7 @@ def plan_path(costmap: Costmap, start: Point, goals: BoolArray, config: RobotNav
     return None if cell is None else search.path(cell)
 
 
-class Search:
+class PathSearch:
     """Dijkstra's algorithm over the planning grid from one start (scikit-image's minimum cost path).
 
     A metre costs 1 in the open and up to ``1 + clearance_weight`` beside an obstacle. The search begins in a window
@@ -97,8 +97,8 @@ class Search:
         self._search: Any = None
 
     @classmethod
-    def begin(cls, costmap: Costmap, start: Point, config: RobotNavigation) -> "Search | None":
-        """Return a search from ``start`` (map frame), ``None`` when the robot does not fit anywhere near."""
+    def begin(cls, costmap: Costmap, start: Point, config: RobotNavigation) -> "PathSearch | None":
+        """Begin a search at ``start`` (map frame), ``None`` when the robot does not fit anywhere near."""
         first = start_cell(costmap, traversable(costmap, config), start)
         return None if first is None else cls(costmap, start, first, config)
 
@@ -132,7 +132,7 @@ class Search:
         self._costs = costs * self._costmap.frame.resolution
 
     def nearest(self, goals: BoolArray) -> tuple[IntArray | None, float]:
-        """Return the cheapest of some coarse cells that the search has reached, and its cost [m]."""
+        """Choose the cheapest of some coarse cells that the search has reached; returns it and its cost [m]."""
         cells = nonzero_cells(goals[self._window])
         costs = self._costs[cells[:, 0], cells[:, 1]]
         if len(cells) == 0 or not np.isfinite(costs.min()):
@@ -141,7 +141,7 @@ class Search:
         return cells[best] + self._corner, float(costs[best])
 
     def path(self, cell: IntArray) -> Path:
-        """Return the path to a coarse cell that the search has reached."""
+        """Trace the path to a coarse cell that the search has reached."""
         row, col = (int(v) for v in cell - self._corner)
         cells = np.array(self._search.traceback((row, col)), dtype=np.int64) + self._corner
         points = np.vstack((np.array(self._start), self._costmap.anchors(cells)))
@@ -154,19 +154,19 @@ class Search:
 
 
 def nonzero_cells(mask: BoolArray) -> IntArray:
-    """Cells ``(row, col)`` of a mask in their order, shape (n, 2); much faster than NumPy's own on a sparse one."""
+    """List the cells ``(row, col)`` of a mask in order, shape (n, 2); on sparse ones much faster than NumPy's own."""
     return np.stack(np.divmod(np.flatnonzero(mask), mask.shape[1]), axis=-1)
 
 
 def cell_costs(clearance: Field, fits: BoolArray, config: RobotNavigation) -> FloatArray:
-    """Cost of a metre in each coarse cell; infinite where the robot does not fit."""
+    """Compute the cost of a metre in each coarse cell; infinite where the robot does not fit."""
     closeness = np.clip(1.0 - clearance / config.open_clearance, 0.0, 1.0)
     costs = np.where(fits, 1.0 + config.clearance_weight * closeness**2, np.inf)
     return costs.astype(np.float64)
 
 
 def straighten(points: FloatArray, costmap: Costmap, config: RobotNavigation) -> FloatArray:
-    """Fewer corners: a straight piece replaces a part of the path where it keeps as much clearance.
+    """Cut corners: a straight segment replaces a stretch of the path where it keeps as much clearance.
 
     Args:
         points: Path from cell to cell, shape (n, 2) [m].
@@ -197,7 +197,7 @@ def straighten(points: FloatArray, costmap: Costmap, config: RobotNavigation) ->
 def _is_clear(
     points: FloatArray, clearance: Field, start: int, end: int, costmap: Costmap, config: RobotNavigation
 ) -> bool:
-    """Whether the straight line between two path points is as clear as the part of the path it would replace."""
+    """Check whether a straight line between two path points is as clear as the stretch it would replace."""
     if end == start + 1:
         return True
     needed = min(float(clearance[start + 1 : end + 1].min()), config.open_clearance)

@@ -86,7 +86,7 @@ class PredictionMonitor:
 
 
 def difference(a: OccupancyGrid, b: OccupancyGrid) -> float:
-    """Area that is free on one of two maps only, without what is thinner than three cells [m2]."""
+    """Measure the area that is free on one of two maps only, without what is thinner than three cells [m2]."""
     frame = a.frame.covering(*b.frame.bounds)
     differs = (a.on(frame).free != b.on(frame).free).astype(np.uint8)
     opened: Any = cv2.morphologyEx(differs, cv2.MORPH_OPEN, np.ones((3, 3), dtype=np.uint8))
@@ -94,7 +94,7 @@ def difference(a: OccupancyGrid, b: OccupancyGrid) -> float:
 
 
 def changed_rooms(before: Sequence[Room], after: Sequence[Room]) -> tuple[str, ...]:
-    """Doors of the rooms of which an area of at least ``CHANGED`` came or went."""
+    """List the doors of rooms of which an area of at least ``CHANGED`` came or went."""
     old, new = ({door: room.polygon for room in rooms for door in room.doors} for rooms in (before, after))
     nothing = Polygon()
     changed = []

@@ -1,13 +1,16 @@
 """What is left of a coverage tour: the stops ahead, and a new tour over the rest of a revised map."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+import shapely
 
-from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.door import Point
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.shapes import Shape
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.graph.graph_builder import build_graph
 from closedrooms.coverage.tour.biconnected import measure_paths
@@ -59,8 +62,20 @@ class RemainingTour:
         self._last = int(self._stops[0])
         self.home = _point(self._places[self._last])
 
+    def put_first(self, shapes: Sequence[Shape]) -> None:
+        """Visit the stops within some shapes first, shape by shape, the others after them in their order."""
+        place = np.full(len(self._stops), len(shapes))
+        for number, shape in enumerate(shapes):
+            place[self.within(shape) & (place == len(shapes))] = number
+        self._stops = self._stops[np.argsort(place, kind="stable")]
+
+    def within(self, shape: Shape) -> BoolArray:
+        """Tell which of the stops still to visit lie within a shape, shape (n,)."""
+        left = self.left
+        return np.asarray(shapely.contains_xy(shape, left[:, 0], left[:, 1]), dtype=np.bool_)
+
     def pass_by(self, here: Point) -> bool:
-        """Strike off the stops close to ``here``; whether the next one was among them."""
+        """Strike off the stops close to ``here``; returns whether the next one was among them."""
         if not len(self._stops):
             return False
         past = np.hypot(*(self.left - np.array(here)).T) <= VISITED
@@ -79,7 +94,7 @@ class RemainingTour:
         return place
 
     def path(self) -> FloatArray:
-        """Return the path over all stops and home along the edges of the graph, shape (k, 2) [m]."""
+        """Join the paths over all stops and home along the edges of the graph, shape (k, 2) [m]."""
         at = {int(vertex): position for position, vertex in enumerate(self._metric.vertices)}
         stops = [at[int(vertex)] for vertex in (*self._stops, self._last)]
         path: FloatArray = self._places[self._metric.trace(stops)]
@@ -141,7 +156,7 @@ def open_tour(distances: FloatArray, config: CoverageConfig) -> list[int]:
 
 
 def _was_near(vertex: FloatArray, done: FloatArray, distance: float, grid: OccupancyGrid) -> bool:
-    """Whether some of the places ``done``, shape (n, 2) [m], lies within a distance [m] of a vertex, in free sight."""
+    """Check whether some of the places ``done``, shape (n, 2) [m], lies near a vertex [m], in free sight."""
     close = done[np.hypot(*(done - vertex).T) <= distance]
     if len(close) == 0:
         return False

@@ -69,7 +69,7 @@ class RevisedPrediction:
         return OccupancyGrid(completed.frame, np.where(doorways, FREE, completed.cells))
 
     def is_wrong(self, grid: OccupancyGrid) -> bool:
-        """Tell whether the map as known now differs from the prediction by more than a detail."""
+        """Check whether the map as known now differs from the prediction by more than a detail."""
         return difference(self.now.grid, self.completed(grid)) >= SURPRISE
 
     def compare(self, grid: OccupancyGrid, stamp: float, *, was_at: Callable[[str], bool]) -> tuple[str, ...] | None:
@@ -89,7 +89,7 @@ class RevisedPrediction:
         return self._monitor.find_news(self.now, grid, self.completed(grid), stamp, was_at=was_at)
 
     def revise(self, grid: OccupancyGrid, looked_into: tuple[str, ...]) -> bool:
-        """Predict anew what the map contradicts; whether the free space has changed by more than a detail.
+        """Predict anew what the map contradicts; returns whether the free space has changed by more than a detail.
 
         Args:
             grid: The map as known now.

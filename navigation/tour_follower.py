@@ -10,6 +10,7 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
+from closedrooms.core.room import Room
 from closedrooms.core.scan import LaserScan
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
@@ -50,11 +51,13 @@ class TourPlan:
         prediction: The completed map that the tour was planned on.
         tour: A closed tour. It begins and ends at the vertex nearest to the robot.
         doors: The doors of the predicted rooms, open by the time they are reached.
+        unsure: Rooms with a confidence below this (0..1) come first, the least sure one before the others.
     """
 
     prediction: Prediction
     tour: CoverageTour
     doors: tuple[ClosedDoor, ...]
+    unsure: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,6 +102,7 @@ class TourFollower:
         self._doors = plan.doors
         self._coverage = coverage
         self._prediction = RevisedPrediction(plan.prediction, plan.doors, predictor)
+        self._unsure = plan.unsure
         self._stops = RemainingTour(plan.tour)
         self._driver = Driver(config)
         self._map = NavigationMap(config)
@@ -115,16 +119,29 @@ class TourFollower:
         """The prediction as revised so far."""
         return self._prediction.now
 
+    def doors_first(self) -> tuple[str, ...]:
+        """Doors of the unsure rooms with stops still to visit, the least sure one first."""
+        return tuple(door for room in self._unsure_rooms() for door in room.doors)
+
+    def _unsure_rooms(self) -> list[Room]:
+        """Rooms that nobody is sure of and that still hold stops, the least sure one first."""
+        asked = [
+            (room.confidence, room.doors, room)
+            for room in self.prediction.rooms
+            if room.confidence is not None and room.confidence < self._unsure and self._stops.within(room.polygon).any()
+        ]
+        return [room for _, _, room in sorted(asked, key=lambda entry: entry[:2])]
+
     def is_waiting(self, stamp: float) -> bool:
-        """Tell whether the robot waits for its doors at ``stamp`` [s]."""
+        """Check whether the robot waits for its doors at ``stamp`` [s]."""
         return self._started_at is None or stamp - self._started_at < DOOR_WAIT
 
     def path_left(self) -> FloatArray:
-        """Tell what is left to drive: the path ahead, then along the graph's edges, shape (k, 2) [m]."""
+        """Join what is left to drive: the path ahead, then along the graph's edges, shape (k, 2) [m]."""
         return np.vstack((self._driver.ahead(math.inf), self._stops.path()))
 
     def outcome(self) -> TourOutcome:
-        """Tell what became of the tour so far."""
+        """Report what became of the tour so far."""
         unreachable = np.array(self._unreachable).reshape(-1, 2)
         return TourOutcome(self.prediction, tuple(self.revisions), self._stops.visited, unreachable, self._replans)
 
@@ -135,14 +152,7 @@ class TourFollower:
         grid: Callable[[], OccupancyGrid],
         bumps: Sequence[float] = (),
     ) -> tuple[float, float]:
-        """Speed [m/s] and turn rate [rad/s] for now; (0, 0) once ``status`` is set.
-
-        Args:
-            pose: ``map_T_robot`` as estimated.
-            scan: What the robot sees now.
-            grid: Returns the map as estimated; only called when something is decided on it.
-            bumps: Directions from which something presses, robot frame [rad].
-        """
+        """Decide on speed [m/s] and turn rate [rad/s] for now; see ``Decider.command``. It waits for doors first."""
         now, driver = scan.stamp, self._driver
         self._started_at = now if self._started_at is None else self._started_at
         if self.status is not None or self.is_waiting(now):
@@ -175,7 +185,7 @@ class TourFollower:
             self._goal, self._arrived = None, True
 
     def _arrive(self) -> None:
-        """At the end of a path: as near to the vertex as one gets."""
+        """Count a vertex as visited at the end of a path: it is as near as one gets."""
         if self._going_back:
             self._going_back = False
         elif len(self._stops):
@@ -195,6 +205,11 @@ class TourFollower:
         goals[cells[:, 0], cells[:, 1]] = True
         path = plan_path(costmap, (pose.x, pose.y), goals, self.config)
         self._stops.begin_at(np.array([pose.x, pose.y]) if path is None else path.points[-1])
+        self._put_unsure_first()
+
+    def _put_unsure_first(self) -> None:
+        """Change the order of the tour, where that is asked for."""
+        self._stops.put_first([room.polygon for room in self._unsure_rooms()])
 
     def _next(self, pose: Pose2, grid: OccupancyGrid, now: float) -> bool:
         """Set out for the next vertex, or for home; vertices that cannot be reached are given up."""
@@ -253,7 +268,7 @@ class TourFollower:
                 self._goal = None
 
     def _was_at(self, door_id: str) -> bool:
-        """Whether the robot has come close to a door."""
+        """Check whether the robot has come close to a door."""
         places = [door.midpoint for door in self._doors if door.id == door_id]
         return any(math.dist(place, at) <= AT_DOOR for place in places for at in self._driven)
 
@@ -275,6 +290,7 @@ class TourFollower:
         done = np.array(self._driven + self._unreachable).reshape(-1, 2)
         if not self._stops.solve_again(completed, here, done, self._coverage, reach=reach):
             return False
+        self._put_unsure_first()
         self._replans += 1
         self._goal, self._attempts, self._going_back = None, 0, False
         return True

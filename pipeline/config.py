@@ -7,12 +7,16 @@ from typing import Annotated, ClassVar, Literal
 import tyro
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.runtime.options import check_least
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.predictor.config import MethodConfig
 from closedrooms.predictor.methods import DEFAULT_METHOD, find_method
 from closedrooms.sim.config import Body, SimConfig, lidar_preset, noise_level
+
+# Draws of what the rooms may be: the interval does not get better long before.
+MOST_COMPLETIONS = 10_000
 
 NoiseName = Literal["none", "low", "medium", "high"]
 LidarName = Literal["default", "hokuyo-utm-30lx", "hokuyo-urg-04lx", "sick-lms111", "rplidar-a2", "robotis-lds-01"]
@@ -54,8 +58,15 @@ class RunConfig:
     method: str = DEFAULT_METHOD
     """How rooms are predicted: ``paper`` is what the authors describe and ran, ``best`` as good as we can."""
 
+    completions: int = 0
+    """Tell the cost of coverage as a distribution: from so many completions, drawn from what the rooms may be."""
+
     drive: bool = False
     """After the prediction, open the doors and drive the tour that was planned on the predicted map."""
+
+    unsure_first: float = 0.0
+    """With ``--drive``, open and visit first the rooms of a confidence below this (0 to 1), one after the other, the
+    least sure one first; the other doors open when these have been seen."""
 
     record: bool = True
     """Write the recording ``run.rrd`` for the rerun viewer."""
@@ -104,6 +115,11 @@ class RunConfig:
         for name, seed in (("--seed", self.seed), *(("--seeds", seed) for seed in self.seeds)):
             if seed < 0:
                 raise InvalidInputError(f"{name} {seed}", expected="a whole number of at least 0")
+        check_completions(self.completions)
+        if not 0.0 <= self.unsure_first <= 1.0:
+            raise InvalidInputError(f"--unsure-first {self.unsure_first}", expected="a confidence, 0 to 1")
+        if self.unsure_first and not self.drive:
+            raise InvalidInputError("--unsure-first without a drive", expected="--drive")
         if (self.live or self.web) and not self.record:
             raise InvalidInputError("--live without a recording", expected="no --no-record")
         if self.sim is None:
@@ -148,8 +164,18 @@ class PredictConfig:
             raise InvalidInputError(f"min_confidence {self.min_confidence}", expected="0 to 1")
 
 
+def check_completions(count: int) -> None:
+    """Check how many completions are drawn.
+
+    Raises:
+        InvalidInputError: Fewer than none, or more than :data:`MOST_COMPLETIONS`.
+    """
+    if not 0 <= count <= MOST_COMPLETIONS:
+        raise InvalidInputError(f"--completions {count}", expected=f"0 to {MOST_COMPLETIONS}")
+
+
 def named_sim(noise: str = "medium", lidar: str = "default", body: Body = "kinematic") -> SimConfig:
-    """Settings of the simulation with the numbers that a level of noise and a lidar stand for.
+    """Set the simulation's numbers that a level of noise and a lidar stand for.
 
     Raises:
         InvalidInputError: No such level or lidar.
@@ -181,6 +207,16 @@ class CoverConfig:
     """Also write the tour for ROS 2: ``path`` as a nav_msgs/Path (``path.yaml``), a path around furniture that can be
     driven; ``nav2`` as that and as the waypoints that nav2's panel loads (``waypoints.yaml``)."""
 
+    completions: int = 0
+    """Predict the rooms behind ``--doors`` and tell the cost of covering them too, as a distribution: from so many
+    completions of the map, drawn from what the rooms may be."""
+
+    method: str = DEFAULT_METHOD
+    """How rooms are predicted for ``--completions``."""
+
+    seed: int = 0
+    """Of the draws of ``--completions``."""
+
     robot_radius: float | None = None
     """Radius of the robot [m] for which every place and path has room; 0.20 m where not given (the same as
     ``--coverage.graph.robot-radius``)."""
@@ -189,6 +225,14 @@ class CoverConfig:
     """Graph and tour."""
 
     def __post_init__(self) -> None:
+        check_completions(self.completions)
+        check_least(self, seed=0)
+        if not find_method(self.method).disjoint:
+            raise InvalidInputError(
+                f"rooms of {self.method} overlap", expected="a method that a tour can be planned on"
+            )
+        if self.completions and self.doors is None:
+            raise InvalidInputError("--completions without closed doors", expected="--doors DOORS.geojson")
         if self.robot_radius is not None:
             graph = replace(self.coverage.graph, robot_radius=self.robot_radius)
             object.__setattr__(self, "coverage", replace(self.coverage, graph=graph))

@@ -1,15 +1,19 @@
 """``closedrooms cover``: a coverage tour on anybody's map."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import write_doors, write_features
 from closedrooms.core.files.outgoing import check_output_folder, output_folder
 from closedrooms.core.files.rosmap import RosMap, read_ros_map, write_map
+from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.report import Report
+from closedrooms.coverage.cost_spread import CostSpread, spread_cost
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.coverage.tour.drivable_path import find_drivable_paths
 from closedrooms.coverage.tour.ros_tour import write_path_message, write_waypoints
@@ -19,7 +23,9 @@ from closedrooms.pipeline.config import CoverConfig
 from closedrooms.pipeline.given_doors import given_doors
 from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
+from closedrooms.pipeline.reporting.report import spread_rows
 from closedrooms.pipeline.reporting.stopwatch import Stopwatch
+from closedrooms.predictor.methods import predict
 
 
 def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Report:
@@ -54,6 +60,7 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Repor
             tour = plan_coverage(grid, doors, config.coverage, start=start, map_name="closed")
         except InvalidInputError as error:
             raise InvalidInputError(str(error), where=config.map) from error
+        spread = _spread(grid, doors, config, start) if config.completions else None
     missed = {door.id: "no free space to reach it from" for door in doors if door.id not in tour.graph.door_vertices}
     missed |= dict.fromkeys(tour.unreached_doors, "no free space to reach it from")
     with output_folder(config.out, manifest) as folder:
@@ -77,20 +84,43 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Repor
                 "not_visited": missed,
             }
         }
+        if spread is not None:
+            manifest["metrics"]["completions"] = spread.figures()
         manifest["notes"] = list(tour.notes)
         manifest["remarks"] = [remark.as_json() for remark in remarks]
         manifest["durations"] = watch.seconds()
     return Report(
         folder=config.out,
         title=f"{config.map.name}: coverage tour",
-        rows=_rows(tour, missed, manifest["durations"]["cover"]),
+        rows=_rows(tour, missed, manifest["metrics"], manifest["durations"]["cover"]),
         failures=missed,
         remarks=remarks,
         figures=manifest["metrics"],
     )
 
 
-def _rows(tour: CoverageTour, missed: dict[str, str], seconds: float) -> list[tuple[str, str]]:
+def _spread(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: CoverConfig, start: Point | None) -> CostSpread:
+    """What covering the map with the rooms behind its doors may cost."""
+    try:
+        prediction = predict(grid, doors, config.method)
+        tour = plan_coverage(prediction.grid, (), config.coverage, start=start, map_name="predicted")
+    except InvalidInputError as error:
+        raise InvalidInputError(str(error), where=config.map) from error
+    return spread_cost(
+        tour.length,
+        grid.frame,
+        doors,
+        prediction.rooms,
+        prediction.probability,
+        config.coverage,
+        count=config.completions,
+        seed=config.seed,
+    )
+
+
+def _rows(
+    tour: CoverageTour, missed: dict[str, str], metrics: Mapping[str, Any], seconds: float
+) -> list[tuple[str, str]]:
     """The table for people."""
     return [
         ("figure", "value"),
@@ -98,6 +128,7 @@ def _rows(tour: CoverageTour, missed: dict[str, str], seconds: float) -> list[tu
         ("length", f"{tour.length:.1f} m"),
         ("lower bound", f"{tour.lower_bound:.1f} m (gap {100 * tour.gap:.1f} %)"),
         ("status", tour.status),
+        *spread_rows(metrics.get("completions")),
         *(("note", note) for note in tour.notes),
         *((f"not visited: {door}", reason) for door, reason in missed.items()),
         ("time", f"{seconds:.2f} s"),

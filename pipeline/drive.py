@@ -1,5 +1,6 @@
 """Driving the coverage tour of the predicted map with the doors open (beyond section 5)."""
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -10,9 +11,9 @@ from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.control_loop import LoopLog, run_loop
+from closedrooms.navigation.control_loop import LoopLog, Step, run_loop
 from closedrooms.navigation.opened_doors import ReopenedMap
-from closedrooms.navigation.tour_follower import TourFollower, TourOutcome, TourPlan
+from closedrooms.navigation.tour_follower import DOOR_WAIT, TourFollower, TourOutcome, TourPlan
 from closedrooms.pipeline.bounds import Outline
 from closedrooms.pipeline.reporting.live_recording import DriveRecording
 from closedrooms.pipeline.reporting.run_log import RunLog
@@ -39,6 +40,38 @@ class DriveResult:
     grid: OccupancyGrid
 
 
+class Porter:
+    """Opens the closed doors of a building for a robot that drives a tour.
+
+    Doors of rooms that are to be seen first open one after the other, each when the robot is done with the one before;
+    when none of them is left, all others do.
+    """
+
+    def __init__(
+        self, log: RunLog, reopened: ReopenedMap, follower: TourFollower, closed: Collection[str], recorder: "Recorder"
+    ) -> None:
+        self._log, self._reopened, self._follower, self._recorder = log, reopened, follower, recorder
+        self._closed = sorted(closed)
+        self._opened_at = -math.inf
+
+    def open_next(self, stamp: float) -> None:
+        """Open what is to be open at ``stamp`` [s]."""
+        first = self._follower.doors_first() if self._closed else ()
+        doors = [door for door in self._closed if not first or door == first[0]]
+        if not doors:
+            return
+        for door in doors:
+            self._log.sim.open_door(door)
+        self._reopened.note_opened(doors)
+        self._closed = [door for door in self._closed if door not in doors]
+        self._opened_at = stamp
+        self._recorder.note(f"opening: {', '.join(doors)}", stamp)
+
+    def is_opening(self, stamp: float) -> bool:
+        """Tell whether doors move at ``stamp`` [s]."""
+        return stamp - self._opened_at < DOOR_WAIT
+
+
 @dataclass(frozen=True, kw_only=True)
 class DriveSettings:
     """What a drive goes by: the configurations of the stages that go on while it lasts."""
@@ -62,14 +95,20 @@ def drive_tour(
         settings: Of every stage.
         recorder: Told of every scan and revision.
     """
-    for door in sorted(closed):
-        log.sim.open_door(door)
-    reopened = ReopenedMap(mapper, [door for door in plan.doors if door.id in closed], settings.mapper)
+    doors = [door for door in plan.doors if door.id in closed]
+    reopened = ReopenedMap(mapper, doors, settings.mapper, waiting=closed)
     follower = TourFollower(plan, settings.navigation, settings.predictor, settings.coverage)
-    outline = Outline(log.sim.plan)
+    outline, porter = Outline(log.sim.plan), Porter(log, reopened, follower, closed, recorder)
+    porter.open_next(log.sim.time)
+    record = DriveRecording(recorder, log, reopened, follower, porter.is_opening)
+
+    def on_step(step: Step) -> None:
+        porter.open_next(step.stamp)
+        record(step)
+
     driven = run_loop(
         log, reopened, follower, settings.navigation,
-        on_step=DriveRecording(recorder, log, reopened, follower),
+        on_step=on_step,
         stop=lambda _: outline.check(log.sim.world_T_robot),
     )  # fmt: skip
     lengths = f"{plan.tour.length:.1f} m planned, {driven.distance:.1f} m driven"

@@ -23,8 +23,8 @@ from closedrooms.predictor.prediction import Prediction
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Outcome:
-    """What came of one prediction.
+class EditedPrediction:
+    """What came of one prediction of the page.
 
     Attributes:
         prediction: In the frame of the grid; ``None`` where the whole failed.
@@ -44,7 +44,7 @@ class Outcome:
         return () if self.prediction is None else self.prediction.rooms
 
 
-def predict_rooms(read: RosMap, doors: Sequence[ClosedDoor], method: str, settings: Any) -> Outcome:
+def predict_rooms(read: RosMap, doors: Sequence[ClosedDoor], method: str, settings: Any) -> EditedPrediction:
     """Predict for people who watch: whatever goes wrong is said and stops nothing.
 
     Args:
@@ -57,12 +57,12 @@ def predict_rooms(read: RosMap, doors: Sequence[ClosedDoor], method: str, settin
     try:
         prediction = predict(read.grid, read.doors_on_grid(doors), method, settings)
     except Exception as error:  # a method may be anybody's
-        return Outcome(None, trouble=reason(error))
-    return Outcome(prediction, dict(prediction.failures), seconds=time.perf_counter() - began)
+        return EditedPrediction(None, trouble=reason(error))
+    return EditedPrediction(prediction, dict(prediction.failures), seconds=time.perf_counter() - began)
 
 
-def plan_tour(prediction: Prediction, method: str, coverage: CoverageConfig) -> CoverageTour | str:
-    """Plan the tour over a completed map, or say in one line why there is none."""
+def plan_edited_tour(prediction: Prediction, method: str, coverage: CoverageConfig) -> CoverageTour | str:
+    """Plan the tour over a map that the page completed, or say in one line why there is none."""
     if not METHODS[method].disjoint:
         return f"no tour: the rooms of the method {method} overlap"
     try:
@@ -87,7 +87,7 @@ def save_rooms(config: PredictConfig, doors: Sequence[ClosedDoor], coverage: Cov
     """
 
     def write_tour(folder: Path, read: RosMap, prediction: Prediction) -> dict[str, Any]:
-        tour = plan_tour(prediction, config.method, coverage)
+        tour = plan_edited_tour(prediction, config.method, coverage)
         if isinstance(tour, str):
             return {"notes": [tour]}
         features = [(read.on_map(shape), about) for shape, about in make_tour_features(tour, "predicted")]

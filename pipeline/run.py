@@ -18,6 +18,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
 from closedrooms.core.report import Report
 from closedrooms.coverage.config import CoverageConfig
+from closedrooms.coverage.cost_spread import CostSpread, spread_cost
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.coverage.tour.tour_features import make_tour_features
 from closedrooms.coverage.tour.tour_planner import plan_coverage
@@ -65,6 +66,7 @@ class Finding:
         tours: By the map that they were planned on: ``closed``, ``predicted``, ``truth``.
         missing: Why there is no tour, by the same names.
         notes: What their planning says.
+        spread: What covering the building may cost, on demand.
         driven: How the predicted tour was driven, on demand.
     """
 
@@ -74,6 +76,7 @@ class Finding:
     tours: dict[str, CoverageTour]
     missing: dict[str, str]
     notes: list[str]
+    spread: CostSpread | None = None
     driven: DriveResult | None = None
 
 
@@ -194,12 +197,13 @@ def _find_out(
         progress.stage("cover")
         tours, missing, notes = plan_tours(survey, prediction, truth.grid, config)
         recorder.tours(tours)
-    found = Finding(survey, prediction, truth, tours, missing, notes)
+        spread = _spread(survey, prediction, tours, config)
+    found = Finding(survey, prediction, truth, tours, missing, notes, spread)
     if not config.drive or "predicted" not in tours:
         return found
     with watch.stage("drive"):
         progress.stage("drive")
-        tour = TourPlan(prediction, tours["predicted"], tuple(survey.doors))
+        tour = TourPlan(prediction, tours["predicted"], tuple(survey.doors), config.unsure_first)
         settings = DriveSettings(
             navigation=config.navigation.for_robot(config.sim.robot),
             mapper=config.mapper,
@@ -210,7 +214,7 @@ def _find_out(
 
 
 def choose_closed(plan: FloorPlan, config: RunConfig) -> tuple[str, ...]:
-    """Return the doors to close: as named, or those of rooms drawn by the seed.
+    """Choose the doors to close: as named, or those of rooms drawn by the seed.
 
     Raises:
         InvalidInputError: Unknown doors, or more rooms than can be closed.
@@ -250,6 +254,24 @@ def plan_tours(
     return tours, missing, notes
 
 
+def _spread(
+    survey: Survey, prediction: Prediction, tours: Mapping[str, CoverageTour], config: RunConfig
+) -> CostSpread | None:
+    """What covering the building may cost, where asked for and where there is a tour on the predicted map."""
+    if not config.completions or "predicted" not in tours:
+        return None
+    return spread_cost(
+        tours["predicted"].length,
+        survey.grid.frame,
+        survey.doors,
+        prediction.rooms,
+        prediction.probability,
+        _coverage(config),
+        count=config.completions,
+        seed=config.seed,
+    )
+
+
 def _coverage(config: RunConfig) -> CoverageConfig:
     """Settings of the tours, for the robot that is simulated."""
     return replace(config.coverage, graph=replace(config.coverage.graph, robot_radius=config.sim.robot.radius))
@@ -259,6 +281,9 @@ def _figures(plan: FloorPlan, closed: Sequence[str], map_T_world: Pose2, found: 
     """What ``run.json`` says of a finding."""
     survey, log, prediction = found.survey, found.survey.exploration, found.prediction
     metrics = run_metrics(plan, closed, map_T_world, survey, prediction, found.truth, found.tours)
+    if found.spread is not None:
+        truth = found.tours.get("truth")
+        metrics["completions"] = found.spread.figures(None if truth is None else truth.length)
     if found.driven is not None:
         metrics["drive"] = drive_metrics(found.driven, plan, map_T_world, found.truth, found.tours.get("truth"))
     seen = [door.id for door in survey.doors]

@@ -106,7 +106,7 @@ def survey_building(
 
 
 def true_building(plan: FloorPlan, closed: Sequence[str], frame: GridFrame, map_T_world: Pose2) -> Truth:
-    """Return the truth on ``frame``, grown so that it holds the whole building.
+    """Rasterise the truth on ``frame``, grown so that it holds the whole building.
 
     Args:
         plan: The building.

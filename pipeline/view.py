@@ -82,7 +82,7 @@ def find_recording(folder: Path) -> Path:
 
 
 def find_viewer() -> str:
-    """Return the program ``rerun`` of this environment.
+    """Find the program ``rerun`` of this environment.
 
     Raises:
         ViewerError: It is not there.

@@ -14,7 +14,7 @@ MAP_RESOLUTION = 0.05
 
 
 def list_worlds(*, verbose: bool = False) -> list[str]:
-    """Return one line a bundled world, its name first; with ``verbose`` more lines on each."""
+    """List the bundled worlds, a line each, the name first; with ``verbose`` more lines on each."""
     import shapely
 
     from closedrooms.worlds.closing import closable_rooms
@@ -50,7 +50,7 @@ def _details(plan: FloorPlan) -> list[str]:
 
 
 def describe_world(plan: FloorPlan) -> list[str]:
-    """Return a plan in words: its rooms with area and doors, its doors with place, width and rooms."""
+    """Describe a plan in words: its rooms with area and doors, its doors with place, width and rooms."""
     from closedrooms.worlds.closing import closable_rooms
 
     closable = closable_rooms(plan)
@@ -126,7 +126,7 @@ def convert_world(src: str, dst: str | Path, to: str, *, level: str | None = Non
 
 
 def beside(path: Path, to: str) -> list[Path]:
-    """Return the files that a format of several files writes; :data:`exporters` are given the first one's name."""
+    """List the files that a format of several files writes; :data:`exporters` are given the first one's name."""
     match to:
         case "rosmap":
             stem = map_stem(path)
@@ -139,12 +139,12 @@ def beside(path: Path, to: str) -> list[Path]:
 
 
 def map_stem(path: Path) -> Path:
-    """Return the name that the files of a ROS map share."""
+    """Strip the ending from the path of a ROS map: its two files share the rest."""
     return path.with_suffix("") if path.suffix in {".yaml", ".yml", ".png", ".pgm"} else path
 
 
 def exporters() -> dict[str, Callable[[Path, FloorPlan], None]]:
-    """Writers of floor plans by the name of their format."""
+    """List the writers of floor plans by the name of their format."""
     from closedrooms.worlds.formats.mesh import write_obj, write_urdf
     from closedrooms.worlds.formats.native import write_plan
     from closedrooms.worlds.formats.sdf import write_sdf

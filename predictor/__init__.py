@@ -2,8 +2,8 @@
 
 ``methods`` is the registry: every method by name, also those of other packages (CONTRIBUTING.md says how to add one);
 ``config`` holds their settings. ``paper/``, ``best/`` and ``baselines`` are the methods, ``structure/`` what a grid
-shows to all of them. ``prediction`` is the result; ``disjoint_rooms`` and ``inpainting`` finish it, ``revision`` goes
-on with it as knowledge arrives.
+shows to all of them. ``prediction`` is the result; ``disjoint_rooms`` and ``inpainting`` finish it, ``confidence/``
+says how sure it is, ``revision`` goes on with it as knowledge arrives.
 """
 
 from typing import TYPE_CHECKING

@@ -13,7 +13,7 @@ from closedrooms.core.room import Room
 from closedrooms.core.shapes import Shape
 from closedrooms.predictor.config import FacesConfig
 from closedrooms.predictor.inpainting import complete_map
-from closedrooms.predictor.paper.arrangement import joined
+from closedrooms.predictor.paper.arrangement import unite_faces
 from closedrooms.predictor.paper.initial_layouts import Start, Started, start_rooms
 from closedrooms.predictor.prediction import Prediction
 
@@ -26,7 +26,7 @@ STRETCH = 64
 def line_of_sight(
     grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesConfig, *, started: Started | None = None
 ) -> Prediction:
-    """Tell what can be seen from each door through unknown cells, up to known ones or the bounding box of the map.
+    """Predict what can be seen from each door through unknown cells, up to known ones or the map's bounding box.
 
     Args:
         grid: The map.
@@ -43,7 +43,7 @@ def line_of_sight(
 def geometric(
     grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesConfig, *, started: Started | None = None
 ) -> Prediction:
-    """Return all unknown faces in line of sight of each door, until faces on the border are met.
+    """Predict all unknown faces in line of sight of each door, until faces on the border are met.
 
     A face is in sight when its centre is: the straight line to the door crosses unknown faces only that are not on
     the border.
@@ -153,7 +153,7 @@ def _faces_in_sight(start: Start, room: int) -> Shape:
             if _in_sight(crossed, eye, arrangement.faces[other]):
                 seen.append(other)
                 queue.append(other)
-    return joined([arrangement.faces[face] for face in sorted(seen)])
+    return unite_faces([arrangement.faces[face] for face in sorted(seen)])
 
 
 def _in_sight(inner: shapely.STRtree, eye: FloatArray, face: Polygon) -> bool:

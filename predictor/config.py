@@ -220,9 +220,6 @@ class BestConfig(MethodConfig):
     shortlist: int = 100
     """Rectangles a door keeps for the joint choice: 60 lose 0.014 of the best that was proposed (``choose``)."""
 
-    symmetry: bool = True
-    """Look for buildings of two equal halves, of which one may show what is hidden in the other."""
-
     keep_trace: bool = False
     """Keep each door's best rectangle by itself beside the rooms chosen together."""
 

@@ -70,7 +70,7 @@ class Method:
         return judge(self.name, grid, doors, self.predict(grid, doors, config, **shared))
 
     def checked(self, config: Any | None) -> Any:
-        """Settings for this method: its defaults for ``None``.
+        """Check settings for this method: its defaults for ``None``.
 
         Raises:
             InvalidInputError: Settings of another method.
@@ -146,7 +146,7 @@ METHODS: Mapping[str, Method] = _Methods()
 
 
 def find_method(name: str) -> Method:
-    """Return the method of a name.
+    """Look up a method by its name.
 
     Raises:
         InvalidInputError: There is none; the message lists all. A package that brings it cannot be loaded.

@@ -86,14 +86,12 @@ class WeighedTrace:
     Attributes:
         faces: Wall faces ``x0, y0, x1, y1``, shape (n, 4).
         directions: Where each of them faces [rad], shape (n,).
-        axes: Axes about which the building is symmetric, ``x0, y0, x1, y1``, shape (k, 4).
         rooms: The candidates, room by room.
         levels: Each door's best candidate by itself, then the rooms chosen together.
     """
 
     faces: FloatArray
     directions: FloatArray
-    axes: FloatArray
     rooms: tuple[WeighedRoom, ...]
     levels: tuple[Level, ...]
 
@@ -123,7 +121,7 @@ class Prediction:
 
 
 def free_probability(prediction: Prediction, grid: OccupancyGrid) -> OccupancyGrid:
-    """Return the probability of each cell to be free on the frame of the completed map, in percent.
+    """Compute each cell's probability to be free on the frame of the completed map, in percent.
 
     Args:
         prediction: Of the map.

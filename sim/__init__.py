@@ -1,6 +1,9 @@
 """The simulated world and its robot: ``simulation`` takes commands and gives observations.
 
-``physics_world`` is PyBullet behind an interface, ``building`` puts a plan into it, ``door_leaves`` move.
-``differential_drive`` and ``contacts`` move the robot (its radius and speeds are ``core.robot``), ``lidar`` and
-``odometry`` are what it senses, ``config`` its noise.
+- The building: ``physics_world`` is PyBullet behind an interface, ``building`` puts a plan into it; ``doors`` move
+  their ``door_leaves``.
+- The robot, whose radius and speeds are ``core.robot``: a disc (``differential_drive``, ``contacts``) or a body on
+  wheels (``wheeled_robot``; ``robot_model`` is ours, ``robot_urdf`` a user's own).
+- What it senses: ``lidar`` and ``odometry``; their noise is in ``config``.
+- What disturbs it: ``glass``, ``bystanders`` (people and things that move), ``faults``.
 """

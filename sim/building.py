@@ -58,7 +58,7 @@ class Building:
         self.door_of_body = {door.body: door for door in self.doors.values()}
 
     def open_door(self, door_id: str) -> None:
-        """Let a door open from now on; it takes its time, and waits for a robot in its way.
+        """Let a door open from now on; it takes its time, and waits for a robot that blocks it.
 
         Raises:
             InvalidInputError: No such door.
@@ -71,7 +71,7 @@ class Building:
 
     @property
     def moving(self) -> bool:
-        """Whether a door is on its way."""
+        """Whether a door is opening."""
         return bool(self._opening)
 
     def advance(self, duration: float, x: float, y: float, radius: float) -> None:
@@ -93,7 +93,7 @@ class Building:
 
 
 def building_solids(plan: FloorPlan) -> Polygon | shapely.MultiPolygon:
-    """Walls, and what shuts the doors and openings to the outside, building frame [m]."""
+    """Unite the walls with what shuts the doors and openings to the outside, building frame [m]."""
     passages: tuple[PlanDoor | Opening, ...] = (*plan.doors, *plan.openings)
     outer = [door_gap(plan, passage) for passage in passages if None in passage.rooms]
     walls = wall_area(plan)
@@ -109,6 +109,6 @@ def _check_doors(plan: FloorPlan, wanted: Collection[str], inner: Collection[str
 
 
 def gap_from(solids: Polygon | shapely.MultiPolygon, x: float, y: float) -> float:
-    """Distance of a place from the solids [m], 0 inside them."""
+    """Compute the distance of a place from the solids [m], 0 inside them."""
     distance = solids.distance(shapely.Point(x, y))
     return math.inf if solids.is_empty else float(distance)

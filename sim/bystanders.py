@@ -2,7 +2,6 @@
 
 import heapq
 import math
-from typing import Protocol
 
 import cv2
 import numpy as np
@@ -21,23 +20,12 @@ PERSON_RADIUS, PERSON_HEIGHT, WALK = 0.2, 1.7, 1.0
 CORNERS = 12
 # They keep so far from the robot [m], wait so long for it at most [s], and rest between two walks so long [s].
 POLITE, PATIENCE, REST = 0.35, 3.0, (1.0, 8.0)
-# Grid on which they find their way, and room that they keep to walls [m].
+# Grid on which they plan their paths, and room that they keep to walls [m].
 CELL, ELBOWS = 0.25, 0.3
 # A box that somebody moves: its side [m], the mean time between two moves [s], how far the robot is then at least [m].
 BOX, MOVED_EVERY, AWAY = 0.4, 60.0, 4.0
 # Places tried before a thing stays where it is.
 TRIES = 40
-
-
-class Mover(Protocol):
-    """Something that moves by itself."""
-
-    @property
-    def outline(self) -> Polygon:
-        """Where it stands, building frame [m]."""
-
-    def advance(self, duration: float, x: float, y: float, radius: float) -> None:
-        """Move on for ``duration`` [s] beside a robot of ``radius`` [m] at ``(x, y)`` [m]."""
 
 
 class _Body:
@@ -84,27 +72,27 @@ class Floor:
         self.cells = np.argwhere(self.free)
 
     def point(self, cell: tuple[int, int]) -> tuple[float, float]:
-        """Middle of a cell [m]."""
+        """Compute the middle of a cell, building frame [m]."""
         x, y = self.origin + (np.array([cell[1], cell[0]]) + 0.5) * CELL
         return (float(x), float(y))
 
     def draw(self, rng: np.random.Generator) -> tuple[int, int]:
-        """Any cell."""
+        """Draw a free cell."""
         row, col = self.cells[int(rng.integers(len(self.cells)))]
         return (int(row), int(col))
 
     def path(self, start: tuple[int, int], goal: tuple[int, int]) -> list[tuple[int, int]]:
-        """Cells of the shortest way, A* over eight neighbours; the start alone where there is none."""
+        """Find the shortest path, A* over eight neighbours: its cells, the start alone where there is none."""
         queue: list[tuple[float, tuple[int, int]]] = [(0.0, start)]
         came: dict[tuple[int, int], tuple[int, int]] = {start: start}
         cost = {start: 0.0}
         while queue:
             _, cell = heapq.heappop(queue)
             if cell == goal:
-                way = [cell]
-                while way[-1] != start:
-                    way.append(came[way[-1]])
-                return way[::-1]
+                path = [cell]
+                while path[-1] != start:
+                    path.append(came[path[-1]])
+                return path[::-1]
             for dr in (-1, 0, 1):
                 for dc in (-1, 0, 1):
                     other = (cell[0] + dr, cell[1] + dc)
@@ -122,7 +110,7 @@ class Floor:
 
 
 class Person:
-    """Walks to some place, rests, and walks on; gives way to the robot."""
+    """Somebody who walks to a place, rests, and walks on, and waits for the robot."""
 
     def __init__(self, number: int, floor: Floor, physics: PhysicsWorld, obstacles: Obstacles, seed: int) -> None:
         angles = np.arange(CORNERS) * 2.0 * math.pi / CORNERS
@@ -132,7 +120,7 @@ class Person:
         room = np.array([floor.point((0, 0)), floor.point(floor.free.shape)])
         self._body = _Body(ring, ("person", number), physics, obstacles, room)
         self._cell = floor.draw(self._rng)
-        self._way: list[tuple[int, int]] = []
+        self._path: list[tuple[int, int]] = []
         self._rest = self._waited = 0.0
         self._body.put(*floor.point(self._cell))
 
@@ -154,12 +142,12 @@ class Person:
         if self._rest > 0.0:
             self._rest -= duration
             return
-        if not self._way:
-            self._way = self._floor.path(self._cell, self._floor.draw(self._rng))[1:]
-            if not self._way:
+        if not self._path:
+            self._path = self._floor.path(self._cell, self._floor.draw(self._rng))[1:]
+            if not self._path:
                 self._rest = float(self._rng.uniform(*REST))
                 return
-        here, target = self._body.place, self._floor.point(self._way[0])
+        here, target = self._body.place, self._floor.point(self._path[0])
         left = math.dist(here, target)
         share = min(WALK * duration / left, 1.0) if left > 0.0 else 1.0
         there = (here[0] + share * (target[0] - here[0]), here[1] + share * (target[1] - here[1]))
@@ -167,18 +155,18 @@ class Person:
         if nearer and math.dist(there, (x, y)) < radius + PERSON_RADIUS + POLITE:
             self._waited += duration
             if self._waited > PATIENCE:
-                self._way, self._waited = [], 0.0
+                self._path, self._waited = [], 0.0
             return
         self._waited = 0.0
         self._body.put(*there)
         if share >= 1.0:
-            self._cell = self._way.pop(0)
-            if not self._way:
+            self._cell = self._path.pop(0)
+            if not self._path:
                 self._rest = float(self._rng.uniform(*REST))
 
 
 class MovedBox:
-    """A box that stands somewhere until somebody puts it elsewhere, out of the robot's way."""
+    """A box that stands somewhere until somebody puts it elsewhere, far from the robot."""
 
     def __init__(self, number: int, floor: Floor, physics: PhysicsWorld, obstacles: Obstacles, seed: int) -> None:
         half = BOX / 2.0

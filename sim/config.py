@@ -45,7 +45,7 @@ class LidarConfig:
     sweep: Literal["instant", "rolling"] = "instant"
     """Whether all beams of a sweep are of one instant, or measured one after the other as the sensor turns."""
     turns: Literal["left", "right"] = "left"
-    """Which way the sensor turns, seen from above: left is counter-clockwise."""
+    """Direction in which the sensor turns, seen from above: left is counter-clockwise."""
     mount: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the sensor sits on the robot: x, y [m] and heading [rad]."""
 
@@ -110,9 +110,9 @@ class NoiseConfig:
     """How wrong the lidar and the odometry are.
 
     The odometry's figures are standard deviations after one metre driven or one full turn. Errors have zero mean and a
-    variance that grows linearly with the way (Thrun, Burgard, Fox: Probabilistic Robotics, section 5.4, with its
-    variances per metre and per radian), so that they do not depend on the length of a step. What is systematic is a
-    bias of its own.
+    variance that grows linearly with the travelled distance (Thrun, Burgard, Fox: Probabilistic Robotics, section 5.4,
+    with its variances per metre and per radian), so that they do not depend on the length of a step. What is
+    systematic is a bias of its own.
     """
 
     range_sd: float = 0.03
@@ -121,62 +121,62 @@ class NoiseConfig:
     """Share of beams that give no measurement (NaN) [0..1]."""
     outliers: float = 0.002
     """Share of beams that give a distance drawn uniformly over the sensor's range [0..1]."""
-    way: float = 0.03
-    """Error of the way after 1 m [m]."""
+    distance: float = 0.03
+    """Error of the travelled distance after 1 m [m]."""
     turn_per_metre: float = math.radians(1.5)
     """Error of the heading after 1 m driven [rad]."""
     turn: float = 0.03
     """Error of the heading after one full turn, as a share of that turn."""
-    way_per_turn: float = 0.0
-    """Error of the way after one full turn [m]."""
-    bias_way: float = 0.0
-    """Systematic error of the way, the same the whole run, as a share of the way."""
+    distance_per_turn: float = 0.0
+    """Error of the travelled distance after one full turn [m]."""
+    bias_distance: float = 0.0
+    """Systematic error of the travelled distance, the same the whole run, as a share of it."""
     bias_turn_per_metre: float = 0.0
     """Systematic turn for each metre driven, the same the whole run [rad]."""
     bias_turn: float = 0.0
     """Systematic error of turns, the same the whole run, as a share of the turn."""
 
     def __post_init__(self) -> None:
-        for name in ("range_sd", "way", "turn_per_metre", "turn", "way_per_turn"):
+        for name in ("range_sd", "distance", "turn_per_metre", "turn", "distance_per_turn"):
             value = getattr(self, name)
             _check("noise", math.isfinite(value) and value >= 0, f"{name} {value:g}", "a finite number, at least 0")
         for name in ("dropouts", "outliers"):
             value = getattr(self, name)
             _check("noise", 0 <= value <= 1, f"{name} {value:g}", "a share from 0 to 1")
-        biases = (self.bias_way, self.bias_turn_per_metre, self.bias_turn)
+        biases = (self.bias_distance, self.bias_turn_per_metre, self.bias_turn)
         _check("noise", _finite(*biases), "with a bias that is not finite", "finite numbers")
 
     @property
     def alphas(self) -> tuple[float, float, float, float]:
-        """The motion model's alpha 1 to 4 (Probabilistic Robotics, table 5.6) for variances linear in the way.
+        """The motion model's alpha 1 to 4 (Probabilistic Robotics, table 5.6) for variances linear in the motion.
 
-        Variance of the heading per radian turned [rad], of the heading per metre driven [rad^2/m], of the way per metre
-        driven [m], of the way per radian turned [m^2/rad].
+        Variance of the heading per radian turned [rad], of the heading per metre driven [rad^2/m], of the distance per
+        metre driven [m], of the distance per radian turned [m^2/rad].
         """
         return (
             (self.turn * FULL_TURN) ** 2 / FULL_TURN,
             self.turn_per_metre**2,
-            self.way**2,
-            self.way_per_turn**2 / FULL_TURN,
+            self.distance**2,
+            self.distance_per_turn**2 / FULL_TURN,
         )
 
 
 NOISE_LEVELS: Mapping[str, NoiseConfig] = MappingProxyType(
     {
-        "none": NoiseConfig(range_sd=0.0, dropouts=0.0, outliers=0.0, way=0.0, turn_per_metre=0.0, turn=0.0),
+        "none": NoiseConfig(range_sd=0.0, dropouts=0.0, outliers=0.0, distance=0.0, turn_per_metre=0.0, turn=0.0),
         "low": NoiseConfig(
-            range_sd=0.01, dropouts=0.001, outliers=0.0, way=0.01, turn_per_metre=math.radians(0.5), turn=0.01
+            range_sd=0.01, dropouts=0.001, outliers=0.0, distance=0.01, turn_per_metre=math.radians(0.5), turn=0.01
         ),
         "medium": NoiseConfig(),
         "high": NoiseConfig(
-            range_sd=0.05, dropouts=0.02, outliers=0.01, way=0.08, turn_per_metre=math.radians(4.0), turn=0.08
+            range_sd=0.05, dropouts=0.02, outliers=0.01, distance=0.08, turn_per_metre=math.radians(4.0), turn=0.08
         ),
     }
 )
 
 
 def noise_level(name: str) -> NoiseConfig:
-    """Return the noise of a level: ``none``, ``low``, ``medium`` or ``high``.
+    """Look up the noise of a level: ``none``, ``low``, ``medium`` or ``high``.
 
     Raises:
         InvalidInputError: No such level.
@@ -187,7 +187,7 @@ def noise_level(name: str) -> NoiseConfig:
 
 
 def lidar_preset(name: str) -> LidarConfig:
-    """Return the lidar of that name, see ``LIDAR_PRESETS``.
+    """Look up a lidar of ``LIDAR_PRESETS`` by its name.
 
     Raises:
         InvalidInputError: No such lidar.
@@ -204,11 +204,11 @@ class FaultConfig:
     lost_scans: float = 0.0
     """Share of sweeps that arrive without a measurement [0..1]."""
     odometry_freezes: float = 0.0
-    """How often the odometry stands still for a while and then tells the whole way [1/min]."""
+    """How often the odometry stands still for a while and then reports the whole motion at once [1/min]."""
     freeze_seconds: float = 1.0
     """How long it does [s]."""
     odometry_drops: float = 0.0
-    """How often the way between two sweeps is never counted [1/min]."""
+    """How often the motion between two sweeps is never counted [1/min]."""
     unequal_wheels: float = 0.0
     """How much larger the right wheel is than the left, unknown to the odometry, as a share of it."""
     phantom_doors: int = 0
@@ -254,7 +254,7 @@ class SimConfig:
     heading: float | None = None
     """Heading of the start, and so of the map frame, against the building [rad]; the plan's where not given."""
     swing: float = math.radians(95.0)
-    """How far hinged doors open where nothing is in the way [rad]."""
+    """How far hinged doors open where nothing blocks them [rad]."""
     door_seconds: float = 2.0
     """Time that a door takes to open wholly [s]; 0 opens it at once."""
 

@@ -17,7 +17,7 @@ SKIN = 1e-4
 TOUCH = 1e-7
 # Cells of the look-up table of edges [m].
 CELL = 0.5
-# Slides along a corner settle within a few turns; what is left of the way after so many is given up.
+# Slides along a corner settle within a few turns; what is left of the motion after so many is given up.
 MAX_TURNS = 12
 
 Edge = tuple[float, float, float, float]
@@ -33,13 +33,13 @@ class Moved(NamedTuple):
 
 
 def edges_of(area: BaseGeometry) -> FloatArray:
-    """Return every edge of every ring of polygons, shape (n, 4): ``x0 y0 x1 y1`` [m]."""
+    """List the edges of all rings of polygons, shape (n, 4): ``x0 y0 x1 y1`` [m]."""
     pieces = [shapely.get_coordinates(ring) for ring in shapely.get_rings(shapely.get_parts(area))]
     return np.concatenate([np.zeros((0, 4)), *(np.hstack((c[:-1], c[1:])) for c in pieces)])
 
 
 def leaf_edges(corners: FloatArray) -> list[Edge]:
-    """Return the four edges of a leaf with ``corners`` of shape (4, 2)."""
+    """List the four edges of a leaf with ``corners`` of shape (4, 2) [m]."""
     points = corners.tolist()
     return [(*a, *b) for a, b in zip(points, points[1:] + points[:1], strict=True)]
 
@@ -74,11 +74,11 @@ class Obstacles:
                 self._leaf_cells[i, j].append(name)
 
     def move_leaf(self, name: LeafName, edges: list[Edge]) -> None:
-        """Say where a leaf is now."""
+        """Replace the edges of a leaf by those where it is now."""
         self._leaves[name] = edges
 
     def near(self, x: float, y: float) -> Sequence[Edge]:
-        """Return every edge within ``reach`` of a place [m], and a few more."""
+        """Look up every edge within ``reach`` of a place [m], and a few more."""
         cell = (math.floor(x / CELL), math.floor(y / CELL))
         fixed = self._cells.get(cell, ())
         leaves = self._leaf_cells.get(cell)
@@ -87,7 +87,7 @@ class Obstacles:
         return [*fixed, *(edge for name in leaves for edge in self._leaves[name])]
 
     def _cells_near(self, edge: Sequence[float]) -> Iterable[tuple[int, int]]:
-        """Cells from which ``edge`` can be within reach."""
+        """List the cells from which ``edge`` can be within reach."""
         ax, ay, bx, by = edge
         box = (min(ax, bx), min(ay, by), max(ax, bx), max(ay, by))
         x0, y0, x1, y1 = (math.floor(v / CELL) for v in _grown(box, self.reach))
@@ -105,12 +105,12 @@ def _grown(box: Sequence[float], margin: float) -> tuple[float, float, float, fl
 
 
 def distance(x: float, y: float, edges: Sequence[Edge]) -> float:
-    """Distance of a point from the nearest edge [m], infinity where there is none."""
+    """Compute the distance of a point from the nearest edge [m], infinity where there is none."""
     return min((math.hypot(*offset(x, y, edge)) for edge in edges), default=math.inf)
 
 
 def offset(x: float, y: float, edge: Edge) -> tuple[float, float]:
-    """Return the vector from the nearest point of an edge to ``(x, y)`` [m]."""
+    """Compute the vector from the nearest point of an edge to ``(x, y)`` [m]."""
     ax, ay, bx, by = edge
     dx, dy = bx - ax, by - ay
     squared = dx * dx + dy * dy
@@ -122,16 +122,16 @@ def offset(x: float, y: float, edge: Edge) -> tuple[float, float]:
 def move_disc(x: float, y: float, dx: float, dy: float, radius: float, edges: Sequence[Edge]) -> Moved:
     """Move a disc by ``(dx, dy)``; where it meets an edge it slides along.
 
-    Exact: the distance to an edge is a convex function along a straight way, so Newton's step from outside never
+    Exact: the distance to an edge is a convex function along a straight line, so Newton's step from outside never
     passes the contact, and hits that with a flat wall in one step. The disc ends ``SKIN`` away from what it touches.
 
     Args:
         x: Centre [m].
         y: Centre [m].
-        dx: Way to go [m].
-        dy: Way to go [m].
+        dx: Motion asked for [m].
+        dy: Motion asked for [m].
         radius: Of the disc [m].
-        edges: Everything within reach of the whole way.
+        edges: Everything within reach of the whole motion.
     """
     limit = radius + SKIN
     touched = False
@@ -156,7 +156,7 @@ def move_disc(x: float, y: float, dx: float, dy: float, radius: float, edges: Se
 def _free_share(
     x: float, y: float, dx: float, dy: float, limit: float, edges: Sequence[Edge]
 ) -> tuple[float, tuple[float, float] | None]:
-    """A share of the way that is surely free, and the normal of an edge that stops it right here."""
+    """Find the share of the motion that is surely free, and the normal of an edge that stops it right here."""
     share = 1.0
     contact = None
     deepest = TOUCH
@@ -176,7 +176,7 @@ def _free_share(
 
 
 def _along(dx: float, dy: float, normals: list[tuple[float, float]]) -> tuple[float, float]:
-    """What is left of a way beside the edges it touches: along the last one, nothing in a corner."""
+    """Turn a motion along the last edge that it touches; nothing of it is left in a corner."""
     nx, ny = normals[-1]
     inward = dx * nx + dy * ny
     dx, dy = dx - inward * nx, dy - inward * ny

@@ -8,7 +8,7 @@ from closedrooms.core.robot import RobotConfig
 from closedrooms.sim.contacts import SKIN, Edge, Obstacles, distance, move_disc, offset
 
 # While velocities change, an arc is driven with the mean of so much time [s]: at the default limits this leaves the
-# true way by at most 0.1 mm in half a second (0.5 mm with 0.05 s).
+# true path by at most 0.1 mm in half a second (0.5 mm with 0.05 s).
 RAMP_SECONDS = 0.02
 # One arc is at most this long [m] and turns by no more than this [rad].
 ARC_LENGTH = 0.3
@@ -16,12 +16,12 @@ ARC_TURN = 0.5
 # Beside obstacles an arc is cut into chords of this length [m] and turn [rad]: they leave it by less than 0.3 mm.
 CHORD_LENGTH = 0.02
 CHORD_TURN = 0.1
-# A robot that gets less than this share of its way is stopped; what gets more slides along, its wheels slipping.
+# A robot that gets less than this share of its motion is stopped; what gets more slides along, its wheels slipping.
 STALLED = 0.1
 
 
 class Motion(NamedTuple):
-    """A piece of the way as it was really driven, in the robot frame at its start.
+    """One motion as it was really driven, in the robot frame at its start.
 
     Attributes:
         dx: Forwards [m].
@@ -61,7 +61,7 @@ class Drive:
 
     @staticmethod
     def reach(config: RobotConfig) -> float:
-        """Tell how far from its centre the robot may meet something within one arc [m]."""
+        """Compute how far from its centre the robot may meet something within one arc [m]."""
         return config.radius + ARC_LENGTH + 2 * SKIN
 
     @property
@@ -76,7 +76,7 @@ class Drive:
             v: Commanded speed [m/s]; the limits are applied.
             w: Commanded turn rate [rad/s]; the limits are applied.
             duration: Time [s].
-            sink: Takes every piece of the way, in order.
+            sink: Takes every motion, in order.
         """
         limits = self.config
         v = min(max(v, -limits.max_speed), limits.max_speed)
@@ -92,7 +92,7 @@ class Drive:
             left -= time
 
     def _piece(self, v: float, w: float, left: float) -> float:
-        """How long to go on with one arc: until a ramp ends, and never too far."""
+        """Choose how long to go on with one arc: until a ramp ends, and never too far [s]."""
         time = left
         for now, wanted, rate in (
             (self.v, v, self.config.max_acceleration),
@@ -108,19 +108,19 @@ class Drive:
             time = ARC_TURN / turning
         return time
 
-    def _arc(self, way: float, turn: float) -> Motion:
-        edges = self._obstacles.near(self.x, self.y) if way else ()
-        if not edges or distance(self.x, self.y, edges) > self.config.radius + SKIN + abs(way):
-            motion = Motion(*chord(way, turn), turn)
+    def _arc(self, length: float, turn: float) -> Motion:
+        edges = self._obstacles.near(self.x, self.y) if length else ()
+        if not edges or distance(self.x, self.y, edges) > self.config.radius + SKIN + abs(length):
+            motion = Motion(*chord(length, turn), turn)
             self._apply(motion)
             return motion
-        return self._arc_beside(way, turn, edges)
+        return self._arc_beside(length, turn, edges)
 
-    def _arc_beside(self, way: float, turn: float, edges: Sequence[Edge]) -> Motion:
-        """An arc that may meet something, chord by chord."""
+    def _arc_beside(self, length: float, turn: float, edges: Sequence[Edge]) -> Motion:
+        """Drive an arc that may meet something, chord by chord."""
         x0, y0, theta0 = self.x, self.y, self.theta
-        chords = max(math.ceil(abs(way) / CHORD_LENGTH), math.ceil(abs(turn) / CHORD_TURN), 1)
-        step_x, step_y = chord(way / chords, turn / chords)
+        chords = max(math.ceil(abs(length) / CHORD_LENGTH), math.ceil(abs(turn) / CHORD_TURN), 1)
+        step_x, step_y = chord(length / chords, turn / chords)
         touched = False
         for _ in range(chords):
             c, s = math.cos(self.theta), math.sin(self.theta)
@@ -133,7 +133,7 @@ class Drive:
         motion = Motion(c * dx + s * dy, c * dy - s * dx, turn)
         if touched:
             self._feel(edges)
-            if math.hypot(dx, dy) < STALLED * abs(way):
+            if math.hypot(dx, dy) < STALLED * abs(length):
                 self.v = 0.0
         return motion
 
@@ -151,15 +151,15 @@ class Drive:
 
 
 def towards(now: float, wanted: float, change: float) -> float:
-    """``wanted``, or as near to it as ``change`` allows."""
+    """Change ``now`` towards ``wanted`` by at most ``change``."""
     if abs(wanted - now) <= change * (1 + 1e-9):
         return wanted
     return now + math.copysign(change, wanted - now)
 
 
-def chord(way: float, turn: float) -> tuple[float, float]:
-    """Tell where an arc of length ``way`` [m] that turns by ``turn`` [rad] ends, in the frame of its start [m]."""
+def chord(length: float, turn: float) -> tuple[float, float]:
+    """Find where an arc of ``length`` [m] that turns by ``turn`` [rad] ends, in the frame of its start [m]."""
     if abs(turn) < 1e-9:
-        return (way, way * turn / 2)
-    radius = way / turn
+        return (length, length * turn / 2)
+    radius = length / turn
     return (radius * math.sin(turn), radius * (1.0 - math.cos(turn)))

@@ -16,12 +16,12 @@ Solids = Polygon | MultiPolygon
 
 # Leaves are a little smaller than their frames and rounded at the edges: touching by less than this is no jam [m].
 PLAY = 0.01
-# A leaf is tried at places at most this far apart on its way, less than its thickness [m].
+# A leaf is tried at places at most this far apart on its travel, less than its thickness [m].
 TRIAL = 0.02
 # How far inside the wall a sliding leaf may stick out of it [m].
 PROUD = 1e-3
-# A hinged leaf that opens less bars the way: such a door hangs on its other jamb, or opens to its other side. The plans
-# of most formats do not say on which jamb a door hangs: the importers guess [rad].
+# A hinged leaf that opens less bars the passage: such a door hangs on its other jamb, or opens to its other side. Most
+# formats of plans do not say on which jamb a door hangs: the importers guess [rad].
 PASSABLE = math.radians(60.0)
 # A wide sliding door telescopes in at most so many panels a side.
 MAX_PANELS = 4
@@ -48,7 +48,7 @@ class Leaf:
     travel: float
 
     def at(self, position: float | FloatArray) -> FloatArray:
-        """Corners when moved by ``position`` [rad or m] of any shape (...), shape (..., 4, 2)."""
+        """Move the corners by ``position`` [rad or m] of any shape (...); returns shape (..., 4, 2)."""
         p = np.asarray(position, dtype=np.float64)[..., None]
         if self.slides:
             moved: FloatArray = self.corners + p[..., None] * self.direction
@@ -59,7 +59,7 @@ class Leaf:
 
     @property
     def reach(self) -> FloatArray:
-        """Points whose bounding box holds the leaf on its whole way, shape (k, 2), building frame [m]."""
+        """Points whose bounding box holds the leaf on its whole travel, shape (k, 2), building frame [m]."""
         if self.slides:
             return np.concatenate((self.corners, self.at(self.travel)))
         r = float(np.linalg.norm(self.corners - self.pivot, axis=1).max())
@@ -67,16 +67,16 @@ class Leaf:
 
 
 def door_leaves(plan: FloorPlan, door: PlanDoor, solids: Solids, swing: float) -> tuple[Leaf, ...]:
-    """Return the leaves of a door with the travel that walls and furniture leave them.
+    """Hang the leaves of a door, with the travel that walls and furniture leave them.
 
-    A hinged leaf swings around the corner of its jamb into ``door.opens_into`` (or the other way, see ``PASSABLE``), a
-    double door has two that hang on both jambs, a sliding door slides into the wall beside it.
+    A hinged leaf swings around the corner of its jamb into ``door.opens_into`` (or to the other side, see
+    ``PASSABLE``), a double door has two that hang on both jambs, a sliding door slides into the wall beside it.
 
     Args:
         plan: The building.
         door: One of its doors.
         solids: Walls and furniture.
-        swing: How far hinged leaves open where nothing is in the way [rad].
+        swing: How far hinged leaves open where nothing blocks them [rad].
     """
     half = min(LEAF_THICKNESS, wall_thickness_at(plan, door)) / 2
     if door.kind == "sliding":
@@ -99,7 +99,7 @@ def door_leaves(plan: FloorPlan, door: PlanDoor, solids: Solids, swing: float) -
 
 
 def _opening_side(plan: FloorPlan, door: PlanDoor) -> FloatArray:
-    """Unit normal of the door towards the side that it opens into, shape (2,)."""
+    """Find the unit normal of the door towards the side that it opens into, shape (2,)."""
     a, b = np.array(door.segment)
     along = (b - a) / door.width
     normal = np.array([-along[1], along[0]])
@@ -132,11 +132,11 @@ def _hinged_leaf(
     eased = replace(leaf, corners=_rectangle(jamb + play * along, free - play * along, half - play))
     length = float(np.linalg.norm(free - jamb))
     trials = np.linspace(0.0, swing, max(math.ceil(swing * length / TRIAL), 1) + 1)
-    return replace(leaf, travel=_free_way(eased, trials, solids))
+    return replace(leaf, travel=_free_travel(eased, trials, solids))
 
 
-def _free_way(leaf: Leaf, trials: FloatArray, solids: Solids) -> float:
-    """The last position before the leaf touches ``solids`` on its way through ``trials``."""
+def _free_travel(leaf: Leaf, trials: FloatArray, solids: Solids) -> float:
+    """Find the last position before the leaf touches ``solids`` on its travel through ``trials``."""
     shapely.prepare(solids)
     touches = shapely.intersects(solids, shapely.polygons(leaf.at(trials)))
     if not touches.any():
@@ -155,7 +155,7 @@ def _free_way(leaf: Leaf, trials: FloatArray, solids: Solids) -> float:
 
 
 def _sliding_leaves(plan: FloorPlan, door: PlanDoor, half: float) -> tuple[Leaf, ...]:
-    """The panels of a sliding door: towards the hinge's end, the other, or parting, whatever opens it furthest."""
+    """Make the panels of a sliding door: to the hinge's end, the other, or parting, whatever opens it furthest."""
     near, far = np.array(door.segment) if door.hinge == 0 else np.array(door.segment[::-1])
     middle = (near + far) / 2
     walls = wall_area(plan)
@@ -172,7 +172,7 @@ def _sliding_leaves(plan: FloorPlan, door: PlanDoor, half: float) -> tuple[Leaf,
 
 
 def _panels(jamb: FloatArray, end: FloatArray, half: float, count: int, pocket: float) -> Iterator[Leaf]:
-    """Panels from ``jamb`` to ``end`` that telescope into a pocket of depth ``pocket`` [m] behind the jamb."""
+    """Make panels from ``jamb`` to ``end`` that telescope into a pocket of depth ``pocket`` [m] behind the jamb."""
     step = (end - jamb) / count
     width = _length(step)
     for number in range(count):
@@ -188,7 +188,7 @@ def _panels(jamb: FloatArray, end: FloatArray, half: float, count: int, pocket: 
 
 
 def _pocket(jamb: FloatArray, outward: FloatArray, length: float, half: float, walls: Solids) -> float:
-    """How far a panel can slide past ``jamb`` and stay inside the wall, up to ``length`` [m]."""
+    """Measure how far a panel can slide past ``jamb`` and stay inside the wall, up to ``length`` [m]."""
     direction = outward / _length(outward)
     depths = np.arange(1, math.ceil(length / TRIAL) + 1) * (length / math.ceil(length / TRIAL))
     strips = [_rectangle(jamb, jamb + depth * direction, half - min(PROUD, half / 2)) for depth in depths]
@@ -198,7 +198,7 @@ def _pocket(jamb: FloatArray, outward: FloatArray, length: float, half: float, w
 
 
 def _rectangle(a: FloatArray, b: FloatArray, half: float) -> FloatArray:
-    """Corners, shape (4, 2), of the strip of half width ``half`` from ``a`` to ``b``."""
+    """Compute the corners, shape (4, 2), of the strip of half width ``half`` from ``a`` to ``b``."""
     corners: FloatArray = rectangles(np.array([[a, b]]), np.array([half]))[0]
     return corners
 

@@ -1,4 +1,4 @@
-"""The doors of a building: placed along their way, or hung in PyBullet and moved by motors and by whoever pushes."""
+"""The doors of a building: placed along their travel, or hung in PyBullet and moved by motors and by whoever pushes."""
 
 from typing import Protocol
 
@@ -17,14 +17,14 @@ from closedrooms.worlds.plan import PlanDoor
 DOOR_HEIGHT = 2.1
 # What a latch holds: rammed at 1 m/s a closed door moved by 0.000 degrees [Nm or N].
 LATCH = 2000.0
-# The motor that opens a hinged door, EN 16005's low energy: it gives way to a robot [Nm]; the same at half a leaf's
+# The motor that opens a hinged door, EN 16005's low energy: a robot stops it [Nm]; the same at half a leaf's
 # width, of a sliding one [N].
 HINGE_MOTOR, SLIDE_MOTOR = 20.0, 44.0
 # Friction of hinges and rails: a leaf stays where it is left [Nm or N].
 HINGE_FRICTION, SLIDE_FRICTION = 2.0, 5.0
-# Speed that a motor may reach where doors open at once, in ways a second [1/s].
+# Speed that a motor may reach where doors open at once, in travels a second [1/s].
 AT_ONCE = 50.0
-# A leaf this near to the end of its way has arrived, and one this near to its frame is closed [share of its way].
+# A leaf this near to the end of its travel has arrived, and one this near to its frame is closed [share of its travel].
 ARRIVED, SHUT = 0.99, 0.02
 
 
@@ -35,7 +35,7 @@ class Door(Protocol):
         plan: The door in the plan.
         leaves: What moves.
         body: Its body in PyBullet.
-        opens: Whether it is on its way to open.
+        opens: Whether it is opening.
     """
 
     plan: PlanDoor
@@ -52,10 +52,10 @@ class Door(Protocol):
         """Whether it blocks the passage."""
 
     def corners(self) -> list[FloatArray]:
-        """Corners of each leaf as it stands, shape (4, 2), building frame [m]."""
+        """Compute the corners of each leaf as it stands, shape (4, 2), building frame [m]."""
 
     def place(self, opening: float) -> None:
-        """Put it somewhere between closed, 0, and open, 1."""
+        """Place it between closed, 0, and open, 1."""
 
     def set_out(self) -> None:
         """Begin to open."""
@@ -65,7 +65,7 @@ class Door(Protocol):
 
 
 class PlacedDoor:
-    """A door without weight: it is put where it is, opens at its pace and waits for a robot in its way."""
+    """A door without weight: it is put where it is, opens at its pace and waits for a robot that blocks it."""
 
     def __init__(
         self, plan: PlanDoor, leaves: tuple[Leaf, ...], physics: PhysicsWorld, obstacles: Obstacles, config: SimConfig
@@ -85,14 +85,14 @@ class PlacedDoor:
         return self.opening == 0.0
 
     def corners(self) -> list[FloatArray]:
-        """Corners of each leaf as it stands, shape (4, 2), building frame [m]."""
+        """Compute the corners of each leaf as it stands, shape (4, 2), building frame [m]."""
         return self._corners(self.opening)
 
     def _corners(self, opening: float) -> list[FloatArray]:
         return [leaf.at(opening * leaf.travel) for leaf in self.leaves]
 
     def place(self, opening: float) -> None:
-        """Put it somewhere between closed, 0, and open, 1."""
+        """Place it between closed, 0, and open, 1."""
         self.opening = opening
         for link, (leaf, corners) in enumerate(zip(self.leaves, self.corners(), strict=True)):
             self._physics.move_joint(self.body, link, opening * leaf.travel)
@@ -114,7 +114,7 @@ class PlacedDoor:
 
 
 class HungDoor:
-    """A door with weight, friction and a latch; its motor gives way to what stands in its way."""
+    """A door with weight, friction and a latch; what blocks it stops its motor."""
 
     def __init__(
         self, plan: PlanDoor, leaves: tuple[Leaf, ...], physics: PhysicsWorld, obstacles: Obstacles, config: SimConfig
@@ -148,11 +148,11 @@ class HungDoor:
         return self.latched or self.opening < SHUT
 
     def corners(self) -> list[FloatArray]:
-        """Corners of each leaf as it stands, shape (4, 2), building frame [m]."""
+        """Compute the corners of each leaf as it stands, shape (4, 2), building frame [m]."""
         return [leaf.at(position) for leaf, position in zip(self.leaves, self._positions(), strict=True)]
 
     def place(self, opening: float) -> None:
-        """Put it somewhere between closed, 0, and open, 1; closed, it latches."""
+        """Place it between closed, 0, and open, 1; closed, it latches."""
         self.latched = self._latches and opening == 0.0
         for link, leaf in enumerate(self.leaves):
             self._physics.move_joint(self.body, link, opening * leaf.travel)
@@ -173,7 +173,7 @@ class HungDoor:
             self._physics.drive_joint(self.body, link, leaf.travel, force=force, speed=speed)
 
     def advance(self, duration: float, x: float, y: float, radius: float) -> None:  # noqa: ARG002
-        """See whether it has arrived: the physics move it."""
+        """Let go of a door that has arrived: the physics move it."""
         if self.opening >= ARRIVED:
             self.opens = False
             for link in range(len(self.leaves)):
@@ -185,7 +185,7 @@ class HungDoor:
 
 
 def door_part(leaf: Leaf) -> MovingPart:
-    """Return a leaf as PyBullet takes it."""
+    """Extrude a leaf into the solid that PyBullet takes."""
     vertices, triangles = extrude(Polygon(leaf.corners), height=DOOR_HEIGHT)
     axis = (*leaf.direction.tolist(), 0.0) if leaf.slides else (0.0, 0.0, float(leaf.sense))
     x, y = leaf.pivot.tolist()

@@ -35,7 +35,7 @@ class Faults:
         self._kept = Pose2()
 
     def odometry(self, pose: Pose2, stamp: float) -> Pose2:
-        """Tell the odometry at ``stamp`` [s]: it may stand still for a while, or lose a piece of the way."""
+        """Spoil the odometry read at ``stamp`` [s]: it may stand still for a while, or forget a motion."""
         config, passed = self.config, stamp - self._stamp
         self._stamp = stamp
         before, self._before = self._before, pose
@@ -50,12 +50,12 @@ class Faults:
         return self._kept
 
     def scan(self, scan: LaserScan) -> LaserScan:
-        """Return the scan, or one without any measurement."""
+        """Lose a share of the scans: such a scan comes back without any measurement (NaN)."""
         lost = self._lost.random() < self.config.lost_scans
         return dataclasses.replace(scan, ranges=np.full(scan.ranges.size, np.nan)) if lost else scan
 
     def phantoms(self, scan: LaserScan, world_T_robot: Pose2) -> tuple[DoorSighting, ...]:
-        """Doors that are reported where there is plain wall in sight."""
+        """Report doors where there is plain wall in sight, robot frame [m]."""
         found = []
         sensor = world_T_robot @ Pose2(*scan.robot_T_sensor)
         for number, (a, b) in enumerate(self._phantoms):
@@ -74,7 +74,7 @@ class Faults:
 
 
 def phantom_places(plan: FloorPlan, count: int, seed: int) -> list[tuple[Point, Point]]:
-    """Places on walls, drawn by length, building frame [m]; the first ones are the same however many are drawn."""
+    """Draw places on walls, by length, building frame [m]; the first ones are the same however many are drawn."""
     rng = stream(seed, "faults", "phantoms", plan.name)
     walls = [wall.segment for wall in plan.walls if math.dist(*wall.segment) > PHANTOM_WIDTH]
     if not walls or count == 0:

@@ -19,7 +19,7 @@ SEEN, UNSEEN = math.radians(10.0), math.radians(20.0)
 
 
 def glazed(plan: FloorPlan, share: float, seed: int) -> FloorPlan:
-    """Return the plan with a share of its walls, by length, of glass beside what is of glass already.
+    """Make a share of a plan's walls, by length, of glass, beside what is of glass already.
 
     Args:
         plan: The building.
@@ -58,7 +58,7 @@ def glass_area(plan: FloorPlan, walls: shapely.Geometry) -> shapely.Polygon | sh
 
 
 def comes_back(incidence: FloatArray, draws: FloatArray) -> BoolArray:
-    """Tell which beams a pane returns, shape (n,).
+    """Decide which beams a pane returns, shape (n,).
 
     Args:
         incidence: Angle against the pane's normal, shape (n,) [rad].

@@ -37,7 +37,7 @@ class Lidar:
         self._last_heading = 0.0
 
     def cast(self, world_T_robot: Pose2) -> tuple[FloatArray, IntArray]:
-        """True distances of the first hits, every ray cast whole; glass is as if it were not there.
+        """Measure the true distances of the first hits, every ray cast whole; glass is as if it were not there.
 
         Args:
             world_T_robot: Where the robot stands.
@@ -50,7 +50,7 @@ class Lidar:
         return self._shoot(start, directions, np.full(self.config.beams, self.config.range_max))
 
     def track(self, world_T_robot: Pose2, poses: FloatArray | None = None) -> tuple[FloatArray, IntArray]:
-        """Return the same as :meth:`cast`, sooner, for poses that follow each other; panes return what they return.
+        """Measure as :meth:`cast`, sooner, for poses that follow each other; panes return what they return.
 
         A ray's cost grows with its length, and most end after a few metres of the twenty they may go. So each is cast
         as far as its neighbours went in the last sweep and a little further; the few that hit nothing are cast whole.
@@ -74,13 +74,13 @@ class Lidar:
         return distances, bodies
 
     def _rays(self, world_T_robot: Pose2) -> tuple[FloatArray, FloatArray, float]:
-        """Where the sensor is, shape (2,) [m], the beams' directions, shape (beams, 2), and its heading [rad]."""
+        """Compute the sensor's place, shape (2,) [m], beams' directions, shape (beams, 2), and its heading [rad]."""
         sensor = world_T_robot @ self._mount
         angles = self._angles + sensor.theta
         return np.array([sensor.x, sensor.y]), np.column_stack((np.cos(angles), np.sin(angles))), sensor.theta
 
     def _rolling_rays(self, poses: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-        """As :meth:`_rays` with a place of the sensor for each beam, shape (beams, 2) [m]."""
+        """Compute what :meth:`_rays` does with a place of the sensor for each beam, shape (beams, 2) [m]."""
         headings = poses[:, 2]
         c, s = np.cos(headings), np.sin(headings)
         x, y = self._mount.x, self._mount.y
@@ -89,12 +89,12 @@ class Lidar:
         return starts, np.column_stack((np.cos(angles), np.sin(angles))), float(headings[-1]) + self._mount.theta
 
     def beam_stamps(self, stamp: float) -> FloatArray:
-        """When each beam of a sweep that ends at ``stamp`` [s] is measured, shape (beams,) [s]."""
+        """Compute when each beam of a sweep that ends at ``stamp`` [s] is measured, shape (beams,) [s]."""
         first, last = self.config.beam_times
         return stamp + np.linspace(first, last, self.config.beams)
 
     def _expected(self, heading: float) -> FloatArray:
-        """How far to cast each ray at first [m], shape (beams,)."""
+        """Estimate how far to cast each ray at first [m], shape (beams,)."""
         longest = self.config.range_max
         if self._last is None:
             return np.full(self.config.beams, longest)
@@ -118,7 +118,7 @@ class Lidar:
     def _behind_glass(
         self, start: FloatArray, directions: FloatArray, distances: FloatArray, bodies: IntArray
     ) -> tuple[FloatArray, IntArray]:
-        """Distances and bodies with the beams that panes before them return."""
+        """Replace distances and bodies of the beams that panes before them return."""
         starts = np.full((*start.shape[:-1], 3), self.config.height)
         starts[..., :2] = start
         ends = np.full((len(directions), 3), self.config.height)
@@ -131,7 +131,7 @@ class Lidar:
         return np.where(first, away, distances), np.where(first, panes, bodies)
 
     def sweep(self, world_T_robot: Pose2, stamp: float, poses: FloatArray | None = None) -> tuple[LaserScan, IntArray]:
-        """Return one scan with its errors.
+        """Take one scan, with its errors.
 
         Args:
             world_T_robot: Where the robot stands.
@@ -158,7 +158,7 @@ class Lidar:
         return scan, np.where(measured, bodies, -1)
 
     def _disturbed(self, distances: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Measured ranges [m] and which of them are measurements of what the ray hit."""
+        """Disturb the ranges [m]; says which of them are measurements of what the ray hit."""
         noise, config = self._noise, self.config
         ranges = distances
         if noise.range_sd > 0:

@@ -15,22 +15,23 @@ BLOCK = 1024
 
 
 class Odometry:
-    """Accumulates the robot's way with errors.
+    """The pose by wheel counts, which drifts from the true one.
 
-    Every piece of the way is a turn, a way and a turn (Probabilistic Robotics, section 5.4.1). Their variances are
-    ``alpha 1 |turn| + alpha 2 way`` for the heading and ``alpha 3 way + alpha 4 |turn|`` for the way, linear in both,
-    so that the errors of many short pieces add up to that of a long one. The heading drifts as a Brownian motion along
-    the piece; the share of it that already bends the way, given its end, has the mean 1/2 and the variance 1/12, and
-    goes into the first turn, so that not even the sideways error depends on how the way was cut.
+    Every motion is a turn, a translation and a turn (Probabilistic Robotics, section 5.4.1). Variances are
+    ``alpha 1 |turn| + alpha 2 distance`` of the heading and ``alpha 3 distance + alpha 4 |turn|`` of the translation,
+    linear in both, so that the errors of many short motions add up to that of a long one. The heading drifts as a
+    Brownian motion meanwhile; the share of it that already bends the path, given its end, has the mean 1/2 and the
+    variance 1/12, and goes into the first turn, so that not even the sideways error depends on how the path was cut.
     """
 
     def __init__(self, noise: NoiseConfig, seed: int) -> None:
         self._noise = noise
         self._alphas = noise.alphas
-        self._way = _normals(stream(seed, "odometry", "way"))
+        # "way" is part of the seed: another word would draw other numbers.
+        self._distance = _normals(stream(seed, "odometry", "way"))
         self._turn = _normals(stream(seed, "odometry", "turn"))
         self._bend = _normals(stream(seed, "odometry", "bend"))
-        self._exact = not any((*self._alphas, noise.bias_way, noise.bias_turn_per_metre, noise.bias_turn))
+        self._exact = not any((*self._alphas, noise.bias_distance, noise.bias_turn_per_metre, noise.bias_turn))
         self._x = self._y = self._theta = 0.0
 
     @property
@@ -39,7 +40,7 @@ class Odometry:
         return Pose2(self._x, self._y, self._theta)
 
     def add(self, motion: Motion) -> None:
-        """Count a piece of the way."""
+        """Count a motion: add it, with its errors, to the pose."""
         dx, dy, turn = motion
         first = 0.0
         if not self._exact:
@@ -50,19 +51,20 @@ class Odometry:
         self._theta += turn
 
     def _disturbed(self, motion: Motion) -> tuple[float, float, float, float]:
-        """The piece as the odometry counts it, and the error of its first turn [rad]."""
+        """Disturb a motion as the odometry counts it; returns the error of its first turn [rad] too."""
         alpha1, alpha2, alpha3, alpha4 = self._alphas
         noise = self._noise
-        way, turned = math.hypot(motion.dx, motion.dy), abs(motion.turn)
-        heading_sd = math.sqrt(alpha1 * turned + alpha2 * way)
+        travelled, turned = math.hypot(motion.dx, motion.dy), abs(motion.turn)
+        heading_sd = math.sqrt(alpha1 * turned + alpha2 * travelled)
         turn_error = heading_sd * next(self._turn)
         first = turn_error / 2 + heading_sd * next(self._bend) / math.sqrt(12.0)
-        drift = noise.bias_turn_per_metre * way + noise.bias_turn * motion.turn
-        way_error = math.sqrt(alpha3 * way + alpha4 * turned) * next(self._way) + noise.bias_way * way
-        ux, uy = (motion.dx / way, motion.dy / way) if way > 0.0 else (1.0, 0.0)
+        drift = noise.bias_turn_per_metre * travelled + noise.bias_turn * motion.turn
+        distance_sd = math.sqrt(alpha3 * travelled + alpha4 * turned)
+        distance_error = distance_sd * next(self._distance) + noise.bias_distance * travelled
+        ux, uy = (motion.dx / travelled, motion.dy / travelled) if travelled > 0.0 else (1.0, 0.0)
         return (
-            motion.dx + way_error * ux,
-            motion.dy + way_error * uy,
+            motion.dx + distance_error * ux,
+            motion.dy + distance_error * uy,
             motion.turn + turn_error + drift,
             first + drift / 2,
         )

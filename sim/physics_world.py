@@ -268,7 +268,7 @@ class PhysicsWorld:
         bullet.changeDynamics(body, -1, activationState=bullet.ACTIVATION_STATE_WAKE_UP, physicsClientId=self._client)
 
     def joint_position(self, body: int, link: int) -> float:
-        """Tell where a joint is [rad or m]."""
+        """Read the position of a joint [rad or m]."""
         return float(self._bullet.getJointState(body, link, physicsClientId=self._client)[0])
 
     def move_joint(self, body: int, link: int, position: float) -> None:
@@ -276,21 +276,21 @@ class PhysicsWorld:
         self._bullet.resetJointState(body, link, position, physicsClientId=self._client)
 
     def cast(self, start: FloatArray, ends: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Return the first thing that each ray hits, glass left out.
+        """Find the first thing that each ray hits, glass left out.
 
         Args:
             start: Where all rays start, shape (3,), or each, shape (n, 3), world frame [m].
             ends: Where they end at the latest, shape (n, 3).
 
         Returns:
-            The share of the way to the end at the hit, shape (n,), 1 without one, and the body hit, shape (n,), -1
+            The share of the ray up to the hit, shape (n,), 1 without one, and the body hit, shape (n,), -1
             without one.
         """
         fractions, bodies, _ = self._cast(start, ends, SEEN, normals=False)
         return fractions, bodies
 
     def cast_at_glass(self, start: FloatArray, ends: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
-        """As :meth:`cast` for glass alone, with the normals where it is hit, shape (n, 3)."""
+        """Find the first pane that each ray hits, as :meth:`cast`, with the normals there, shape (n, 3)."""
         return self._cast(start, ends, GLASS, normals=True)
 
     def _cast(
@@ -315,7 +315,7 @@ class PhysicsWorld:
         return fractions, bodies, found
 
     def _visual(self, vertices: FloatArray, triangles: IntArray, colour: Colour) -> int:
-        """What is drawn of a mesh, flat faces from both sides; -1, nothing, where nobody looks."""
+        """Make what is drawn of a mesh, flat faces from both sides; -1, nothing, where nobody looks."""
         if not self.visible:
             return -1
         # Every face has corners and a normal of its own, and once more turned round.
@@ -368,7 +368,7 @@ def check_display() -> None:
 
 
 def _volume(part: MovingPart) -> float:
-    """Of the upright prism that a part is [m^3]; its triangles are its sides alone."""
+    """Compute the volume of the upright prism that a part is [m^3]; its triangles are its sides alone."""
     a, b, c = (part.vertices[part.triangles[:, i]] for i in range(3))
     # The divergence of (x, y, 0) is 2, and top and bottom do not count.
     flux = np.cross(b - a, c - a) * (a + b + c)

@@ -63,12 +63,12 @@ class RobotModel:
 
 
 def robot_mass(config: RobotConfig) -> float:
-    """Mass of the body [kg]."""
+    """Compute the mass of the body [kg]."""
     return MASS * (config.radius / MASS_RADIUS) ** 2
 
 
 def make_model(config: RobotConfig, plane: float) -> RobotModel:
-    """Return the robot of the configuration: a round body on two driven wheels and two casters.
+    """Describe the robot of the configuration: a round body on two driven wheels and two casters.
 
     The lidar looks over the body, so that no ray has to be told to pass it: rays that start in a body cost half as
     much again. Nothing in a building is met above the scan plane and not below it.

@@ -33,11 +33,11 @@ GROUND = 0.03
 BOX_MARGIN = 1e-3
 # Words in the names of links that carry a lidar.
 LIDAR_NAMES = ("base_scan", "laser", "lidar", "hokuyo")
-# The drive that calibrates: so long each way [s], at these shares of the limits.
+# The drive that calibrates: so long straight and so long turning [s], at these shares of the limits.
 SETTLE, DRIVE, SHARE = 1.0, 2.0, 0.5
 # What is tried, as shares of the accelerations set, until a robot does not tip by so much [rad].
 GENTLER, TIPS = (1.0, 0.5, 0.25, 0.12), 0.1
-# Pieces of a drive after which the tilt is looked at; a heading turns by less than half a turn in each.
+# Stretches of a drive after which the tilt is looked at; a heading turns by less than half a turn in each.
 STRETCHES = 20
 # A robot that gets less than this share of what its wheels turn does not drive on them.
 DRIVES = 0.1
@@ -77,7 +77,7 @@ class Joint:
 
 
 def with_own_robot(config: SimConfig) -> SimConfig:
-    """Return the settings with radius, height and lidar of the URDF that they name; as they are where they name none.
+    """Replace radius, height and lidar in the settings by those of the URDF that they name, if they name one.
 
     Raises:
         InvalidInputError: The URDF cannot be used; the message says why.
@@ -173,7 +173,7 @@ def check_description(path: Path) -> None:
 
 
 def _check_tree(root: Any, path: Path) -> None:
-    """Links and joints must make one tree: PyBullet crashes on anything else."""
+    """Check that links and joints make one tree: PyBullet crashes on anything else."""
     links = [link.get("name") for link in root.findall("link")]
     pairs = []
     for joint in root.findall("joint"):
@@ -207,7 +207,7 @@ def _check_loads(path: Path) -> None:
 
 
 def _joints(physics: PhysicsWorld, path: Path) -> tuple[list[Joint], tuple[FloatArray, FloatArray]]:
-    """Every joint, and the corners of the box around the base, of the robot with its base frame at the origin."""
+    """List the joints, and the corners of the box around the base, of the robot with its base at the origin."""
     bullet, client = physics.bullet, physics.client
     with quiet():
         flags = bullet.URDF_USE_INERTIA_FROM_FILE
@@ -242,7 +242,7 @@ def _box(physics: PhysicsWorld, body: int, link: int, place: Any) -> tuple[Float
 
 
 def _find_wheels(joints: list[Joint], named: str | None, path: Path) -> tuple[tuple[Wheel, ...], float]:
-    """The driven wheels and the direction in which they roll [rad]."""
+    """Find the driven wheels and the direction in which they roll [rad]."""
     by_name = {joint.name: joint for joint in joints}
     if named is not None:
         names = [name.strip() for name in named.split(",") if name.strip()]
@@ -294,7 +294,7 @@ def _find_wheels(joints: list[Joint], named: str | None, path: Path) -> tuple[tu
 
 
 def _above(joint: Joint, joints: list[Joint]) -> list[Joint]:
-    """The joints between a link and the base that can turn."""
+    """List the joints between a link and the base that can turn."""
     found, parent = [], joint.parent
     while parent >= 0:
         above = joints[parent]
@@ -305,7 +305,7 @@ def _above(joint: Joint, joints: list[Joint]) -> list[Joint]:
 
 
 def _calibrated(model: RobotModel, robot: RobotConfig, path: Path) -> tuple[RobotModel, RobotConfig]:
-    """Model and limits by which the robot drives as it is told: wheel radius, track, and accelerations that do not tip.
+    """Calibrate wheel radius, track and accelerations so that the robot drives as it is told and does not tip.
 
     Raises:
         InvalidInputError: It does not get on, does not turn or tips, however gently it is driven.
@@ -326,7 +326,7 @@ def _calibrated(model: RobotModel, robot: RobotConfig, path: Path) -> tuple[Robo
 
 @dataclass(frozen=True, slots=True)
 class _Trial:
-    """How a robot drove: shares of the way and the turn that its wheels counted, and the largest tilt [rad]."""
+    """How a robot drove: shares of the distance and the turn that its wheels counted, and the largest tilt [rad]."""
 
     ahead: float
     turned: float
@@ -362,7 +362,7 @@ def _ignore(_: Motion) -> None:
 def _lidar_mount(
     joints: list[Joint], middle: FloatArray, heading: float, floor: float
 ) -> tuple[float, float, float, float] | None:
-    """Where the lidar sits, ``(x, y, theta)`` in the robot frame, and its height [m]; ``None`` where no link says."""
+    """Find the lidar, ``(x, y, theta)`` in the robot frame, and its height [m]; ``None`` where no link says."""
     for word in LIDAR_NAMES:
         for joint in joints:
             if word in joint.link.lower():

@@ -88,7 +88,7 @@ class Simulation:
             self._lidar = Lidar(self.config.lidar, self.config.noise, physics, self._seed)
             self._time = 0.0
             self._rolls = self.config.lidar.sweep == "rolling"
-            self._way = np.array([[0.0, start.x, start.y, start.theta]])
+            self._path = np.array([[0.0, start.x, start.y, start.theta]])
             self.physics = physics
             self._stack = stack.pop_all()
         return self
@@ -150,13 +150,13 @@ class Simulation:
         return Observation(whole, faults.odometry(odometry, self._time), sightings if whole is scan else (), bumps)
 
     def _odometry_noise(self) -> NoiseConfig:
-        """The noise with what unequal wheels add: a curve where the wheels turn alike."""
+        """Add to the noise what unequal wheels do: a curve where the wheels turn alike."""
         noise, unequal = self.config.noise, self.config.faults.unequal_wheels
         track = TRACK_SHARE * self.config.robot.radius if self._model is None else self._model.track
         return replace(noise, bias_turn_per_metre=noise.bias_turn_per_metre + unequal / track)
 
     def _let_in(self, physics: PhysicsWorld) -> list[Person | MovedBox]:
-        """People and boxes, none at the robot's start."""
+        """Let in people and boxes, none at the robot's start."""
         config, start, building = self.config, self.world_T_map, self._building
         if not config.people + config.clutter:
             return []
@@ -172,21 +172,21 @@ class Simulation:
         return movers
 
     def _beam_poses(self) -> FloatArray | None:
-        """Where the robot was at each beam of a rolling sweep, shape (beams, 3), building frame."""
+        """Interpolate the robot's pose at each beam of a rolling sweep, shape (beams, 3), building frame."""
         if not self._rolls:
             return None
-        stamps, poses = self._way[:, 0], self._way[:, 1:]
+        stamps, poses = self._path[:, 0], self._path[:, 1:]
         when = self._lidar.beam_stamps(self._time)
         return np.column_stack([np.interp(when, stamps, axis) for axis in poses.T])
 
-    def _note_way(self) -> None:
-        """Remember the last sweep's way, heading unwrapped."""
+    def _note_path(self) -> None:
+        """Remember the path since the last sweep, heading unwrapped."""
         drive = self._drive
         row = np.array([[self._time, drive.x, drive.y, drive.theta]])
-        way = np.concatenate((self._way, row))
+        path = np.concatenate((self._path, row))
         # One row from before the sweep's first beam must stay.
-        first = int(np.searchsorted(way[:, 0], self._time - self.period, side="right")) - 1
-        self._way = way[max(first, 0) :]
+        first = int(np.searchsorted(path[:, 0], self._time - self.period, side="right")) - 1
+        self._path = path[max(first, 0) :]
 
     def true_ranges(self, world_T_robot: Pose2) -> FloatArray:
         """Measure without noise from anywhere, shape (beams,) [m], infinity without a return."""
@@ -218,13 +218,13 @@ class Simulation:
                 mover.advance(part, drive.x, drive.y, drive.config.radius)
             self._time += part
             if self._rolls:
-                self._note_way()
+                self._note_path()
         if end - self._time > 1e-9:
             drive.advance(v, w, end - self._time, self._odometry.add)
         self._time = end
 
     def open_door(self, door_id: str) -> None:
-        """Let a closed door open while time passes; it waits for a robot that stands in its way.
+        """Let a closed door open while time passes; it waits for a robot that blocks it.
 
         Raises:
             InvalidInputError: No such door.
@@ -232,11 +232,11 @@ class Simulation:
         self._building.open_door(door_id)
 
     def door_states(self) -> dict[str, float]:
-        """Tell how far each door between rooms is open: 0 closed, 1 as far as the plan allows."""
+        """Look up how far each door between rooms is open: 0 closed, 1 as far as the plan allows."""
         return {name: door.opening for name, door in self._building.doors.items()}
 
     def door_leaves(self, door_id: str) -> list[Polygon]:
-        """Tell where the leaves of a door are now, building frame [m]."""
+        """Outline the leaves of a door as they stand now, building frame [m]."""
         door = self._building.doors[door_id]
         return [Polygon(corners) for corners in door.corners()]
 

@@ -57,7 +57,7 @@ class WheeledRobot:
             v: Commanded speed [m/s]; the limits are applied.
             w: Commanded turn rate [rad/s]; the limits are applied.
             duration: Time [s]; what is no whole step is done next time.
-            sink: Takes every piece of the way as the wheels' encoders count it, in order.
+            sink: Takes every motion as the wheels' encoders count it, in order.
         """
         limits = self.config
         v = min(max(v, -limits.max_speed), limits.max_speed)
@@ -82,14 +82,14 @@ class WheeledRobot:
         return math.acos(max(-1.0, min(1.0, 1.0 - 2.0 * (q[0] ** 2 + q[1] ** 2))))
 
     def _enough_torque(self) -> float:
-        """Torque of each motor with which the wheels rather slip than stall [Nm]."""
+        """Compute the torque of each motor with which the wheels rather slip than stall [Nm]."""
         bullet, client = self._physics.bullet, self._physics.client
         links = range(-1, bullet.getNumJoints(self._body, physicsClientId=client))
         mass: float = sum(bullet.getDynamicsInfo(self._body, link, physicsClientId=client)[0] for link in links)
         return 2.0 * mass * GRAVITY * self.model.wheel_radius / len(self._joints)
 
     def _command(self, v: float, w: float) -> None:
-        """One step of the ramp; the motors are told when it changes anything."""
+        """Take one step of the ramp; the motors are told when it changes anything."""
         limits = self.config
         self.v = towards(self.v, v, limits.max_acceleration / STEPS)
         self.w = towards(self.w, w, limits.max_turn_acceleration / STEPS)
@@ -110,12 +110,12 @@ class WheeledRobot:
         )
 
     def _read_wheels(self) -> Sequence[float]:
-        """Encoder angle of each wheel, forwards [rad]."""
+        """Read the encoder angle of each wheel, forwards [rad]."""
         states = self._physics.bullet.getJointStates(self._body, self._joints, physicsClientId=self._physics.client)
         return [wheel.sign * state[0] for state, (_, wheel) in zip(states, self._wheels, strict=True)]
 
     def _count_wheels(self) -> Motion:
-        """The way since the last reading, by the encoders alone."""
+        """Compute the motion since the last reading, by the encoders alone."""
         before, self._angles = self._angles, self._read_wheels()
         rolled = {1: 0.0, -1: 0.0}
         for old, new, (_, wheel) in zip(before, self._angles, self._wheels, strict=True):

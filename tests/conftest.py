@@ -1,20 +1,24 @@
-"""What all tests share: settings of hypothesis, and a little world of wall segments with an exact raycaster.
+"""What all tests share: settings of hypothesis, a world of wall segments, a plan, and somebody else's method.
 
-With it the mapper and navigation are tested without the simulator.
+With the segments, which have an exact raycaster, the mapper and navigation are tested without the simulator.
 """
 
-from collections.abc import Callable
+import textwrap
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import settings
+from shapely.geometry import box as area_of
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
 from closedrooms.core.scan import LaserScan
+from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom, Wall
 
 # Properties hold on a busy machine too: an example that takes long is no failure.
 settings.register_profile("closedrooms", deadline=None)
@@ -27,7 +31,7 @@ def box(x0: float, y0: float, x1: float, y1: float) -> list[tuple[float, float, 
 
 @dataclass
 class Drive:
-    """A driven way: scans, odometry ``(n, 3)`` and true poses ``(n, 3)`` in the frame of the first one."""
+    """A drive: scans, odometry ``(n, 3)`` and true poses ``(n, 3)`` in the frame of the first one."""
 
     scans: list[LaserScan]
     odometry: FloatArray
@@ -82,7 +86,7 @@ class SegmentWorld:
         *,
         step: float = 0.08,
         turn: float = 0.12,
-        way_noise: float = 0.0,
+        distance_noise: float = 0.0,
         turn_noise: float = 0.0,
         bias: float = 0.0,
         seed: int = 0,
@@ -90,7 +94,7 @@ class SegmentWorld:
     ) -> Drive:
         """Drive from corner to corner, turning on the spot.
 
-        ``way_noise`` [m] and ``turn_noise`` [rad] are standard deviations after 1 m (variance linear in the way);
+        ``distance_noise`` [m] and ``turn_noise`` [rad] are standard deviations after 1 m (the variance is linear);
         ``bias`` [rad] turns the odometry by so much per metre.
         """
         rng = stream(seed, "drive")
@@ -111,12 +115,12 @@ class SegmentWorld:
             pose = Pose2(x, y, theta)
             delta = before.inverse() @ pose
             before = pose
-            way = float(np.hypot(delta.x, delta.y))
-            root = np.sqrt(way)
+            distance = float(np.hypot(delta.x, delta.y))
+            root = np.sqrt(distance)
             odom = odom @ Pose2(
-                delta.x + rng.normal(0, way_noise * root) if way else 0.0,
-                delta.y + rng.normal(0, way_noise * root) if way else 0.0,
-                delta.theta + rng.normal(0, turn_noise * root + 0.3 * turn_noise * abs(delta.theta)) + bias * way,
+                delta.x + rng.normal(0, distance_noise * root) if distance else 0.0,
+                delta.y + rng.normal(0, distance_noise * root) if distance else 0.0,
+                delta.theta + rng.normal(0, turn_noise * root + 0.3 * turn_noise * abs(delta.theta)) + bias * distance,
             )
             odometry.append(odom.as_tuple())
             truth.append((start @ pose).as_tuple())
@@ -150,3 +154,80 @@ def ring() -> SegmentWorld:
 @pytest.fixture
 def segment_world() -> Callable[[list[tuple[float, float, float, float]]], SegmentWorld]:
     return SegmentWorld
+
+
+@pytest.fixture
+def three_rooms() -> Callable[..., FloorPlan]:
+    """Makes a corridor of 12 x 2 m below three rooms of 4 x 3 m; the second also has a door to the third.
+
+    r0 is the corridor, d0 (0.9 m) leads to r1, d1 (0.9 m) to r2, the opening o0 (1.5 m) to r3, d2 from r2 to r3; inner
+    walls have 0.2 m.
+    """
+
+    def made(name: str, *, outer_walls: float, d2: float) -> FloorPlan:
+        outer = [((0, 0), (12, 0)), ((12, 0), (12, 5)), ((0, 5), (12, 5)), ((0, 0), (0, 5))]
+        inner = [((0, 2), (12, 2)), ((4, 2), (4, 5)), ((8, 2), (8, 5))]
+        thick = [*((segment, outer_walls) for segment in outer), *((segment, 0.2) for segment in inner)]
+        return FloorPlan(
+            name=name,
+            rooms=(
+                PlanRoom("r0", "corridor", area_of(0, 0, 12, 2)),
+                PlanRoom("r1", "office", area_of(0, 2, 4, 5)),
+                PlanRoom("r2", "office", area_of(4, 2, 8, 5)),
+                PlanRoom("r3", "office", area_of(8, 2, 12, 5)),
+            ),
+            walls=tuple(Wall(f"w{i}", segment, thickness) for i, (segment, thickness) in enumerate(thick)),
+            doors=(
+                PlanDoor("d0", ((1.5, 2.0), (2.4, 2.0)), ("r0", "r1"), opens_into="r1"),
+                PlanDoor("d1", ((5.5, 2.0), (6.4, 2.0)), ("r0", "r2"), opens_into="r2"),
+                PlanDoor("d2", ((8.0, 3.0), (8.0, 3.0 + d2)), ("r2", "r3"), opens_into="r2"),
+            ),
+            openings=(Opening("o0", ((9.0, 2.0), (10.5, 2.0)), ("r0", "r3")),),
+            start=(3.0, 1.0, 0.0),
+        )
+
+    return made
+
+
+ROUND_METHOD = """
+    from dataclasses import dataclass
+
+    from closedrooms.core.room import Room
+    from closedrooms.predictor.methods import Method
+    from closedrooms.predictor.prediction import Prediction
+    from shapely.geometry import Point
+
+
+    @dataclass(frozen=True, kw_only=True)
+    class RoundConfig:
+        radius: float = 2.0
+
+
+    def predict_round(grid, doors, config):
+        rooms = tuple(Room(Point(door.midpoint).buffer(config.radius), (door.id,)) for door in doors)
+        return Prediction(grid, rooms)
+
+
+    METHOD = Method("round", "a disc behind every door", RoundConfig, predict_round, disjoint=False)
+    NOTHING = 3
+    """
+
+
+@pytest.fixture
+def install_round(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
+    """Installs a package beside us that brings the method ``round``, and what else its entry points name."""
+    from closedrooms.predictor import methods
+
+    def install(module: str, **names: str) -> None:
+        folder = tmp_path / "site"
+        metadata = folder / f"{module}-1.0.dist-info"
+        metadata.mkdir(parents=True)
+        (folder / f"{module}.py").write_text(textwrap.dedent(ROUND_METHOD))
+        (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module.replace('_', '-')}\nVersion: 1.0\n")
+        entries = [f"{name} = {module}:{value}" for name, value in {"round": "METHOD", **names}.items()]
+        (metadata / "entry_points.txt").write_text("\n".join(["[closedrooms.methods]", *entries, ""]))
+        monkeypatch.syspath_prepend(folder)
+        methods._entries.cache_clear()
+
+    yield install
+    methods._entries.cache_clear()

@@ -1,6 +1,8 @@
 """The page of ``closedrooms edit``: doors marked on a map in a browser, rooms predicted at once.
 
-What a person does (:mod:`~closedrooms.web.document`), where a door goes (:mod:`~closedrooms.web.snapping`), what is
-kept (:mod:`~closedrooms.web.drafts`) and who may look (:mod:`~closedrooms.web.gate`) know nothing of a browser. NiceGUI
-is imported by what draws: ``page``, ``map_board``, ``map_layers``, ``door_list``, ``settings_dialog``, ``prompts``.
+- Without a browser: ``sheet`` is the map, ``session`` a visitor at work on it, ``document`` what they do, ``snapping``
+  where a door goes, ``drafts`` what is kept, ``gate`` who may look, ``settings_form`` the settings as rows,
+  ``pictures`` encode a map.
+- Drawn with NiceGUI: ``server`` opens the ``page``, made of ``map_board``, ``map_layers``, ``door_list``,
+  ``settings_dialog`` and ``prompts``.
 """

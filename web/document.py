@@ -175,7 +175,7 @@ def as_saved(doors: Sequence[ClosedDoor]) -> tuple[ClosedDoor, ...]:
 
 
 def as_segment(door: ClosedDoor) -> Segment:
-    """Return the jambs of a door; of a bare point a line of its width along x."""
+    """Compute the jambs of a door; of a bare point, a line of its width along x."""
     return door.segment or _around(door.midpoint, 0.0, door.width or USUAL_WIDTH)
 
 
@@ -193,7 +193,7 @@ def _rounded(door: ClosedDoor) -> ClosedDoor:
 
 
 def _drawn(name: str, segment: Segment, width: float | None) -> ClosedDoor:
-    """A door from jamb to jamb.
+    """Place a door from jamb to jamb.
 
     Raises:
         InvalidInputError: Too far away, too narrow or too wide.

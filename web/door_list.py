@@ -84,7 +84,7 @@ class DoorList:
                 self._numbers(door)
 
     def _numbers(self, door: ClosedDoor) -> None:
-        """Width and direction of the selected door, to type."""
+        """Draw width and direction of the selected door, to type."""
         name = door.id
         (x0, y0), (x1, y1) = as_segment(door)
         with ui.row().classes("no-wrap gap-2"):
@@ -104,7 +104,7 @@ class DoorList:
         return lambda: self._session.change(lambda document: document.turned(name, angle))
 
     def _behind(self, door: ClosedDoor) -> str:
-        """What is known of the room behind a door."""
+        """Describe what is known of the room behind a door."""
         outcome = self._session.outcome
         if outcome is None or self._session.stale:
             return "..."
@@ -126,7 +126,7 @@ def _aimed(document: Document, name: str, degrees: float) -> Document:
 
 
 def describe(room: Room) -> str:
-    """Return a room in one line: its area, its kind, how sure the prediction is where the method says so."""
+    """Describe a room in one line: area, kind, and how sure the prediction is where the method says so."""
     parts = [f"{room.polygon.area:.1f} m²", room.kind or ""]
     confidence = getattr(room, "confidence", None)
     if confidence is not None:

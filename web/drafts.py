@@ -106,7 +106,7 @@ class Drafts:
 
 
 def state_folder() -> Path:
-    """``closedrooms`` in the folder where programs of this user keep their state (XDG Base Directory Specification)."""
+    """Find the folder where this user's programs keep their state (XDG Base Directory Specification)."""
     given = os.environ.get("XDG_STATE_HOME", "")
     # A relative path counts as none (the specification).
     base = Path(given) if given and Path(given).is_absolute() else Path.home() / ".local" / "state"
@@ -114,7 +114,7 @@ def state_folder() -> Path:
 
 
 def _places(value: Any) -> frozenset[tuple[float, float]]:
-    """Points of a file; what is none is left out: a dismissed proposal comes back then."""
+    """Read the points of a file; what is none is left out: a dismissed proposal comes back then."""
     found = value if isinstance(value, list) else []
     return frozenset(
         (float(place[0]), float(place[1]))

@@ -60,7 +60,7 @@ class Gate:
         await self._app(scope, receive, answer)
 
     def _from_here(self, scope: Scope) -> bool:
-        """Whether the address and, where a page asks, that page's own are this server's (no DNS rebinding)."""
+        """Check that the address and, where a page asks, that page's own are this server's (no DNS rebinding)."""
         headers = dict(scope["headers"])
         origin = headers.get(b"origin", b"").decode("latin-1")
         return headers.get(b"host", b"").decode("latin-1") in self._hosts and (

@@ -180,7 +180,7 @@ class MapBoard:
 
 
 def css(colour: Colour) -> str:
-    """Return a colour as style sheets write it."""
+    """Write a colour as style sheets do."""
     return "#{:02x}{:02x}{:02x}".format(*colour)
 
 

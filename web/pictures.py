@@ -13,7 +13,7 @@ LONGEST = 4096
 
 
 def map_url(grid: OccupancyGrid) -> str:
-    """Return a map in grey as the address of a PNG that holds its own bytes; large maps are made coarser."""
+    """Encode a map in grey as the address of a PNG that holds its own bytes; large maps are made coarser."""
     values = np.arange(256).astype(np.uint8).view(np.int8)
     shades = np.full(256, UNKNOWN, dtype=np.uint8)
     shades[is_free(values)] = FREE

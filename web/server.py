@@ -71,7 +71,7 @@ class Desk:
 
 
 def _server(config: EditConfig, token: str, port: int) -> Any:
-    """The web server with the page behind its gate."""
+    """Set up the web server with the page behind its gate."""
     import uvicorn
     from fastapi import FastAPI
     from nicegui import ui
@@ -95,7 +95,7 @@ def _server(config: EditConfig, token: str, port: int) -> Any:
 
 @contextmanager
 def _listening(port: int) -> Iterator[socket.socket]:
-    """A socket on this machine alone.
+    """Open a socket on this machine alone.
 
     Raises:
         OutputError: The port is taken or not allowed.

@@ -14,7 +14,7 @@ from closedrooms.core.names import file_name
 from closedrooms.core.report import Report
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.pipeline.config import PredictConfig
-from closedrooms.pipeline.edit import Outcome, plan_tour, predict_rooms, save_rooms
+from closedrooms.pipeline.edit import EditedPrediction, plan_edited_tour, predict_rooms, save_rooms
 from closedrooms.predictor.structure.door_proposals import DoorProposal
 from closedrooms.web.config import EditConfig
 from closedrooms.web.document import USUAL_WIDTH, Document, History, as_saved, as_segment
@@ -49,7 +49,7 @@ class EditSession:
             self.trouble = str(error)
         self._history = History(Document(config.method, config.predictor, as_saved(doors)))
         self.selected: str | None = None
-        self.outcome: Outcome | None = None
+        self.outcome: EditedPrediction | None = None
         self._predicted: Document | None = None
 
     # What stands
@@ -86,7 +86,7 @@ class EditSession:
         ]
 
     def segment(self, door: ClosedDoor) -> Segment:
-        """Return the jambs of a door in the frame of the grid [m]."""
+        """Look up the jambs of a door in the frame of the grid [m]."""
         a, b = as_segment(door)
         return (self.sheet.point_on_grid(a), self.sheet.point_on_grid(b))
 
@@ -194,7 +194,7 @@ class EditSession:
 
     # What comes of it
 
-    def predict(self) -> Outcome:
+    def predict(self) -> EditedPrediction:
         """Predict the rooms of the document as it stands; may run on another thread than the page's."""
         document = self.document
         outcome = predict_rooms(self.sheet.read, document.doors, document.method, document.settings)
@@ -206,7 +206,7 @@ class EditSession:
         outcome, document = self.outcome, self._predicted
         if outcome is None or outcome.prediction is None or document is None:
             return "no tour: no prediction"
-        return plan_tour(outcome.prediction, document.method, self.config.coverage)
+        return plan_edited_tour(outcome.prediction, document.method, self.config.coverage)
 
     @property
     def out(self) -> Path:
@@ -235,7 +235,7 @@ class EditSession:
         return report
 
     def draft(self) -> Draft | None:
-        """Tell what this visitor left unsaved at their last visit, where it is not what the page shows anyway.
+        """Read what this visitor left unsaved at their last visit, where it is not what the page shows anyway.
 
         Raises:
             ClosedroomsError: It cannot be read any more.

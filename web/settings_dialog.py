@@ -51,7 +51,7 @@ def _field(row: SettingRow) -> Any:
 
 
 def _changed(document: Document, rows: list[SettingRow], fields: dict[str, Any]) -> Document:
-    """The document with what the form says.
+    """Change the document to what the form says.
 
     Raises:
         InvalidInputError: A value that the settings refuse.

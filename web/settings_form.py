@@ -97,7 +97,7 @@ def _rows(settings: Any, standard: Any, group: str) -> Iterator[SettingRow]:
 
 
 def _without_none(hint: Any) -> tuple[Any, bool]:
-    """A type without its ``None``, and whether it had one."""
+    """Split ``None`` off a type; says whether it had one."""
     if get_origin(hint) not in {Union, types.UnionType}:
         return hint, False
     rest = [part for part in get_args(hint) if part is not type(None)]
@@ -105,7 +105,7 @@ def _without_none(hint: Any) -> tuple[Any, bool]:
 
 
 def _checked(row: SettingRow, value: Any) -> Any:
-    """A value as its field takes it.
+    """Convert a value to what its field takes.
 
     Raises:
         InvalidInputError: It is of another kind.
@@ -127,7 +127,7 @@ def _checked(row: SettingRow, value: Any) -> Any:
 
 @functools.cache
 def _docstrings(owner: Hashable) -> dict[str, str]:
-    """The text below each field of a class and of those that it inherits from; none where there is no source."""
+    """Read the text below each field of a class and of those that it inherits from; none without a source."""
     texts: dict[str, str] = {}
     for base in reversed(inspect.getmro(cast("type[Any]", owner))[:-1]):
         try:

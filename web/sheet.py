@@ -29,15 +29,15 @@ class MapSheet:
     proposals: tuple[DoorProposal, ...]
 
     def point_on_map(self, point: Point) -> Point:
-        """Return a point of the grid's frame in the map frame [m]."""
+        """Transform a point of the grid's frame to the map frame [m]."""
         return _moved(point, self.read.map_T_grid)
 
     def point_on_grid(self, point: Point) -> Point:
-        """Return a point of the map frame in the grid's frame [m]."""
+        """Transform a point of the map frame to the grid's frame [m]."""
         return _moved(point, self.read.map_T_grid.inverse())
 
     def segment_on_map(self, segment: Segment) -> Segment:
-        """Return a segment of the grid's frame in the map frame [m]."""
+        """Transform a segment of the grid's frame to the map frame [m]."""
         return (self.point_on_map(segment[0]), self.point_on_map(segment[1]))
 
     @property

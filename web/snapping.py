@@ -69,14 +69,14 @@ class WallSnapper:
         near = np.array(self._tree.query_ball_point(point, reach), dtype=np.int64)
         if not near.size:
             return None
-        ways = self._outward(near)
+        outward = self._outward(near)
         # What few cells near here face is the jamb of a door, or noise, and no wall.
-        alike = (ways @ ways.T > math.cos(ALIKE)).sum(axis=1)
+        alike = (outward @ outward.T > math.cos(ALIKE)).sum(axis=1)
         wall = alike >= LEAST_SHARE * alike.max()
-        near, ways = near[wall], ways[wall]
+        near, outward = near[wall], outward[wall]
         distances = np.hypot(*(self._points[near] - point).T)
-        chosen = int(np.lexsort((near, distances, ~self._hidden(near, ways)))[0])
-        inward, face = -ways[chosen], self._points[near[chosen]]
+        chosen = int(np.lexsort((near, distances, ~self._hidden(near, outward)))[0])
+        inward, face = -outward[chosen], self._points[near[chosen]]
         foot = np.array(point) + inward * float((face - point) @ inward)
         doorway = self._doorway(foot, inward, width)
         along = np.array([inward[1], -inward[0]])
@@ -88,9 +88,9 @@ class WallSnapper:
             return Snapped(_segment(leaf, along, -doorway_width / 2, doorway_width / 2), False)
         return Snapped(_segment(leaf, along, doorway.left, doorway.right), True)
 
-    def _hidden(self, faces: IntArray, ways: FloatArray) -> BoolArray:
-        """Which faces have unknown cells behind them, at most of the depths; outside the map all is unknown."""
-        behind = self._points[faces, None, :] - np.array(DEPTHS)[None, :, None] * ways[:, None, :]
+    def _hidden(self, faces: IntArray, outward: FloatArray) -> BoolArray:
+        """Mark faces with unknown cells behind them, at most of the depths; outside the map all is unknown."""
+        behind = self._points[faces, None, :] - np.array(DEPTHS)[None, :, None] * outward[:, None, :]
         cells = self._grid.frame.to_cells(behind)
         inside = self._grid.frame.contains(cells)
         unknown = ~inside
@@ -98,22 +98,22 @@ class WallSnapper:
         return np.asarray(2 * unknown.sum(axis=1) > len(DEPTHS))
 
     def _outward(self, faces: IntArray) -> FloatArray:
-        """Unit vectors to the free side of faces, across a wall direction where one is like what the cells show."""
+        """Compute unit vectors to the free side of faces, across a wall direction where one is like what cells show."""
         angles = self._angles[faces]
         if self._directions:
-            both = np.array([way + turn for way in self._directions for turn in (0.0, math.pi)])
+            both = np.array([angle + turn for angle in self._directions for turn in (0.0, math.pi)])
             turns = np.mod(both[None, :] - angles[:, None] + math.pi, math.tau) - math.pi
             nearest = np.abs(turns).argmin(axis=1)
             angles = np.where(np.abs(turns).min(axis=1) < ALIKE, both[nearest], angles)
         return np.stack((np.cos(angles), np.sin(angles)), axis=-1)
 
     def _doorway(self, foot: FloatArray, inward: FloatArray, width: float) -> Doorway | None:
-        """The opening at a point of a face or beside it; one that is flush where no jamb shows."""
+        """Find the opening at a point of a face or beside it; one that is flush where no jamb shows."""
         along = np.array([inward[1], -inward[0]])
         places = [foot + aside * along for aside in ASIDE]
         doors = [FacingDoor(ClosedDoor("new", (float(x), float(y))), inward) for x, y in places]
         found = find_doorways(self._grid, doors, width=width)
-        recessed = [way for way in found if way is not None and way.leaf > way.face]
+        recessed = [doorway for doorway in found if doorway is not None and doorway.leaf > doorway.face]
         return recessed[0] if recessed else found[0]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from shapely.geometry import Point as PointShape
 
 from closedrooms.core.door import Point, Segment
-from closedrooms.worlds.geometry import LEAF_THICKNESS, WallLines, distance_along
+from closedrooms.worlds.geometry import LEAF_THICKNESS, WallAxes, distance_along
 from closedrooms.worlds.plan import FloorPlan, PlanDoor
 
 # Passages this close to a wall's centre line are in it [m].
@@ -38,8 +38,8 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True)
-class Leaf:
-    """One leaf of a door, closed, and how it moves.
+class BoxLeaf:
+    """One leaf of a door as a box, closed, and how it moves.
 
     Attributes:
         box: The closed leaf.
@@ -58,7 +58,7 @@ def _box(a: Point, b: Point, thickness: float) -> Box:
 
 
 def wall_boxes(plan: FloorPlan) -> list[Box]:
-    """Return the walls between their gaps; at corners both walls reach to the other's face."""
+    """Cut the walls into boxes between their gaps; at corners both walls reach to the other's face."""
     meeting: defaultdict[tuple[int, int], list[float]] = defaultdict(list)
     for wall in plan.walls:
         for end in wall.segment:
@@ -110,12 +110,12 @@ def _between(gaps: Sequence[tuple[float, float]], length: float) -> list[tuple[f
     return pieces
 
 
-def door_leaves(plan: FloorPlan, door: PlanDoor) -> list[Leaf]:
-    """Return the leaves of a door: one, or two of half the width for a double door."""
-    thickness = min(LEAF_THICKNESS, WallLines(plan).thickness(door.segment) or LEAF_THICKNESS)
+def box_leaves(plan: FloorPlan, door: PlanDoor) -> list[BoxLeaf]:
+    """Make the closed leaves of a door: one, or two of half the width for a double door."""
+    thickness = min(LEAF_THICKNESS, WallAxes(plan).thickness(door.segment) or LEAF_THICKNESS)
     first, second = door.segment
     if door.kind == "sliding":
-        return [Leaf(_box(first, second, thickness), None, 1)]
+        return [BoxLeaf(_box(first, second, thickness), None, 1)]
     side = _side(plan, door)
     middle = door.midpoint
     if door.kind == "double":
@@ -123,7 +123,7 @@ def door_leaves(plan: FloorPlan, door: PlanDoor) -> list[Leaf]:
     else:
         ends = [(first, second) if door.hinge == 0 else (second, first)]
     # A leaf that leaves its hinge along the segment opens counter-clockwise to the segment's left.
-    return [Leaf(_box(hinge, edge, thickness), hinge, side if hinge == first else -side) for hinge, edge in ends]
+    return [BoxLeaf(_box(hinge, edge, thickness), hinge, side if hinge == first else -side) for hinge, edge in ends]
 
 
 def _side(plan: FloorPlan, door: PlanDoor) -> int:
@@ -139,8 +139,8 @@ def _side(plan: FloorPlan, door: PlanDoor) -> int:
     return 1 if left <= right else -1
 
 
-def opened(leaf: Leaf, angle: float = math.pi / 2) -> Box:
-    """Tell where a leaf stands when it is open: turned by ``angle`` [rad], or slid aside by its length."""
+def open_leaf(leaf: BoxLeaf, angle: float = math.pi / 2) -> Box:
+    """Place an open leaf: turned by ``angle`` [rad], or slid aside by its length."""
     box = leaf.box
     if leaf.hinge is None:
         step = leaf.turn * box.length

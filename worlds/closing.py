@@ -15,7 +15,7 @@ DRAWS = 32
 
 
 def closable_rooms(plan: FloorPlan, *, several_doors: bool = False) -> dict[str, tuple[str, ...]]:
-    """Return the rooms that may be closed, with their doors, in plan order.
+    """List the rooms that may be closed, with their doors, in plan order.
 
     A room may be closed when it has no opening without a door, lies in the start's connected part, and closing all
     its doors cuts nothing else off. Doors to the outside are not counted: the building itself stays shut.
@@ -85,7 +85,7 @@ def _draw(plan: FloorPlan, closable: dict[str, tuple[str, ...]], rng: np.random.
 
 
 def check_closed(plan: FloorPlan, door_ids: Iterable[str]) -> tuple[str, ...]:
-    """Return the doors in plan order, once it is sure that they hide whole rooms and nothing else.
+    """Check that doors hide whole rooms and nothing else; returns them in plan order.
 
     Raises:
         InvalidInputError: An unknown door, one to the outside, a room that stays open through another passage, the
@@ -124,7 +124,7 @@ def _example(plan: FloorPlan) -> str:
 
 
 def hidden_rooms(plan: FloorPlan, closed: Collection[str]) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
-    """Parts of the start's connected building that closed doors hide: ``(room ids, closed door ids)`` each."""
+    """List what closed doors hide of the start's connected building: ``(room ids, closed door ids)`` each."""
     start = start_room(plan)
     hidden = _reached(plan, start, ()) - _reached(plan, start, closed)
     parts = []

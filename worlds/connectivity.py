@@ -7,7 +7,7 @@ Sides = tuple[str | None, str | None]
 
 
 def connected_parts(names: Sequence[str], sides: Iterable[Sides]) -> list[set[str]]:
-    """Return the sets of rooms that passages connect, in the order of their first rooms.
+    """Group rooms that passages connect, in the order of their first rooms.
 
     Args:
         names: Ids of all rooms.

@@ -9,12 +9,12 @@ from closedrooms.worlds.start_pose import CIRCULATION
 
 
 def is_circulation(label: str) -> bool:
-    """Tell whether people walk through rooms of this label rather than into them."""
+    """Check whether people walk through rooms of this label rather than into them."""
     return any(word in label.lower() for word in CIRCULATION)
 
 
 def hung(doors: Sequence[PlanDoor], openings: Sequence[Opening], rooms: Sequence[PlanRoom]) -> tuple[PlanDoor, ...]:
-    """Return the doors swung into the room that they close.
+    """Hang doors so that they swing into the room that they close.
 
     That is the room with fewer passages; between equals the one that is no circulation, then the smaller one.
     """
@@ -34,7 +34,7 @@ def hung(doors: Sequence[PlanDoor], openings: Sequence[Opening], rooms: Sequence
 
 
 def without_entrances(plan: FloorPlan) -> FloorPlan:
-    """Return the plan with its doors and openings to the outside walled up, each named in ``meta["sealed"]``.
+    """Wall up a plan's doors and openings to the outside, each named in ``meta["sealed"]``.
 
     A robot that maps a floor must not leave it.
     """

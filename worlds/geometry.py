@@ -29,7 +29,7 @@ MITRE_LIMIT = 4.0
 
 
 def wall_area(plan: FloorPlan) -> Polygon | MultiPolygon:
-    """Return every wall as a solid, minus the gaps of doors and openings, building frame [m].
+    """Unite all walls, minus the gaps of doors and openings, building frame [m].
 
     Doors and openings to the outside of the plan (a side that is ``None``) are cut out too.
     """
@@ -37,13 +37,13 @@ def wall_area(plan: FloorPlan) -> Polygon | MultiPolygon:
     passages = plan.passages
     if not passages:
         return walls
-    lines = WallLines(plan)
+    lines = WallAxes(plan)
     gaps = shapely.union_all([lines.gap(passage.segment) for passage in passages])
     return _without_twins(shapely.difference(walls, gaps))
 
 
 def solid_walls(walls: Sequence[Wall]) -> Polygon | MultiPolygon:
-    """Walls as one solid without any gap; outer corners are mitred, free ends are flat."""
+    """Unite walls without any gap; outer corners are mitred, free ends are flat."""
     if not walls:
         return MultiPolygon()
     segments = np.array([wall.segment for wall in walls], dtype=np.float64)
@@ -58,7 +58,7 @@ def _without_twins(area: BaseGeometry) -> Polygon | MultiPolygon:
 
 
 def rectangles(segments: FloatArray, halves: FloatArray) -> FloatArray:
-    """Corners, shape (n, 4, 2), of the strips of half width ``halves`` (n,) around ``segments`` (n, 2, 2)."""
+    """Compute corners (n, 4, 2) of the strips of half width ``halves`` (n,) around ``segments`` (n, 2, 2)."""
     along = segments[:, 1] - segments[:, 0]
     length = np.linalg.norm(along, axis=1, keepdims=True)
     normal = np.column_stack((-along[:, 1], along[:, 0])) / np.where(length > 0.0, length, 1.0)
@@ -98,7 +98,7 @@ def _mitre(node: FloatArray, a1: float, h1: float, a2: float, h2: float) -> Base
     return Polygon(corners).convex_hull
 
 
-class WallLines:
+class WallAxes:
     """Centre lines of a plan's walls, to look up the wall under a door."""
 
     def __init__(self, plan: FloorPlan) -> None:
@@ -107,7 +107,7 @@ class WallLines:
         self._tree = STRtree(np.asarray(shapely.linestrings(self._segments))) if len(plan.walls) else None
 
     def thickness(self, segment: Segment) -> float | None:
-        """Thickness [m] of the wall along ``segment``, the thickest where several lie there; ``None`` without one."""
+        """Look up the thickness [m] of the wall along ``segment``, the thickest of several; ``None`` without one."""
         if self._tree is None:
             return None
         (x0, y0), (x1, y1) = segment
@@ -120,32 +120,32 @@ class WallLines:
         return float(self._thickness[parallel].max()) if parallel.size else None
 
     def gap(self, segment: Segment) -> Polygon:
-        """Return the piece of wall that a passage along ``segment`` takes away, slightly deeper than the wall."""
+        """Outline what a passage along ``segment`` takes away of its wall, slightly deeper than the wall."""
         thickness = self.thickness(segment)
         half = (thickness if thickness is not None else BARE_GAP) / 2 + GAP_MARGIN
         return Polygon(rectangles(np.array([segment], dtype=np.float64), np.array([half]))[0])
 
 
 def wall_thickness_at(plan: FloorPlan, door: PlanDoor | Opening) -> float:
-    """Thickness [m] of the wall that ``door`` stands in; that of a bare gap where there is no wall."""
-    thickness = WallLines(plan).thickness(door.segment)
+    """Look up the thickness [m] of the wall that ``door`` stands in; of a bare gap where there is no wall."""
+    thickness = WallAxes(plan).thickness(door.segment)
     return BARE_GAP if thickness is None else thickness
 
 
 def door_leaf(plan: FloorPlan, door: PlanDoor) -> Polygon:
-    """Return the closed leaf: from jamb to jamb on the wall's centre line, never thicker than the wall."""
+    """Outline the closed leaf: from jamb to jamb on the wall's centre line, never thicker than the wall."""
     half = min(LEAF_THICKNESS, wall_thickness_at(plan, door)) / 2
     return Polygon(rectangles(np.array([door.segment], dtype=np.float64), np.array([half]))[0])
 
 
 def door_gap(plan: FloorPlan, door: PlanDoor | Opening) -> Polygon:
-    """Return the volume of wall that a door or opening takes away, from wall face to wall face."""
+    """Outline what a door or opening takes away of its wall, from wall face to wall face."""
     half = wall_thickness_at(plan, door) / 2
     return Polygon(rectangles(np.array([door.segment], dtype=np.float64), np.array([half]))[0])
 
 
 def room_interior(plan: FloorPlan, room_id: str) -> Polygon:
-    """Return the free floor of one room, wall face to wall face, building frame [m]; doorways are not part of it.
+    """Outline the free floor of one room, wall face to wall face, building frame [m], without doorways.
 
     Raises:
         KeyError: No such room.
@@ -154,7 +154,7 @@ def room_interior(plan: FloorPlan, room_id: str) -> Polygon:
 
 
 def room_interiors(plan: FloorPlan, room_ids: Sequence[str]) -> dict[str, Polygon]:
-    """Return the free floors of several rooms, by id; see :func:`room_interior`."""
+    """Outline the free floors of several rooms, by id; see :func:`room_interior`."""
     rooms = {room.id: room for room in plan.rooms}
     segments = np.array([wall.segment for wall in plan.walls], dtype=np.float64).reshape(-1, 2, 2)
     tree = STRtree(np.asarray(shapely.linestrings(segments)))
@@ -175,14 +175,14 @@ def _interior(room: PlanRoom, walls: Sequence[Wall]) -> Polygon:
 
 
 def areal(geometry: BaseGeometry) -> Polygon | MultiPolygon:
-    """Return the polygons of any geometry, without points, lines and slivers below 1e-6 square metres."""
+    """Keep the polygons of any geometry, without points, lines and slivers below 1e-6 square metres."""
     found = [p for g in shapely.get_parts(geometry) for p in shapely.get_parts(g)]
     parts = [p for p in found if isinstance(p, Polygon) and p.area > 1e-6]
     return parts[0] if len(parts) == 1 else MultiPolygon(parts)
 
 
 def distance_along(line: Segment, point: Point) -> float:
-    """Tell how far along ``line`` the foot of ``point`` lies [m], from the line's first end."""
+    """Measure how far along ``line`` the foot of ``point`` lies [m], from the line's first end."""
     (x0, y0), (x1, y1) = line
     length = math.hypot(x1 - x0, y1 - y0)
     return ((point[0] - x0) * (x1 - x0) + (point[1] - y0) * (y1 - y0)) / length

@@ -42,7 +42,7 @@ class Importer:
 
 
 def bundled_names() -> list[str]:
-    """Names of the bundled worlds, sorted."""
+    """List the names of the bundled worlds, sorted."""
     return sorted(path.stem for path in PLANS.glob("*.json"))
 
 
@@ -68,7 +68,7 @@ def load_world(name_or_path: str, *, level: str | None = None) -> "FloorPlan":
 
 
 def read_world(name_or_path: str, *, level: str | None = None) -> "FloorPlan":
-    """As :func:`load_world`, entrances included."""
+    """Read a world as :func:`load_world`, entrances included."""
     from closedrooms.worlds.formats.native import read_plan
 
     if name_or_path in bundled_names():
@@ -107,7 +107,7 @@ def _is_file_name(given: str) -> bool:
 
 
 def distinct_names(plans: Sequence["FloorPlan"], sources: Sequence[str]) -> list[str]:
-    """Return a name for each plan, its own where no other plan has it.
+    """Name each plan: its own name where no other plan has it.
 
     Plans of one name are told apart by the folders of their files, as few of them as it takes, and by a number where
     that is not enough; the order of the plans does not matter for the former.
@@ -138,7 +138,7 @@ def _refuse_level(level: str | None, where: str | Path) -> None:
 
 
 def importer_of(path: Path) -> Importer:
-    """Return the importer that recognises the content of a file.
+    """Find the importer that recognises the content of a file.
 
     Raises:
         InvalidInputError: It cannot be read, or no importer knows it.
@@ -153,7 +153,7 @@ def importer_of(path: Path) -> Importer:
 
 
 def importers() -> list[Importer]:
-    """Return every importer, the more specific ones first."""
+    """List every importer, the more specific ones first."""
     from closedrooms.worlds.formats.houseexpo import read_houseexpo
     from closedrooms.worlds.formats.kth import read_kth
     from closedrooms.worlds.formats.luperto import read_luperto

@@ -12,18 +12,18 @@ from closedrooms.core.door import Segment
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.geometry import areal, wall_area
 from closedrooms.worlds.plan import FloorPlan, Wall
-from closedrooms.worlds.wall_assembly import joined
+from closedrooms.worlds.wall_assembly import join_segments
 
 # The smallest robot that must not get out [m].
 RADIUS = 0.15
 # Rooms closer together than this face each other and not the outside [m].
 FACING = 0.6
-# Pieces of outline shorter than this are no way out [m].
+# Pieces of outline shorter than this let nobody out [m].
 SHORTEST = 0.01
 
 
 def leaks(plan: FloorPlan, radius: float = RADIUS) -> bool:
-    """Tell whether a disc of ``radius`` [m] gets from a room to the outside, every door open."""
+    """Check whether a disc of ``radius`` [m] gets from a room to the outside, every door open."""
     walls = wall_area(plan)
     rooms = shapely.union_all([room.polygon for room in plan.rooms])
     x_min, y_min, x_max, y_max = shapely.total_bounds([walls, rooms])
@@ -37,7 +37,7 @@ def leaks(plan: FloorPlan, radius: float = RADIUS) -> bool:
 
 
 def without_leaks(plan: FloorPlan) -> FloorPlan:
-    """Return the plan with walls where its outline has none and a robot would get out; said in ``remarks``.
+    """Wall up a plan where its outline has no wall and a robot would get out; said in ``remarks``.
 
     Args:
         plan: Without doors and openings to the outside.
@@ -51,7 +51,7 @@ def without_leaks(plan: FloorPlan) -> FloorPlan:
     for line in shapely.get_parts(bare):
         points = [(round(x, 4), round(y, 4)) for x, y in shapely.get_coordinates(line).tolist()]
         segments += [(a, b) for a, b in itertools.pairwise(points) if a != b]
-    runs = [run for run in joined(segments) if math.dist(*run) >= SHORTEST]
+    runs = [run for run in join_segments(segments) if math.dist(*run) >= SHORTEST]
     if not runs:
         return plan
     thickness = round(float(np.median([wall.thickness for wall in plan.walls])), 4)

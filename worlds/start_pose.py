@@ -21,7 +21,7 @@ CLEARANCE = 0.3
 
 
 def start_room(plan: FloorPlan) -> str:
-    """Id of the room that the robot starts in: that of ``plan.start``, else the main room.
+    """Find the id of the room that the robot starts in: that of ``plan.start``, else the main room.
 
     Raises:
         InvalidInputError: ``plan.start`` lies in no room, or the robot fits into none.
@@ -39,7 +39,7 @@ def start_room(plan: FloorPlan) -> str:
 
 
 def start_pose(plan: FloorPlan) -> Pose2:
-    """``world_T_robot`` at the start: ``plan.start``, or the widest place of the main room.
+    """Find ``world_T_robot`` at the start: ``plan.start``, or the widest place of the main room.
 
     The main room is the one with most passages of those in the largest connected part that the robot fits into;
     between equals a circulation room by its label, then the larger one. The heading is along its longer side.

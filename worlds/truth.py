@@ -13,7 +13,7 @@ from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyG
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.worlds.closing import hidden_rooms
-from closedrooms.worlds.geometry import LEAF_THICKNESS, WallLines, areal, rectangles, room_interiors, wall_area
+from closedrooms.worlds.geometry import LEAF_THICKNESS, WallAxes, areal, rectangles, room_interiors, wall_area
 from closedrooms.worlds.plan import FloorPlan
 
 
@@ -28,7 +28,7 @@ def rasterise(plan: FloorPlan, frame: GridFrame, map_T_world: Pose2) -> Occupanc
         frame: Of the result, in the map frame.
         map_T_world: Building frame to map frame.
     """
-    lines = WallLines(plan)
+    lines = WallAxes(plan)
     gaps = [lines.gap(p.segment) for p in plan.passages if None not in p.rooms]
     cells = np.full(frame.shape, UNKNOWN, dtype=np.int8)
     cells[_fill([*(room.polygon for room in plan.rooms), *gaps], frame, map_T_world)] = FREE
@@ -70,7 +70,7 @@ def _oriented_rings(polygon: Polygon) -> list[np.ndarray]:
 
 
 def true_rooms(plan: FloorPlan, closed: Collection[str], map_T_world: Pose2) -> list[Room]:
-    """Return the closed rooms' true interiors in the map frame, wall face to wall face.
+    """Outline the closed rooms' true interiors in the map frame, wall face to wall face.
 
     Args:
         plan: In the building frame.
@@ -81,7 +81,7 @@ def true_rooms(plan: FloorPlan, closed: Collection[str], map_T_world: Pose2) -> 
         One room for each part of the building that only closed doors lead to, with their ids, in plan order. Rooms
         behind the same doors that are joined by open passages are one room.
     """
-    lines = WallLines(plan)
+    lines = WallAxes(plan)
     result = []
     for names, doors in hidden_rooms(plan, closed):
         areas: list[BaseGeometry] = list(room_interiors(plan, names).values())
@@ -100,7 +100,7 @@ def _moved(area: Polygon | MultiPolygon, map_T_world: Pose2) -> Polygon | MultiP
 def reachable(
     plan: FloorPlan, closed: Collection[str], frame: GridFrame, map_T_world: Pose2, start_world_xy: Point
 ) -> BoolArray:
-    """True free cells connected (by edges) to the start while ``closed`` doors are shut, shape ``frame.shape``.
+    """Mark true free cells connected (by edges) to the start while ``closed`` doors are shut, shape ``frame.shape``.
 
     A shut door blocks a band along its leaf that is at least one cell wide, so that nothing leaks past it.
     """
@@ -121,7 +121,7 @@ def reachable(
 
 
 def truth_bounds(plan: FloorPlan, map_T_world: Pose2) -> tuple[float, float, float, float]:
-    """``(x_min, y_min, x_max, y_max)`` [m] of walls and rooms in the map frame."""
+    """Bound walls and rooms in the map frame: ``(x_min, y_min, x_max, y_max)`` [m]."""
     areas = [wall_area(plan), *(room.polygon for room in plan.rooms)]
     points = map_T_world.transform(shapely.get_coordinates(areas))
     (x_min, y_min), (x_max, y_max) = points.min(axis=0), points.max(axis=0)

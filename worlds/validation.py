@@ -10,7 +10,7 @@ from shapely.strtree import STRtree
 
 from closedrooms.core.door import Segment
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.worlds.geometry import WallLines, wall_area
+from closedrooms.worlds.geometry import WallAxes, wall_area
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
 
 # Jambs lie on a wall's centre line within this [m].
@@ -119,14 +119,14 @@ def _check_passages(plan: FloorPlan, where: str) -> None:
 
 
 def passage_faults(plan: FloorPlan) -> dict[int, tuple[str, str]]:
-    """Tell what is wrong with doors and openings, and what was expected, by their number among ``plan.passages``.
+    """Find what is wrong with doors and openings, by their number among ``plan.passages``; says what was expected.
 
     Args:
         plan: Its rooms and walls are as they should be.
     """
     rooms = {room.id: room.polygon for room in plan.rooms}
     thickest = max((wall.thickness for wall in plan.walls), default=0.0)
-    lines = WallLines(plan)
+    lines = WallAxes(plan)
     on_wall = _on_walls(plan, [door.segment for door in plan.doors])
     seen: set[str] = set()
     faults: dict[int, tuple[str, str]] = {}
@@ -177,7 +177,7 @@ def _sides_fault(name: str, passage: PlanDoor | Opening, rooms: dict[str, Polygo
 
 
 def _place_fault(
-    name: str, passage: PlanDoor | Opening, rooms: dict[str, Polygon], thickest: float, lines: WallLines
+    name: str, passage: PlanDoor | Opening, rooms: dict[str, Polygon], thickest: float, lines: WallAxes
 ) -> tuple[str, str] | None:
     """A passage away from its rooms, or with one of them on the wrong side."""
     (x0, y0), (x1, y1) = passage.segment

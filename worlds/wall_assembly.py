@@ -22,8 +22,8 @@ STRAIGHT = 2e-3
 
 
 @dataclass(frozen=True, slots=True)
-class Edge:
-    """A straight piece of the boundary between two rooms, or of the outside (``rooms[1]`` is ``None``).
+class RoomEdge:
+    """A straight stretch of the border between two rooms, or to the outside (``rooms[1]`` is ``None``).
 
     Attributes:
         segment: Building frame [m].
@@ -39,18 +39,18 @@ class Edge:
         return math.dist(*self.segment)
 
     def point(self, along: float) -> Point:
-        """Return the point at ``along`` metres from the first end."""
+        """Interpolate the point at ``along`` metres from the first end."""
         (x0, y0), (x1, y1) = self.segment
         t = along / self.length
         return (x0 + t * (x1 - x0), y0 + t * (y1 - y0))
 
     def part(self, centre: float, width: float) -> Segment:
-        """Return the piece of ``width`` metres around ``centre`` metres from the first end."""
+        """Cut out ``width`` metres around ``centre`` metres from the first end."""
         return (self.point(centre - width / 2), self.point(centre + width / 2))
 
 
-def shared_edges(polygons: Sequence[Polygon]) -> list[Edge]:
-    """Return the straight edges of rooms that form a coverage (neighbours share their vertices).
+def shared_edges(polygons: Sequence[Polygon]) -> list[RoomEdge]:
+    """Find the straight edges of rooms that form a coverage (neighbours share their vertices).
 
     Returns:
         Each edge once, longest possible for its pair of rooms, in order of the pairs.
@@ -68,11 +68,11 @@ def shared_edges(polygons: Sequence[Polygon]) -> list[Edge]:
         if first != second:
             by_pair[first, second].append(segment)
     ordered = sorted(by_pair.items(), key=lambda item: (item[0][0], -1 if item[0][1] is None else item[0][1]))
-    return [Edge(segment, pair) for pair, segments in ordered for segment in joined(segments)]
+    return [RoomEdge(segment, pair) for pair, segments in ordered for segment in join_segments(segments)]
 
 
-def joined(segments: Iterable[Segment]) -> list[Segment]:
-    """Segments put together to straight runs as long as they go.
+def join_segments(segments: Iterable[Segment]) -> list[Segment]:
+    """Join segments to straight runs as long as they go.
 
     A run grows from piece to touching piece while all its points lie within :data:`STRAIGHT` of the line between its
     ends, so that slow bends are cut into several runs. Every piece is part of one run.
@@ -118,20 +118,22 @@ def _straight_run(points: Sequence[Point]) -> Segment | None:
     return (start, end) if aside <= STRAIGHT else None
 
 
-def walls_along(edges: Sequence[Edge], thickness: Callable[[Edge], float]) -> list[Wall]:
-    """Return one wall along each straight run of edges of one thickness; edges of thickness 0 carry no wall."""
+def walls_along(edges: Sequence[RoomEdge], thickness: Callable[[RoomEdge], float]) -> list[Wall]:
+    """Build one wall along each straight run of edges of one thickness; edges of thickness 0 carry none."""
     by_thickness: defaultdict[float, list[Segment]] = defaultdict(list)
     for edge in edges:
         value = thickness(edge)
         if value > 0.0:
             by_thickness[value].append(edge.segment)
-    runs = [(segment, value) for value in sorted(by_thickness) for segment in joined(by_thickness[value])]
+    runs = [(segment, value) for value in sorted(by_thickness) for segment in join_segments(by_thickness[value])]
     runs.sort()
     return [Wall(f"w{number:03d}", segment, value) for number, (segment, value) in enumerate(runs)]
 
 
-def free_spans(edge: Edge, edges: Sequence[Edge], taken: Iterable[Segment], margin: float) -> list[tuple[float, float]]:
-    """Stretches of an edge, in metres from its first end, where a door may stand.
+def free_spans(
+    edge: RoomEdge, edges: Sequence[RoomEdge], taken: Iterable[Segment], margin: float
+) -> list[tuple[float, float]]:
+    """List the stretches of an edge, in metres from its first end, where a door may stand.
 
     Args:
         edge: Of the wall.
@@ -160,7 +162,7 @@ def free_spans(edge: Edge, edges: Sequence[Edge], taken: Iterable[Segment], marg
     return spans
 
 
-def _coordinates(edge: Edge, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _coordinates(edge: RoomEdge, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """How far along an edge and how far from its line points, shape (..., 2), lie [m]."""
     start = np.array(edge.segment[0])
     direction = (np.array(edge.segment[1]) - start) / edge.length
@@ -170,7 +172,7 @@ def _coordinates(edge: Edge, points: FloatArray) -> tuple[FloatArray, FloatArray
 
 
 def coverage(polygons: Sequence[Polygon], *, gap: float = 0.0, snap: float = -1.0) -> list[Polygon]:
-    """Room outlines made to share their edges exactly: overlaps cut, gaps up to ``gap`` metres filled."""
+    """Make room outlines share their edges exactly: cut overlaps, fill gaps up to ``gap`` metres."""
     clean = shapely.coverage_clean  # type: ignore[attr-defined]  # since shapely 2.2; not in the stubs yet
     cleaned = clean(np.array(polygons, dtype=object), gap_width=gap, snapping_distance=snap)
     result = []
@@ -183,7 +185,7 @@ def coverage(polygons: Sequence[Polygon], *, gap: float = 0.0, snap: float = -1.
 def without_gaps(
     polygons: Sequence[Polygon], width: float, *, fixed: int = 0, branches: bool = True, touching: float = 0.0
 ) -> tuple[list[Polygon], list[Polygon]]:
-    """Rooms grown into the gaps and notches between them that are narrower than ``width`` metres.
+    """Grow rooms into the gaps and notches between them that are narrower than ``width`` metres.
 
     Args:
         polygons: Side by side.

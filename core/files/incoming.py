@@ -81,6 +81,8 @@ def opened(path: Path, what: str) -> Iterator[io.BufferedReader]:
             if not stat.S_ISREG(mode):
                 kind = next((name for is_kind, name in KINDS.items() if is_kind(mode)), "no regular file")
                 raise InvalidInputError(kind, expected=f"{what} in a regular file", where=path)
+            # Some files of the kernel call themselves regular and have nothing to give: an error here, ``None`` later.
+            os.pread(descriptor, 1, 0)
             file = os.fdopen(descriptor, "rb")
         except BaseException:
             os.close(descriptor)
@@ -173,7 +175,26 @@ def read_json(path: Path, *, what: str, max_bytes: int = MAX_TEXT) -> Any:
         InvalidInputError: Missing, unreadable, too large or not JSON; numbers that are not finite or of more than
             :data:`MAX_DIGITS` digits, texts that are no Unicode, values nested deeper than :data:`MAX_DEPTH`.
     """
-    text = read_text(path, what=what, max_bytes=max_bytes)
+    return _parsed(read_text(path, what=what, max_bytes=max_bytes), path, what)
+
+
+def parse_json(content: bytes, *, what: str, where: Path | str) -> Any:
+    """Parse untrusted JSON that was read from somewhere else than a file; see :func:`read_json`.
+
+    Args:
+        content: UTF-8.
+        what: What it should be, for the message.
+        where: What it was read from, for the message.
+
+    Raises:
+        InvalidInputError: See :func:`read_json`.
+    """
+    with reading(where, what):
+        text = content.decode("utf-8-sig")
+    return _parsed(text, where, what)
+
+
+def _parsed(text: str, path: Path | str, what: str) -> Any:
     try:
         value = json.loads(text, parse_constant=_refuse_constant, parse_int=_whole, parse_float=_finite)
     except (ValueError, RecursionError) as error:
@@ -186,7 +207,7 @@ def read_json(path: Path, *, what: str, max_bytes: int = MAX_TEXT) -> Any:
     return value
 
 
-def check_depth(value: Any, path: Path, what: str) -> None:
+def check_depth(value: Any, path: Path | str, what: str) -> None:
     """Make sure that lists and dictionaries are not nested deeper than :data:`MAX_DEPTH`.
 
     Raises:

@@ -12,12 +12,12 @@ SCHEMA = 1
 KEY = "schema"
 
 
-def check_schema(manifest: Mapping[str, Any], path: Path) -> None:
+def check_schema(manifest: Mapping[str, Any], path: Path | str) -> None:
     """Refuse the manifest of a newer closedrooms; one that names no version was written before there were any.
 
     Args:
         manifest: What ``run.json`` or ``manifest.json`` holds.
-        path: That file, for the message.
+        path: That file or its address, for the message.
 
     Raises:
         InvalidInputError: A newer version, or none that there can be.

@@ -9,8 +9,8 @@ from closedrooms.core.files.incoming import MAX_DEPTH, MAX_DIGITS, read_text, re
 
 MAX_BYTES = 20_000_000
 """Longest YAML that is read [bytes]: the largest public RMF building has under 2 MB."""
-MAX_NODES = 3_000_000
-"""Most values of one file."""
+MAX_NODES = 1_000_000
+"""Most values of one file: they take 4 s to look through."""
 MAX_ALIASED = 10_000
 """Most values that aliases may stand for, all together: honest writers repeat a few, bombs thousands of millions."""
 

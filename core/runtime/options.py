@@ -4,7 +4,7 @@ from closedrooms.core.errors import InvalidInputError
 
 
 def check_least(config: object, **least: int) -> None:
-    """Whole numbers that may not be smaller.
+    """Check that whole numbers are not smaller than they may be.
 
     Args:
         config: Options of a command.

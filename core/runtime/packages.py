@@ -19,6 +19,7 @@ BROUGHT_BY = {
     "gtsam": "'closedrooms[slam]'",
     "rosbags": "'closedrooms[bags]'",
     "nicegui": "'closedrooms[web]'",
+    "fsspec": "'closedrooms[s3]'",
 }
 
 
@@ -43,7 +44,7 @@ def require(*modules: str, by: str, instead: str = "") -> None:
 
 
 def missing_package(error: ModuleNotFoundError, *, by: str) -> MissingPackageError | None:
-    """Return the one line for a failed import, ``None`` where the module is none of :data:`BROUGHT_BY`.
+    """Explain a failed import in one line, ``None`` where the module is none of :data:`BROUGHT_BY`.
 
     Args:
         error: Of the import.

@@ -110,7 +110,7 @@ def _overlook(before: Callable[[Any], object]) -> Callable[[Any], object]:
 
 
 def leave_at_once(numbers: Sequence[int] = SIGNALS) -> None:
-    """From now on these signals end the process at once and quietly: its work is done, the interpreter shuts down."""
+    """Let these signals end the process at once and quietly: its work is done, the interpreter shuts down."""
     handle(numbers, lambda number, _: os._exit(128 + number))
 
 

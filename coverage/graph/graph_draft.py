@@ -77,7 +77,7 @@ class GraphDraft:
         return len(self.points) - 1
 
     def follow(self, chain: IntArray) -> int:
-        """Edges along a chain of cells, with bends where a straight one would cross an obstacle.
+        """Add edges along a chain of cells, with bends where a straight one would cross an obstacle.
 
         Walls decide at which cells of the chain it bends. Where a robot has to keep clear of something else between
         two of them, a doorpost or a table, the edge goes around it.
@@ -122,7 +122,7 @@ class GraphDraft:
         return vertex
 
     def finish(self, map_name: str | None = None) -> TopologicalGraph:
-        """Return the graph in the map frame."""
+        """Convert the draft to a graph in the map frame."""
         frame = self.space.frame
         origin, resolution = np.array([frame.origin_x, frame.origin_y]), frame.resolution
         return make_graph(

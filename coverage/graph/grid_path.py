@@ -93,7 +93,7 @@ def find_shortest_path(start: IntArray, goal: IntArray, cells: BoolArray) -> Int
 
 
 def pull_taut(path: IntArray, cells: BoolArray) -> list[int]:
-    """Indices of a path of cells, first and last included, between which straight segments stay on ``cells``.
+    """Choose the cells of a path, first and last included, between which straight segments stay on ``cells``.
 
     From each stop the farthest cell of the path that is in sight becomes the next, found in strides that double.
     """

@@ -31,7 +31,7 @@ def find_cells_between(a: FloatArray, b: FloatArray) -> IntArray:
 
 
 def is_clear(passable: BoolArray, a: npt.ArrayLike, b: npt.ArrayLike) -> bool:
-    """Tell whether all cells between two points (row, col; continuous cells) are passable and inside the grid."""
+    """Check whether all cells between two points (row, col; continuous cells) are passable and inside the grid."""
     cells = find_cells_between(np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64))
     rows, cols = cells[:, 0], cells[:, 1]
     if (cells < 0).any() or (rows >= passable.shape[0]).any() or (cols >= passable.shape[1]).any():
@@ -40,7 +40,7 @@ def is_clear(passable: BoolArray, a: npt.ArrayLike, b: npt.ArrayLike) -> bool:
 
 
 def split_where_blocked(chain: IntArray, passable: BoolArray, *, around: float = 0.0) -> list[int]:
-    """Indices of a chain, first and last included, between which straight segments cross no obstacle.
+    """Split a chain, ends included, where straight segments would cross an obstacle; returns indices.
 
     Where the segment between two ends is blocked, the cell of the chain farthest from it becomes a vertex, and both
     halves are asked again; a step from cell to neighbouring cell is never split. So it does where the segment takes

@@ -57,7 +57,7 @@ def find_reachable(free: BoolArray, radius: float) -> ReachableSpace:
 
 
 def part_where_labels_meet(mask: BoolArray, labels: IntArray) -> BoolArray:
-    """Return the cells of ``mask`` without those where two labels meet, so that no connected part holds two of them."""
+    """Cut ``mask`` where two labels meet, so that no connected part holds two of them."""
     parted = mask.copy()
     for here, there in (
         (np.s_[:-1, :], np.s_[1:, :]),

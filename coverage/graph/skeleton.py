@@ -32,7 +32,7 @@ class VoronoiGraph:
 
 
 def thin(mask: BoolArray) -> BoolArray:
-    """Return the skeleton of ``mask``, whose border is empty: one cell wide, same connectivity.
+    """Thin ``mask``, whose border is empty, to its skeleton: one cell wide, same connectivity.
 
     scikit-image's ``skeletonize``, as the paper. A part that thinning takes away whole keeps one cell.
     """
@@ -51,7 +51,7 @@ def thin(mask: BoolArray) -> BoolArray:
 
 @cache
 def load_skeletonize() -> Callable[[BoolArray], BoolArray]:
-    """scikit-image's ``skeletonize`` of two dimensions.
+    """Load scikit-image's ``skeletonize`` of two dimensions.
 
     Its package imports scipy.ndimage and scipy.spatial for functions beside it, a fifth of the CPU time of
     ``closedrooms cover``. The compiled function needs none of them, so its file is loaded by itself; where a version
@@ -77,7 +77,7 @@ def load_skeletonize() -> Callable[[BoolArray], BoolArray]:
 
 
 def trace_skeleton(skeleton: BoolArray) -> VoronoiGraph:
-    """Vertices where the skeleton ends or branches, and the chains of cells between them.
+    """Trace the vertices where the skeleton ends or branches, and the chains of cells between them.
 
     Neighbours of all cells are looked up at once; only the walk along the chains is a loop.
 

@@ -31,11 +31,11 @@ class _Branch:
     length: float
 
     def towards(self, vertex: int) -> IntArray:
-        """Return the chain, turned so that it ends at ``vertex``."""
+        """Turn the chain so that it ends at ``vertex``."""
         return self.chain if self.ends[1] == vertex else self.chain[::-1]
 
     def other(self, vertex: int) -> int:
-        """Return the vertex at the other end."""
+        """Look up the vertex at the other end."""
         return self.ends[0] if self.ends[1] == vertex else self.ends[1]
 
 

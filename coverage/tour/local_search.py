@@ -34,7 +34,7 @@ class LocalSearch:
         self._number(0, self.n - 1)
 
     def length(self) -> float:
-        """Length of the tour [m]."""
+        """Measure the tour [m]."""
         return sum(self.d[a][b] for a, b in zip(self.tour, self.tour[1:] + self.tour[:1], strict=True))
 
     def _number(self, first: int, last: int) -> None:
@@ -42,7 +42,7 @@ class LocalSearch:
             self.position[self.tour[position]] = position
 
     def improve(self, queue: list[int]) -> None:
-        """Moves that shorten the tour, beginning at the vertices of ``queue``, until none is left there."""
+        """Make moves that shorten the tour, beginning at the vertices of ``queue``, until none is left there."""
         queued = set(queue)
         while queue:
             vertex = queue.pop()
@@ -54,7 +54,7 @@ class LocalSearch:
                     queue.append(other)
 
     def improve_fully(self) -> None:
-        """Moves from everywhere, until none shortens the tour: where an edge is new, others may move to it."""
+        """Make moves from everywhere, until none shortens the tour: where an edge is new, others may move to it."""
         before, self.thorough = np.inf, True
         while self.length() < before - 1e-9:
             before = self.length()

@@ -6,7 +6,7 @@ from closedrooms.core.arrays import FloatArray, IntArray
 
 
 def find_lower_bound(distances: FloatArray, *, upper: float, steps: int) -> float:
-    """Largest weight of a minimum 1-tree over penalties that the subgradient method finds.
+    """Maximise the weight of a minimum 1-tree over the penalties of its vertices by the subgradient method.
 
     Step sizes after Held, Wolfe and Crowder, 1974: a share of the gap to ``upper`` over the squared norm of the
     degrees' surplus; the share is halved whenever the bound has stood still for a while.

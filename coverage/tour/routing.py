@@ -14,7 +14,7 @@ UNITS_PER_METRE = 10_000
 
 
 def find_christofides_tour(distances: FloatArray) -> list[int]:
-    """OR-Tools' Christofides tour from vertex 0, without any search after it.
+    """Find OR-Tools' Christofides tour from vertex 0, without any search after it.
 
     Args:
         distances: Symmetric, metres, shape (n, n).
@@ -31,7 +31,7 @@ def find_christofides_tour(distances: FloatArray) -> list[int]:
 def run_tabu_search(
     distances: FloatArray, *, solutions: int | None, convergence: int | None, seconds: float | None
 ) -> tuple[list[int], SearchStatus]:
-    """OR-Tools' Christofides tour, then its tabu search; the best tour met.
+    """Improve OR-Tools' Christofides tour by its tabu search; returns the best tour met.
 
     Args:
         distances: Symmetric, metres, shape (n, n).

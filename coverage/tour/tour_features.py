@@ -8,7 +8,7 @@ from closedrooms.coverage.tour.coverage_tour import CoverageTour
 
 
 def make_tour_features(tour: CoverageTour, map_name: str) -> list[Feature]:
-    """Vertices, edges, and the tour, each with ``map`` and ``type``.
+    """Make features of vertices, edges and the tour, each with ``map`` and ``type``.
 
     Args:
         tour: A tour.

@@ -1,13 +1,13 @@
 """Options of ``closedrooms dataset``."""
 
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Literal
 
 import tyro
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.runtime.options import check_least
+from closedrooms.experiments.places import Place, Url
 from closedrooms.experiments.scheduler_address import check_scheduler
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
@@ -15,6 +15,9 @@ from closedrooms.pipeline.config import NoiseName, named_sim
 from closedrooms.sim.config import SimConfig
 
 MapSource = Literal["erased", "simulated"]
+Format = Literal["folders", "shards"]
+# A shard is sent to an object store as a whole, and read into a viewer: Hugging Face asks for at most 5 GB.
+MOST_MB = 5000.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,8 +27,14 @@ class DatasetConfig:
     worlds: tyro.conf.Positional[tuple[str, ...]]
     """Names of bundled worlds or files that the importers read; ``all`` names the 20 bundled worlds."""
 
-    out: Path
-    """Folder to write; the same command again goes on where it stopped."""
+    out: Place
+    """Folder, or with shards an address that fsspec knows (``s3://bucket/folder``); the same command goes on there."""
+
+    format: Format = "folders"
+    """``folders``: nine files a sample; ``shards``: Parquet files of many samples each, for large datasets."""
+
+    shard_mb: float = 256.0
+    """Size of a shard, in MB: it ends with the sample that reaches it."""
 
     repetitions: int = 15
     """Orders in which the doors of a world are closed one after the other (paper, section 5: 15)."""
@@ -69,5 +78,14 @@ class DatasetConfig:
             raise InvalidInputError("no world", expected="names of bundled worlds, files, or all")
         if self.sim is None:
             object.__setattr__(self, "sim", named_sim(self.noise))
+        if isinstance(self.out, Url) and self.format == "folders":
+            raise InvalidInputError("--format folders at an address", expected="--format shards", where=self.out)
+        if self.format == "shards" and self.record:
+            raise InvalidInputError(
+                "--record with --format shards, whose bytes are repeatable (those of recordings are not)",
+                expected="--format folders",
+            )
+        if not 0 < self.shard_mb <= MOST_MB:
+            raise InvalidInputError(f"--shard-mb {self.shard_mb:g}", expected=f"above 0, at most {MOST_MB:g}")
         check_least(self, repetitions=1, max_closed=1, workers=1, seed=0)
         check_scheduler(self.scheduler)

@@ -1,14 +1,15 @@
 """``closedrooms dataset``: maps of many buildings with closed doors, and what is really behind them."""
 
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any, TextIO
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files.incoming import read_json
-from closedrooms.core.files.outgoing import MANIFEST, write_bytes, write_json
+from closedrooms.core.files.outgoing import MANIFEST, write_bytes
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.dataset.card import card
@@ -16,18 +17,28 @@ from closedrooms.experiments.dataset.checksums import check
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.layout import (
     CARD,
-    DATASET_MANIFEST,
+    Count,
     alone,
     claim,
-    description,
     file_sums,
     fingerprint,
     row,
+    write_manifest,
     write_metadata,
     write_sums,
 )
 from closedrooms.experiments.dataset.sample import Outcome, Task, make
-from closedrooms.experiments.dataset.variants import SPLITS, Variant, World, find_variants, find_worlds
+from closedrooms.experiments.dataset.sharded import finish, make_shards, shard_counts
+from closedrooms.experiments.dataset.variants import (
+    SPLITS,
+    Split,
+    World,
+    count_variants,
+    find_variants,
+    find_worlds,
+    in_order,
+)
+from closedrooms.experiments.places import Url
 from closedrooms.experiments.workers import Crew, Lost
 from closedrooms.pipeline.reporting.progress import Progress, Silent
 
@@ -47,19 +58,79 @@ def dataset(config: DatasetConfig, *, progress: Progress | None = None) -> Repor
     """
     progress = progress or Silent()
     require("pyarrow", by="closedrooms dataset")
-    config = replace(config, out=config.out.resolve())
+    if isinstance(config.out, Path):
+        config = replace(config, out=config.out.resolve())
+    _check_reach(config)
     progress.stage("worlds")
     worlds = find_worlds(config)
-    variants = [variant for world in worlds for variant in find_variants(world, config)]
     claim(config, worlds)
-    crew: Crew[Task, Outcome] = Crew(config.workers, config.scheduler, _needs(config), "closedrooms dataset")
     with alone(config.out):
-        failures = _surveys(config, worlds, crew, progress) if config.maps == "erased" else {}
-        tasks = [Task(config, v.world, v) for v in variants if v.world.name not in failures]
-        failed = {v.id: failures[v.world.name] for v in variants if v.world.name in failures}
-        failed |= {task.variant.id: reason for task, reason in _make(tasks, crew, progress, "samples") if task.variant}
-        progress.stage("tables")
-        return _finish(config, worlds, variants, failed)
+        if config.format == "shards":
+            shards = make_shards(config, worlds, progress, _needs(config))
+            progress.stage("tables")
+            failed, _ = finish(config, worlds, shards)
+            counts = shard_counts(shards)
+        else:
+            failed = _make_folders(config, worlds, progress)
+            progress.stage("tables")
+            counts = _finish(config, worlds, failed)
+        return _report(config, worlds, counts, failed)
+
+
+def _check_reach(config: DatasetConfig) -> None:
+    """Refuse an address that other processes do not see.
+
+    Raises:
+        InvalidInputError: ``memory://`` with workers.
+    """
+    alone_here = config.workers == 1 and config.scheduler is None
+    if isinstance(config.out, Url) and config.out.startswith("memory://") and not alone_here:
+        raise InvalidInputError("other processes do not see memory://", expected="--workers 1", where=config.out)
+
+
+def _report(
+    config: DatasetConfig, worlds: Sequence[World], counts: Mapping[Split, Count], failed: Mapping[str, str]
+) -> Report:
+    made, wanted = sum(count.samples for count in counts.values()), count_variants(worlds, config)
+    return Report(
+        folder=config.out,
+        title=f"{made} of {wanted} samples, {len(worlds)} worlds, {config.maps}, noise {config.noise}",
+        rows=[
+            ("split", "buildings", "samples", "MB"),
+            *((split, str(c.buildings), str(c.samples), f"{c.size / 1e6:.1f}") for split, c in counts.items()),
+        ],
+        failures=dict(sorted(failed.items())),
+        figures={
+            "fingerprint": fingerprint(config.out),
+            "splits": {
+                split: {"buildings": c.buildings, "samples": c.samples, "bytes": c.size} for split, c in counts.items()
+            },
+        },
+    )
+
+
+def _make_folders(config: DatasetConfig, worlds: Sequence[World], progress: Progress) -> dict[str, str]:
+    """Make what is missing of a dataset of folders; why samples failed, by id."""
+    crew: Crew[Task, Outcome] = Crew(config.workers, config.scheduler, _needs(config), "closedrooms dataset")
+    failures: dict[str, str] = {}
+    if config.maps == "erased":
+        surveys = (Task(config, world) for world in worlds)
+        failures = {task.world.name: why for task, why in _make(surveys, len(worlds), crew, progress, "surveys")}
+    variants = (
+        variant for split in SPLITS for world in in_order(worlds, split) for variant in find_variants(world, config)
+    )
+    failed: dict[str, str] = {}
+
+    def tasks() -> Iterator[Task]:
+        for variant in variants:
+            if variant.world.name in failures:
+                failed[variant.id] = failures[variant.world.name]
+            else:
+                yield Task(config, variant.world, variant)
+
+    total = count_variants(worlds, config)
+    made = _make(tasks(), total, crew, progress, "samples")
+    return failed | {task.variant.id: why for task, why in made if task.variant}
 
 
 def _needs(config: DatasetConfig) -> tuple[str, ...]:
@@ -67,26 +138,27 @@ def _needs(config: DatasetConfig) -> tuple[str, ...]:
     return ("pybullet", "mapbox_earcut", "skimage", *(("rerun",) if config.record else ()))
 
 
-def _surveys(
-    config: DatasetConfig, worlds: Sequence[World], crew: Crew[Task, Outcome], progress: Progress
-) -> dict[str, str]:
-    """Explore each building once; why it failed, by world."""
-    tasks = [Task(config, world) for world in worlds]
-    return {task.world.name: reason for task, reason in _make(tasks, crew, progress, "surveys")}
-
-
-def _make(tasks: Sequence[Task], crew: Crew[Task, Outcome], progress: Progress, stage: str) -> list[tuple[Task, str]]:
+def _make(
+    tasks: Iterable[Task], total: int, crew: Crew[Task, Outcome], progress: Progress, stage: str
+) -> list[tuple[Task, str]]:
     """Make what is not there yet; the tasks that failed, with the reason.
 
     Raises:
         InvalidInputError: Something there was changed since it was written.
         OutputError: Nothing can be written any more.
     """
-    progress.stage(stage, len(tasks))
-    missing = [task for task in tasks if not _there(task.folder)]
-    number, failed = len(tasks) - len(missing), []
-    progress.advance(number, f"{number} of {len(tasks)}")
-    for task, outcome in crew.do(make, missing):
+    progress.stage(stage, total)
+    number, failed = 0, []
+
+    def missing() -> Iterator[Task]:
+        nonlocal number
+        for task in tasks:
+            if _there(task.folder):
+                number += 1
+            else:
+                yield task
+
+    for task, outcome in crew.do(make, missing()):
         if isinstance(outcome, Lost):
             failed.append((task, outcome.reason))
         elif outcome.trouble:
@@ -94,7 +166,7 @@ def _make(tasks: Sequence[Task], crew: Crew[Task, Outcome], progress: Progress, 
         elif outcome.failure:
             failed.append((task, outcome.failure))
         number += 1
-        progress.advance(number, f"{number} of {len(tasks)}")
+        progress.advance(number, f"{number} of {total}")
     return failed
 
 
@@ -110,18 +182,16 @@ def _there(folder: Path) -> bool:
     return True
 
 
-def _finish(
-    config: DatasetConfig, worlds: Sequence[World], variants: Sequence[Variant], failed: dict[str, str]
-) -> Report:
-    """Write what stands at the root and in front of each split."""
+def _finish(config: DatasetConfig, worlds: Sequence[World], failed: Mapping[str, str]) -> dict[Split, Count]:
+    """Write what stands at the root and in front of each split of a dataset of folders."""
+    assert isinstance(config.out, Path), "folders are of this machine"
     out = config.out
-    made = sorted((v for v in variants if v.id not in failed), key=lambda v: v.id)
-    if not made:
+    if len(failed) == count_variants(worlds, config):
         raise InvalidInputError(
             f"no sample could be made ({next(iter(failed.values()), 'none was wanted')})",
             expected="at least one", where=out,
         )  # fmt: skip
-    counts: dict[str, tuple[int, int, int]] = {}
+    counts: dict[Split, Count] = {}
     # One run.json is in memory at a time: a million of them have 21 GB. What the tables and sums need goes to disk.
     with tempfile.TemporaryFile("w+", dir=out, prefix=".sums.") as sums:
         surveys = [Task(config, world).folder for world in worlds if config.maps == "erased"]
@@ -129,27 +199,15 @@ def _finish(
             _read(folder, out, sums)[1] for folder in sorted(surveys, key=lambda path: f"{path}/") if folder.exists()
         )
         for split in sorted(SPLITS):
-            own = [variant for variant in made if variant.world.split == split]
-            counts[split] = (len({v.world.name for v in own}), len(own), _write_table(out, split, own, sums))
-        size += sum(bytes_ for _, _, bytes_ in counts.values())
-        _write_root(config, worlds, variants, made, failed, size)
+            counts[split] = _write_table(config, in_order(worlds, split), failed, sums)
+        size += sum(count.size for count in counts.values())
+        made: dict[Split, int] = {split: count.samples for split, count in counts.items()}
+        write_bytes(out / CARD, card(config, worlds, made, failed, size).encode())
+        write_manifest(config, worlds, failed)
         sums.seek(0)
         parts = (line.rstrip("\n").partition("  ") for line in sums)
         write_sums(out, ((name, value) for value, _, name in parts))
-    splits = {split: counts[split] for split in SPLITS}
-    return Report(
-        folder=out,
-        title=f"{len(made)} of {len(variants)} samples, {len(worlds)} worlds, {config.maps}, noise {config.noise}",
-        rows=[
-            ("split", "buildings", "samples", "MB"),
-            *((split, str(b), str(s), f"{size / 1e6:.1f}") for split, (b, s, size) in splits.items()),
-        ],
-        failures=dict(sorted(failed.items())),
-        figures={
-            "fingerprint": fingerprint(out),
-            "splits": {split: {"buildings": b, "samples": s, "bytes": size} for split, (b, s, size) in splits.items()},
-        },
-    )
+    return {split: counts[split] for split in SPLITS}
 
 
 def _read(folder: Path, out: Path, sums: TextIO) -> tuple[dict[str, Any], int]:
@@ -160,44 +218,22 @@ def _read(folder: Path, out: Path, sums: TextIO) -> tuple[dict[str, Any], int]:
     return about, sum(path.stat().st_size for path in folder.iterdir())
 
 
-def _write_table(out: Path, split: str, made: Sequence[Variant], sums: TextIO) -> int:
-    """The table of a split; the bytes of its samples."""
-    sizes = 0
+def _write_table(config: DatasetConfig, worlds: Sequence[World], failed: Mapping[str, str], sums: TextIO) -> Count:
+    """The table of a split; what is in it."""
+    assert isinstance(config.out, Path), "folders are of this machine"
+    out, sizes, samples, buildings = config.out, 0, 0, set()
 
     def rows() -> Iterator[dict[str, Any]]:
-        nonlocal sizes
-        for variant in made:
-            about, size = _read(out / variant.id, out, sums)
-            sizes += size
-            yield row(variant, about)
+        nonlocal sizes, samples
+        for world in worlds:
+            for variant in find_variants(world, config):
+                if variant.id not in failed:
+                    about, size = _read(out / variant.id, out, sums)
+                    sizes, samples = sizes + size, samples + 1
+                    buildings.add(world.name)
+                    yield row(variant, about)
 
-    if made:
-        write_metadata(out / split, rows())
-    return sizes
-
-
-def _write_root(
-    config: DatasetConfig,
-    worlds: Sequence[World],
-    variants: Sequence[Variant],
-    made: Sequence[Variant],
-    failed: dict[str, str],
-    size: int,
-) -> None:
-    """The card and the manifest."""
-    out = config.out
-    write_bytes(out / CARD, card(config, worlds, made, failed, size).encode())
-    samples = [
-        {
-            "id": variant.id,
-            "split": variant.world.split,
-            "world": variant.world.name,
-            "repetition": variant.repetition,
-            "closed": list(variant.closed),
-            "status": "failed" if variant.id in failed else "ok",
-            "reason": failed.get(variant.id, ""),
-        }
-        for variant in sorted(variants, key=lambda v: v.id)
-    ]
-    manifest = {"command": "dataset", **description(config, worlds), "complete": True, "samples": samples}
-    write_json(out / DATASET_MANIFEST, manifest)
+    source = rows()
+    for first in source:
+        write_metadata(out / worlds[0].split, chain((first,), source))
+    return Count(len(buildings), samples, sizes)

@@ -5,19 +5,25 @@ import heapq
 import json
 import re
 import shutil
+import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError
-from closedrooms.core.files.incoming import read_json
+from closedrooms.core.files.incoming import parse_json
 from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, new_file, write_json
 from closedrooms.core.files.schema import KEY, SCHEMA, check_schema
 from closedrooms.experiments.dataset.checksums import digest
 from closedrooms.experiments.dataset.config import DatasetConfig
-from closedrooms.experiments.dataset.sample import FORMAT, NOT_CONTENT, SURVEYS
-from closedrooms.experiments.dataset.variants import SPLITS, Variant, World
+from closedrooms.experiments.dataset.sample import FORMAT, NOT_CONTENT
+from closedrooms.experiments.dataset.shard import DATA, PARTS
+from closedrooms.experiments.dataset.survey_store import SURVEYS
+from closedrooms.experiments.dataset.variants import SPLITS, Variant, World, find_variants, in_order
+from closedrooms.experiments.places import Url
+from closedrooms.experiments.stores import Store, file_digest, open_store, read_file, write_file
 from closedrooms.pipeline.reporting.manifest import resolved, versions
 
 DATASET_MANIFEST = "manifest.json"
@@ -27,35 +33,69 @@ METADATA = "metadata.parquet"
 LOCK = ".lock"
 # Rows of a split's table held and written at a time.
 ROWS = 10_000
-OURS = {DATASET_MANIFEST, CARD, SUMS, SURVEYS, LOCK, *SPLITS}
+OURS = {
+    "folders": {DATASET_MANIFEST, CARD, SUMS, SURVEYS, LOCK, *SPLITS},
+    "shards": {DATASET_MANIFEST, CARD, SUMS, SURVEYS, LOCK, DATA, PARTS},
+}
+OURS_OF_ANY = set().union(*OURS.values())
+# What the manifest names.
+NAMED = {"folders": "samples", "shards": "shards"}
 # Names of what is being written: folders by tempfile, files by process number.
 UNFINISHED = re.compile(r"\..+\.([A-Za-z0-9_]{8}\.(part|old)|([0-9a-f]{8}-)?\d+\.part|lock)")
 
 
+@dataclass(frozen=True, slots=True)
+class Count:
+    """What is in one split.
+
+    Attributes:
+        buildings: With a sample in it.
+        samples: That there are.
+        size: Their bytes.
+    """
+
+    buildings: int
+    samples: int
+    size: int
+
+
 def claim(config: DatasetConfig, worlds: Sequence[World]) -> None:
-    """Make the folder ours before the work, or make sure that it holds a part of this very dataset.
+    """Make the place ours before the work, or make sure that it holds a part of this very dataset.
 
     Raises:
         OutputError: It holds something that is not ours, or cannot be written.
         InvalidInputError: A dataset of another configuration, or of another version.
     """
-    folder, wanted = config.out, description(config, worlds)
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"the output is a file; expected a folder: {folder}")
-    if folder.is_dir() and any(folder.iterdir()):
-        strange = sorted(path.name for path in folder.iterdir() if path.name not in OURS and not _unfinished(path))
-        if strange or not (folder / DATASET_MANIFEST).is_file():
+    place, wanted = config.out, description(config, worlds)
+    begun = {"command": "dataset", **wanted, "complete": False, NAMED[config.format]: []}
+    if isinstance(place, Url):
+        store = open_store(place)
+        if DATASET_MANIFEST in store.names():
+            check_same(read_manifest(place), wanted, place)
+        elif store.names():
+            raise OutputError(
+                f"the output holds something else ({min(store.names())}); expected nothing or a dataset: {place}"
+            )
+        else:
+            write_file(store, DATASET_MANIFEST, json_bytes(begun))
+        return
+    if place.exists() and not place.is_dir():
+        raise OutputError(f"the output is a file; expected a folder: {place}")
+    if place.is_dir() and any(place.iterdir()):
+        ours = OURS[config.format]
+        strange = sorted(path.name for path in place.iterdir() if path.name not in ours and not _unfinished(path))
+        if not (place / DATASET_MANIFEST).is_file() or (strange and not set(strange) <= OURS_OF_ANY):
             what = strange[0] if strange else "no manifest.json"
             raise OutputError(
-                f"the output folder holds something else ({what}); expected an empty one or a dataset: {folder}"
+                f"the output folder holds something else ({what}); expected an empty one or a dataset: {place}"
             )
-        check_same(read_manifest(folder), wanted, folder)
+        check_same(read_manifest(place), wanted, place)
         return
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OutputError(f"cannot write ({error.strerror}): {folder}") from error
-    write_json(folder / DATASET_MANIFEST, {"command": "dataset", **wanted, "complete": False, "samples": []})
+        raise OutputError(f"cannot write ({error.strerror}): {place}") from error
+    write_json(place / DATASET_MANIFEST, begun)
 
 
 def _unfinished(path: Path) -> bool:
@@ -64,14 +104,19 @@ def _unfinished(path: Path) -> bool:
 
 
 @contextlib.contextmanager
-def alone(folder: Path) -> Iterator[None]:
+def alone(folder: Path | Url) -> Iterator[None]:
     """Work on a dataset as the only process, and without what killed ones left behind half-written.
+
+    An object store knows no locks, and shows nothing half-written: nothing is done for an address.
 
     Raises:
         OutputError: Another process works on it.
     """
     import fcntl
 
+    if isinstance(folder, Url):
+        yield
+        return
     try:
         with (folder / LOCK).open("w") as lock:
             try:
@@ -94,24 +139,38 @@ def _clear_unfinished(folder: Path) -> None:
             shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
-def read_manifest(folder: Path) -> dict[str, Any]:
+def read_manifest(place: Path | Url) -> dict[str, Any]:
     """Read the manifest of a dataset.
 
     Raises:
         InvalidInputError: No dataset, or one of another format.
     """
-    path = folder / DATASET_MANIFEST
-    manifest = read_json(path, what="a dataset's manifest.json")
+    store = open_store(place)
+    where, manifest = store.where(DATASET_MANIFEST), read_stored_json(store, DATASET_MANIFEST)
     if not isinstance(manifest, dict) or manifest.get("program") != PROGRAM:
-        raise InvalidInputError("not written by closedrooms", expected="a dataset's manifest.json", where=path)
-    check_schema(manifest, path)
+        raise InvalidInputError("not written by closedrooms", expected="a dataset's manifest.json", where=where)
+    check_schema(manifest, where)
     if manifest.get("format") != FORMAT:
         raise InvalidInputError(
             f"a dataset of format {manifest.get('format')!r}",
             expected=f"format {FORMAT}, which this version reads",
-            where=path,
+            where=where,
         )
     return manifest
+
+
+def read_stored_json(store: Store, name: str) -> Any:
+    """Parse a JSON file of a dataset.
+
+    Raises:
+        InvalidInputError: It cannot be read, or is no JSON.
+    """
+    return parse_json(read_file(store, name), what=f"a dataset's {name}", where=store.where(name))
+
+
+def json_bytes(value: Any) -> bytes:
+    """Return a value as the JSON that a dataset holds."""
+    return (json.dumps(value, indent=2, allow_nan=False) + "\n").encode()
 
 
 def description(config: DatasetConfig, worlds: Sequence[World]) -> dict[str, Any]:
@@ -123,6 +182,7 @@ def description(config: DatasetConfig, worlds: Sequence[World]) -> dict[str, Any
         "seed": config.seed,
         "repetitions": config.repetitions,
         "max_closed": config.max_closed,
+        **({"layout": "shards", "shard_mb": config.shard_mb} if config.format == "shards" else {}),
         "configuration": resolved(config, leave_out=NOT_CONTENT),
         "versions": versions(),
         "worlds": {
@@ -132,20 +192,49 @@ def description(config: DatasetConfig, worlds: Sequence[World]) -> dict[str, Any
     }
 
 
-def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path) -> None:
+def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], place: Path | Url) -> None:
     """Refuse to mix two datasets.
 
     Raises:
         InvalidInputError: Names the first entry that differs.
     """
     wanted = json.loads(json.dumps(wanted))
-    for key in wanted:
-        if found.get(key) != wanted[key]:
+    for key in ("layout", *wanted):
+        if found.get(key) != wanted.get(key):
             raise InvalidInputError(
                 f"the dataset there has other {key}",
                 expected="the command that began it, the same worlds and versions, or an empty folder",
-                where=folder,
+                where=place,
             )
+
+
+def write_manifest(config: DatasetConfig, worlds: Sequence[World], failed: Mapping[str, str]) -> None:
+    """Write the manifest of a dataset of folders, sample by sample: of a million of them it has 200 MB.
+
+    Raises:
+        OutputError: It cannot be written.
+    """
+    assert isinstance(config.out, Path), "folders are of this machine"
+    head = {"command": "dataset", **description(config, worlds), "complete": True, "samples": []}
+    empty = b"[]\n}\n"
+    with new_file(config.out / DATASET_MANIFEST) as file:
+        file.write(json_bytes(head).removesuffix(empty) + b"[")
+        between = b"\n"
+        for variant in (
+            v for split in sorted(SPLITS) for w in in_order(worlds, split) for v in find_variants(w, config)
+        ):
+            entry = {
+                "id": variant.id,
+                "split": variant.world.split,
+                "world": variant.world.name,
+                "repetition": variant.repetition,
+                "closed": list(variant.closed),
+                "status": "failed" if variant.id in failed else "ok",
+                "reason": failed.get(variant.id, ""),
+            }
+            file.write(between + textwrap.indent(json.dumps(entry, indent=2), "    ").encode())
+            between = b",\n"
+        file.write(b"\n  ]\n}\n")
 
 
 def row(variant: Variant, about: Mapping[str, Any]) -> dict[str, Any]:
@@ -227,6 +316,6 @@ def file_sums(folder: Path, name: str, about: Mapping[str, Any]) -> list[tuple[s
     return sorted((f"{name}/{file}", value) for file, value in sums.items())
 
 
-def fingerprint(folder: Path) -> str:
+def fingerprint(place: Path | Url) -> str:
     """SHA-256 of ``SHA256SUMS``: one line that says whether two datasets are equal."""
-    return digest(folder / SUMS)
+    return file_digest(open_store(place), SUMS)

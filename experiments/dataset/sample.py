@@ -1,7 +1,7 @@
 """One sample of a dataset: made, written, and described in one row."""
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,8 @@ from closedrooms.experiments.dataset.checksums import checksums
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.erase import Eraser
 from closedrooms.experiments.dataset.open_survey import survey_open
-from closedrooms.experiments.dataset.survey_store import read_survey, write_survey
+from closedrooms.experiments.dataset.shard import Shard
+from closedrooms.experiments.dataset.survey_store import SURVEYS, read_survey, survey_folder, write_survey
 from closedrooms.experiments.dataset.variants import Variant, World, noise_seed
 from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.logs.recorded_run import RecordedRun
@@ -42,9 +43,8 @@ if TYPE_CHECKING:
     from closedrooms.visualization.rerun.recorder import Recorder
 
 FORMAT = 1
-SURVEYS = "surveys"
 # What says nothing about a sample's content.
-NOT_CONTENT = ("out", "worlds", "workers", "scheduler", "repetitions", "max_closed")
+NOT_CONTENT = ("out", "worlds", "workers", "scheduler", "repetitions", "max_closed", "format", "shard_mb")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,8 @@ class Task:
 
     @property
     def folder(self) -> Path:
-        """Where it goes."""
+        """Where it goes in a dataset of folders."""
+        assert isinstance(self.config.out, Path), "folders are of this machine"
         if self.variant is None:
             return self.config.out / SURVEYS / self.world.name
         return self.config.out / self.variant.id
@@ -70,10 +71,14 @@ class Outcome:
     Attributes:
         failure: Why this one cannot be made; the others can.
         trouble: Why nothing can be written, e.g. a full disk; all work ends.
+        size: Bytes that were written, where they count.
+        shard: What is in the shard that was written, where it is one.
     """
 
     failure: str = ""
     trouble: str = ""
+    size: int = 0
+    shard: Shard | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,23 +98,41 @@ class Observed:
 
 
 def make(task: Task) -> Outcome:
-    """Make one survey or sample and write it; what goes wrong is told, a missing package raised."""
+    """Make one survey or sample as a folder; what goes wrong is told, a missing package raised."""
+    return guarded(lambda: make_folder(task, task.folder))
+
+
+def guarded(work: Callable[[], Outcome | None]) -> Outcome:
+    """Do work and tell what goes wrong; a missing package is raised."""
     try:
-        plan = _plan(task.world.source)
-        if task.variant is None:
-            config = task.config
-            seed = noise_seed(config, task.world)
-            survey = survey_open(plan, config.sim, config.mapper, config.navigation, seed)
-            write_survey(task.folder, survey, _about(task, seed))
-        else:
-            _make_sample(task, task.variant, plan)
+        return work() or Outcome()
     except OutputError as error:
         return Outcome(trouble=str(error))
     except ModuleNotFoundError:
         raise
     except Exception as error:
         return Outcome(failure=reason(error))
-    return Outcome()
+
+
+def make_folder(task: Task, folder: Path) -> None:
+    """Write one survey or sample.
+
+    Args:
+        task: What to make.
+        folder: Takes its place whole or not at all.
+
+    Raises:
+        OutputError: It cannot be written.
+        InvalidInputError: It cannot be made.
+    """
+    plan = _plan(task.world.source)
+    if task.variant is None:
+        config = task.config
+        seed = noise_seed(config, task.world)
+        survey = survey_open(plan, config.sim, config.mapper, config.navigation, seed)
+        write_survey(folder, survey, _about(task, seed))
+    else:
+        _make_sample(task, task.variant, plan, folder)
 
 
 def _about(task: Task, seed: int) -> dict[str, Any]:
@@ -124,7 +147,7 @@ def _about(task: Task, seed: int) -> dict[str, Any]:
     }
 
 
-def _make_sample(task: Task, variant: Variant, plan: FloorPlan) -> None:
+def _make_sample(task: Task, variant: Variant, plan: FloorPlan, folder: Path) -> None:
     config, world = task.config, task.world
     closed = tuple(door.id for door in plan.doors if door.id in variant.closed)
     erased = config.maps == "erased"
@@ -140,7 +163,7 @@ def _make_sample(task: Task, variant: Variant, plan: FloorPlan) -> None:
         "closed": list(closed),
     }
     with (
-        output_folder(task.folder, manifest) as staging,
+        output_folder(folder, manifest) as staging,
         open_recording(staging / "run.rrd" if config.record else None, config.sim.robot, name=variant.id) as recorder,
     ):
         recorder.configuration(manifest["configuration"])
@@ -197,8 +220,8 @@ def _erased(config: DatasetConfig, world: World, closed: Sequence[str]) -> Obser
 @functools.lru_cache(maxsize=1)
 def _eraser(config: DatasetConfig, world: World) -> Eraser:
     """A worker takes the samples of one world after the other: it reads the survey once."""
-    folder = Task(config, world).folder
-    return Eraser(read_survey(folder, _plan(world.source), config, noise_seed(config, world)))
+    with survey_folder(config, world) as folder:
+        return Eraser(read_survey(folder, _plan(world.source), config, noise_seed(config, world)))
 
 
 @functools.lru_cache(maxsize=2)

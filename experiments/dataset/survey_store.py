@@ -1,5 +1,8 @@
 """Surveys on disk: every worker draws its maps from the same file, also after a restart."""
 
+import contextlib
+import tempfile
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,13 +12,18 @@ from closedrooms.core.files.archives import read_arrays
 from closedrooms.core.files.incoming import read_json
 from closedrooms.core.files.outgoing import MANIFEST, output_folder
 from closedrooms.core.files.tum import read_trajectory, write_trajectory
-from closedrooms.experiments.dataset.checksums import checksums
+from closedrooms.experiments.dataset.checksums import check, checksums
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.open_survey import OpenSurvey
+from closedrooms.experiments.dataset.packing import SCANS, SURVEY, read_rows, unpack
+from closedrooms.experiments.dataset.variants import World
+from closedrooms.experiments.stores import open_store
 from closedrooms.mapping.logs.npz import read_scans, write_scans
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.plan import FloorPlan
+
+SURVEYS = "surveys"
 
 
 def write_survey(folder: Path, survey: OpenSurvey, about: dict[str, Any]) -> None:
@@ -70,3 +78,35 @@ def read_survey(folder: Path, plan: FloorPlan, config: DatasetConfig, seed: int)
     return OpenSurvey(
         plan, config.sim, config.mapper, seed, start, status, seconds, keyframes, poses, stamps, estimate, truth
     )
+
+
+def survey_name(world: World) -> str:
+    """Return the file of a survey in a dataset of shards."""
+    return f"{SURVEYS}/{world.name}.parquet"
+
+
+@contextlib.contextmanager
+def survey_folder(config: DatasetConfig, world: World) -> Iterator[Path]:
+    """Yield a folder with the files of a survey; of a dataset of shards they are unpacked and compared with their sums.
+
+    Raises:
+        InvalidInputError: Missing, broken, or changed since it was written.
+    """
+    if config.format == "folders":
+        assert isinstance(config.out, Path), "folders are of this machine"
+        yield config.out / SURVEYS / world.name
+        return
+    store, name = open_store(config.out), survey_name(world)
+    with tempfile.TemporaryDirectory(prefix="closedrooms-") as scratch:
+        with store.opened(name) as file:
+            rows = read_rows(file, store.where(name), columns=[*SURVEY, *SCANS])
+        if len(rows) != 1:
+            raise InvalidInputError(f"{len(rows)} rows", expected="one survey", where=store.where(name))
+        folder = Path(scratch)
+        unpack(rows[0], folder)
+        try:
+            check(folder)
+        except InvalidInputError as error:
+            where = store.where(name)
+            raise InvalidInputError("changed since it was written", expected="a survey", where=where) from error
+        yield folder

@@ -3,7 +3,7 @@
 import hashlib
 import re
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -101,22 +101,34 @@ def split_buildings(names: Sequence[str], seed: int) -> dict[str, Split]:
     return splits
 
 
-def find_variants(world: World, config: DatasetConfig) -> list[Variant]:
-    """Return every sample of a building: doors closed one after the other, in as many orders as there are repetitions.
+def find_variants(world: World, config: DatasetConfig) -> Iterator[Variant]:
+    """Yield every sample of a building in the order of their ids: doors closed one after the other, in several orders.
 
     A door closed among i stays closed among i + 1, and the first door differs between repetitions for as long as there
-    are doors (paper, section 5).
+    are doors (paper, section 5). No more than the samples of one order are held at a time.
     """
-    count = min(config.max_closed, len(world.closable))
+    most = min(config.max_closed, len(world.closable))
     firsts = stream(config.seed, "first door", world.name).permutation(len(world.closable))
-    variants = []
-    for repetition in range(config.repetitions):
+    for repetition in sorted(range(config.repetitions), key=lambda number: f"{number:02d}-"):
         first = int(firsts[repetition % len(firsts)])
         rng = stream(config.seed, "closed doors", world.name, str(repetition))
         others = [int(i) for i in rng.permutation(len(world.closable)) if i != first]
         order = [world.closable[i] for i in (first, *others)]
-        variants += [Variant(world, repetition, tuple(order[:n])) for n in range(1, count + 1)]
-    return variants
+        yield from sorted((Variant(world, repetition, tuple(order[:n])) for n in range(1, most + 1)), key=_id)
+
+
+def _id(variant: Variant) -> str:
+    return variant.id
+
+
+def count_variants(worlds: Sequence[World], config: DatasetConfig) -> int:
+    """Return how many samples some buildings have."""
+    return config.repetitions * sum(min(config.max_closed, len(world.closable)) for world in worlds)
+
+
+def in_order(worlds: Sequence[World], split: Split) -> list[World]:
+    """Return the buildings of a split in the order of their samples' ids."""
+    return sorted((world for world in worlds if world.split == split), key=lambda world: f"{world.name}/")
 
 
 def noise_seed(config: DatasetConfig, world: World, *variant: str) -> int:

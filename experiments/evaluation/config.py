@@ -8,7 +8,9 @@ import tyro
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.runtime.options import check_least
+from closedrooms.experiments.places import Place
 from closedrooms.experiments.scheduler_address import check_scheduler
+from closedrooms.pipeline.config import check_completions
 from closedrooms.predictor.methods import find_method
 
 COMPARED = ("paper", "best", "rose", "line-of-sight", "geometric")
@@ -23,9 +25,9 @@ def in_order(names: Iterable[str]) -> list[str]:
 class EvaluateConfig:
     """What is compared with what."""
 
-    datasets: tyro.conf.Positional[tuple[Path, ...]]
-    """Folders written by ``closedrooms dataset`` (with manifest.json); in any other, a sample is any folder below that
-    holds map.yaml, doors.geojson and truth.yaml."""
+    datasets: tyro.conf.Positional[tuple[Place, ...]]
+    """Folders that ``closedrooms dataset`` wrote (with manifest.json), or the address of shards; in any other folder, a
+    sample is any folder below that holds map.yaml, doors.geojson and truth.yaml."""
 
     out: Path
     """Folder to write; the same command again goes on where it stopped."""
@@ -44,6 +46,10 @@ class EvaluateConfig:
 
     probability: bool = False
     """Write each sample's probability of every cell too (``probability.yaml`` and ``.png``), about 20 kB a map."""
+
+    completions: int = 0
+    """Also tell the cost of coverage of every sample as a distribution, from so many completions drawn from what the
+    rooms may be, and how often the true cost lies in its interval. Needs no ``tours``."""
 
     worst: int = 12
     """Samples on the contact sheet of the worst cases."""
@@ -65,4 +71,5 @@ class EvaluateConfig:
         for name in self.methods:
             find_method(name)
         check_least(self, workers=1, resamples=1, subset_worlds=1, subset_repetitions=1)
+        check_completions(self.completions)
         check_scheduler(self.scheduler)

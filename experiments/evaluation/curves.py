@@ -140,6 +140,44 @@ def draw_reliability(path: Path, rows: Sequence[Row], methods: Sequence[str]) ->
     return True
 
 
+def draw_costs(path: Path, scores: Sequence[Row], methods: Sequence[str]) -> bool:
+    """Intervals of the cost of coverage by share of the true cost, from low to high, a panel a method.
+
+    Args:
+        path: The PNG.
+        scores: One entry a sample and method.
+        methods: Which to draw.
+
+    Returns:
+        Whether there was anything to draw.
+    """
+    if not methods:
+        return False
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.6 * len(methods), 4.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, len(methods), squeeze=False, sharey=True)[0]
+    for axes, method in zip(panels, methods, strict=True):
+        own = [s["completions"] for s in scores if s["method"] == method and s.get("completions", {}).get("truth_m")]
+        own.sort(key=lambda cost: cost["mean_m"] / cost["truth_m"])
+        for within, colour in ((True, ROOM_COLOURS[0]), (False, ROOM_COLOURS[4])):
+            kept = [(at, cost) for at, cost in enumerate(own) if cost["true_within"] == within]
+            bars = [[cost[end] / cost["truth_m"] for _, cost in kept] for end in ("low_m", "high_m", "mean_m")]
+            at, shade = [number for number, _ in kept], [value / 255 for value in colour]
+            said = f"{'within' if within else 'outside'}: {len(kept)}"
+            axes.vlines(at, bars[0], bars[1], color=shade, linewidth=1.2, label=said)
+            axes.plot(at, bars[2], color=shade, marker="o", markersize=2.0, linestyle="none")
+        axes.axhline(1.0, color="0.4", linewidth=0.8, linestyle="--")
+        axes.set(title=LABELS.get(method, method), xlabel="samples, by mean")
+        axes.legend(fontsize=8)
+        axes.grid(alpha=0.3)
+    panels[0].set_ylabel("cost of coverage / true cost: interval and mean")
+    save_figure(figure, path)
+    return True
+
+
 def same_extent(panels: Sequence[Any]) -> None:
     """Give the panels of one row, pictures of one building, the extent that holds them all."""
     drawn = [panel for panel in panels if panel.images]

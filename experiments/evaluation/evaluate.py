@@ -36,7 +36,10 @@ def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Rep
     progress = progress or Silent()
     require("pyarrow", "matplotlib", by="closedrooms evaluate")
     # Workers of a cluster stand in other folders.
-    samples = [replace(sample, folder=sample.folder.resolve()) for sample in find_samples(config.datasets)]
+    samples = [
+        sample if sample.shard else replace(sample, folder=sample.folder.resolve())
+        for sample in find_samples(config.datasets)
+    ]
     claim(config.out, "evaluate")
     with only_writer(config.out):
         return _evaluate(samples, config, progress)
@@ -108,9 +111,10 @@ def _work(samples: Sequence[SamplePath], config: EvaluateConfig) -> Iterator[Out
         out=config.out.resolve(),
         tours=config.tours,
         probability=config.probability,
+        completions=config.completions,
     )
     workers = min(config.workers, len(samples))
-    needs = ("skimage", *(("networkx", "ortools") if config.tours else ()))
+    needs = ("skimage", *(("networkx", "ortools") if config.tours or config.completions else ()))
     crew: Crew[SamplePath, Outcome] = Crew(workers, config.scheduler, needs, "closedrooms evaluate")
     for sample, outcome in crew.do(job, samples):
         yield Outcome([], {sample.name: outcome.reason}) if isinstance(outcome, Lost) else outcome

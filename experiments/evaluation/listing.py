@@ -1,6 +1,6 @@
 """Which samples a dataset holds: as its manifest lists them, or every folder with the files of one."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -9,6 +9,8 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import read_text
 from closedrooms.core.files.outgoing import MANIFEST
 from closedrooms.core.numbers import repr_of
+from closedrooms.experiments.evaluation.shard_rows import ShardRow, list_rows
+from closedrooms.experiments.places import Url
 
 FILES = ("map.yaml", "doors.geojson", "truth.yaml")
 DATASET_MANIFEST = "manifest.json"
@@ -27,6 +29,7 @@ class SamplePath:
         digest: SHA-256 of its run.json, empty where the dataset does not say.
         world: Building, empty where no manifest names it.
         repetition: Repetition, -1 where no manifest names it.
+        shard: Where it is a row of a shard, else ``None``; see :mod:`closedrooms.experiments.evaluation.shard_rows`.
     """
 
     name: str
@@ -36,9 +39,10 @@ class SamplePath:
     digest: str = ""
     world: str = ""
     repetition: int = -1
+    shard: ShardRow | None = None
 
 
-def find_samples(datasets: Sequence[Path]) -> list[SamplePath]:
+def find_samples(datasets: Sequence[Path | Url]) -> list[SamplePath]:
     """Return every sample of the datasets, by name.
 
     Raises:
@@ -47,10 +51,9 @@ def find_samples(datasets: Sequence[Path]) -> list[SamplePath]:
     """
     found: dict[str, SamplePath] = {}
     for dataset in datasets:
-        if not dataset.is_dir():
+        if isinstance(dataset, Path) and not dataset.is_dir():
             raise InvalidInputError("no such folder", expected="a dataset", where=dataset)
-        listed = (dataset / DATASET_MANIFEST).is_file()
-        samples = list(_listed(dataset) if listed else _folders(dataset))
+        samples = list(_samples_of(dataset))
         if not samples:
             raise InvalidInputError("no sample", expected=f"folders with {', '.join(FILES)}", where=dataset)
         for sample in samples:
@@ -62,6 +65,31 @@ def find_samples(datasets: Sequence[Path]) -> list[SamplePath]:
     return [sample for _, sample in sorted(found.items())]
 
 
+def _samples_of(dataset: Path | Url) -> Iterator[SamplePath]:
+    if isinstance(dataset, Path) and not (dataset / DATASET_MANIFEST).is_file():
+        yield from _folders(dataset)
+        return
+    from closedrooms.experiments.dataset.layout import read_manifest
+
+    manifest = read_manifest(dataset)
+    if manifest.get("layout") == "shards":
+        yield from _rows(dataset, manifest)
+    elif isinstance(dataset, Path):
+        yield from _listed(dataset, manifest)
+    else:
+        raise InvalidInputError("a dataset of folders at an address", expected="one of shards", where=dataset)
+
+
+def _rows(dataset: Path | Url, manifest: Mapping[str, Any]) -> Iterator[SamplePath]:
+    """The samples in the shards of a dataset, those that failed included."""
+    place = dataset.resolve() if isinstance(dataset, Path) else dataset
+    for row in list_rows(place, manifest):
+        folder = Path(f"{row.shard.name}/{row.name}") if row.shard else Path(row.name)
+        yield SamplePath(
+            row.name, folder, row.problem, listed=True, world=row.world, repetition=row.repetition, shard=row.shard
+        )
+
+
 def _folders(dataset: Path) -> Iterator[SamplePath]:
     """Every folder with the files of a sample, at any depth."""
     for folder in sorted(path.parent for path in dataset.rglob(FILES[0])):
@@ -70,12 +98,9 @@ def _folders(dataset: Path) -> Iterator[SamplePath]:
             yield SamplePath(dataset.resolve().name if name == "." else name, folder)
 
 
-def _listed(dataset: Path) -> Iterator[SamplePath]:
+def _listed(dataset: Path, manifest: Mapping[str, Any]) -> Iterator[SamplePath]:
     """The samples of a manifest, those that failed included."""
-    from closedrooms.experiments.dataset.layout import read_manifest
-
     path = dataset / DATASET_MANIFEST
-    manifest = read_manifest(dataset)
     entries = manifest.get("samples")
     if not isinstance(entries, list):
         raise InvalidInputError("no list of samples", expected="the manifest of a dataset", where=path)

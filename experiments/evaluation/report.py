@@ -6,7 +6,8 @@ from typing import Any
 
 from closedrooms.experiments.evaluation.cases import draw_extremes, draw_worst, extreme_cases
 from closedrooms.experiments.evaluation.config import EvaluateConfig, in_order
-from closedrooms.experiments.evaluation.curves import draw_errors, draw_iou, draw_reliability
+from closedrooms.experiments.evaluation.cost import cost_rows
+from closedrooms.experiments.evaluation.curves import draw_costs, draw_errors, draw_iou, draw_reliability
 from closedrooms.experiments.evaluation.listing import SamplePath
 from closedrooms.experiments.evaluation.numbers import number_rows
 from closedrooms.experiments.evaluation.page import Section, Table, write_page
@@ -35,6 +36,13 @@ SURENESS = (
     "distance of the two over the groups. AUROC: how well confidence tells rooms of IoU above 0.5. Best of k: the room "
     "and its first k - 1 alternatives. Brier and log score a cell: unknown cells within 8 m of a closed door; guess: "
     "the rooms taken as sure."
+)
+
+COSTS = (
+    "Tours over completions drawn from what the rooms may be: their mean, and the interval that should hold the true "
+    "cost so often. Within: how often it does, and the 95 % interval of that over buildings; below and above: where "
+    "it lies else. Width of the interval, error of the mean and of the tour on the predicted map: percent of the true "
+    "cost."
 )
 
 
@@ -73,7 +81,8 @@ def write_report(
         if rows:
             write_table(folder / name, rows)
     sure = sureness_rows(scores)
-    for name, rows in (("sureness", sure), ("reliability", reliability_rows(scores))):
+    costs = cost_rows(scores, config.resamples)
+    for name, rows in (("sureness", sure), ("reliability", reliability_rows(scores)), ("completions", costs)):
         if rows:
             write_table(folder / name, rows)
     sections = _sections(folder, scores, {sample.name: sample for sample in samples}, config, iou, coverage)
@@ -96,6 +105,10 @@ def write_report(
     if draw_reliability(folder / "reliability.png", reliability_rows(scores), in_order({r["method"] for r in sure})):
         files = ["sureness.csv", "reliability.csv"]
         surely = [Section("How sure", SURENESS, folder / "reliability.png", [_table(sure)], files)]
+    if draw_costs(folder / "completions.png", scores, in_order(row["method"] for row in costs)):
+        surely.append(
+            Section("Cost of coverage", COSTS, folder / "completions.png", [_table(costs)], ["completions.csv"])
+        )
     by_world = Section("Buildings (table 1: most closed doors)", tables=[_table(worlds)], files=["worlds.csv"])
     tail = [_failure_section(failures)] if failures else []
     title = f"closedrooms evaluate: {len(samples)} samples"
@@ -134,9 +147,8 @@ def _sections(
     shown = [*WITHOUT_PREDICTION, *names[:1]]
     drawn = draw_errors(folder / "figure-12.png", coverage, shown)
     table = [row for row in coverage if row["part"] == "all"]
-    add("Figure 12: errors of the coverage cost", "", "figure-12.png",
-        _doors_table(table, "estimate", [*WITHOUT_PREDICTION, *names], "error"), csv="coverage.csv",
-        drawn=drawn)  # fmt: skip
+    errors = _doors_table(table, "estimate", [*WITHOUT_PREDICTION, *names], "error")
+    add("Figure 12: errors of the coverage cost", "", "figure-12.png", errors, csv="coverage.csv", drawn=drawn)
     drawn = draw_errors(folder / "figure-14.png", coverage, names)
     add("Figure 14: errors of the coverage cost by prediction", "", "figure-14.png", csv="coverage.csv", drawn=drawn)
     method = next(iter(in_order(set(present) - {"authors"})), None)

@@ -17,10 +17,10 @@ from closedrooms.core.files.geojson import write_rooms
 from closedrooms.core.files.incoming import read_json
 from closedrooms.core.files.outgoing import write_json
 from closedrooms.core.files.rosmap import write_raw_map
-from closedrooms.core.grid import OccupancyGrid
 from closedrooms.experiments.dataset.checksums import digest
+from closedrooms.experiments.evaluation.cost import score_cost
 from closedrooms.experiments.evaluation.listing import SamplePath
-from closedrooms.experiments.evaluation.samples import Sample, read_sample
+from closedrooms.experiments.evaluation.samples import Sample, at_hand, read_sample, renamed
 from closedrooms.experiments.evaluation.scores import (
     added_rooms,
     hidden_area,
@@ -58,6 +58,21 @@ class Outcome:
     problems: dict[str, str] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True)
+class Extras:
+    """What is done beside predicting and scoring.
+
+    Attributes:
+        tours: Plan coverage tours, where the sample tells |R|.
+        probability: Write each cell's probability.
+        completions: Tell the cost of coverage from so many completions.
+    """
+
+    tours: bool
+    probability: bool
+    completions: int
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Hidden:
     """What the map does not show of the truth: the same for every method."""
@@ -68,7 +83,13 @@ class _Hidden:
 
 
 def evaluate_sample(
-    sample: SamplePath, methods: Sequence[str], out: Path, *, tours: bool = True, probability: bool = False
+    sample: SamplePath,
+    methods: Sequence[str],
+    out: Path,
+    *,
+    tours: bool = True,
+    probability: bool = False,
+    completions: int = 0,
 ) -> Outcome:
     """Scores of some methods on one sample, each kept in ``out/<method>/<sample>``.
 
@@ -80,17 +101,28 @@ def evaluate_sample(
         out: Folder of the evaluation.
         tours: Plan coverage tours too, where the sample's run.json tells |R|.
         probability: Write each cell's probability too (``probability.{yaml,png}``).
+        completions: Tell the cost of coverage as a distribution too, from so many completions.
 
     Raises:
         OutputError: The result cannot be written.
     """
-    outcome = Outcome()
     if sample.problem:
-        outcome.problems[sample.name] = sample.problem
-        return outcome
+        return Outcome(problems={sample.name: sample.problem})
+    try:
+        with at_hand(sample) as here:
+            outcome = _evaluate(here, methods, out, Extras(tours, probability, completions))
+            problems = {name: renamed(why, here.folder, sample) for name, why in outcome.problems.items()}
+            return Outcome(outcome.scores, problems)
+    except InvalidInputError as error:
+        return Outcome(problems={sample.name: reason(error)})
+
+
+def _evaluate(sample: SamplePath, methods: Sequence[str], out: Path, extras: Extras) -> Outcome:
+    """Scores of some methods on one sample in a folder."""
+    outcome = Outcome()
     wanted = [*methods, *([AUTHORS] if (sample.folder / "authors.yaml").is_file() else [])]
     content = _content(sample.folder)
-    keys = {method: _fingerprint(content, method, tours=tours, probability=probability) for method in wanted}
+    keys = {method: _fingerprint(content, method, extras) for method in wanted}
     kept = {method: _kept(out / method / sample.name / RESULT, keys[method]) for method in wanted}
     if any(scores is None for scores in kept.values()):
         try:
@@ -109,7 +141,7 @@ def evaluate_sample(
             _make(folder)
             head = _head(read, sample.name, method, keys[method], hidden)
             try:
-                scores = head | _score(read, method, folder, hidden, out, starts, tours=tours, probability=probability)
+                scores = head | _score(read, method, folder, hidden, out, starts, extras)
             except (OutputError, ModuleNotFoundError):
                 raise
             except Exception as error:
@@ -137,10 +169,12 @@ def _content(folder: Path) -> str:
     return content.hexdigest()
 
 
-def _fingerprint(content: str, method: str, *, tours: bool, probability: bool) -> str:
+def _fingerprint(content: str, method: str, extras: Extras) -> str:
     """Changes with the input, the method, the versions of libraries and the code that predicts, plans and scores."""
-    parts = [content, method, json.dumps(versions()), _code(), tour_code() if tours and _has_tour(method) else ""]
-    parts += ["probability"] if probability and method != AUTHORS else []
+    planned = (extras.tours or extras.completions) and _has_tour(method)
+    parts = [content, method, json.dumps(versions()), _code(), tour_code() if planned else ""]
+    parts += ["probability"] if extras.probability and method != AUTHORS else []
+    parts += [f"completions {extras.completions} {extras.tours}"] if extras.completions and planned else []
     return hashlib.sha256(" ".join(parts).encode()).hexdigest()
 
 
@@ -151,9 +185,14 @@ def _code() -> str:
         *(root / "predictor").rglob("*.py"),
         *(root / "predictor").rglob("*.json"),
         *(root / "core").rglob("*.py"),
-        root / "pipeline" / "scores.py",
+        root / "pipeline" / "reporting" / "scores.py",
     ]
-    return code_digest([*files, *(here / name for name in ("sample.py", "samples.py", "scores.py", "sureness.py"))])
+    return code_digest(
+        [
+            *files,
+            *(here / name for name in ("sample_evaluation.py", "samples.py", "scores.py", "sureness.py", "cost.py")),
+        ]
+    )
 
 
 def _kept(path: Path, key: str) -> Scores | None:
@@ -236,9 +275,7 @@ def _score(
     hidden: _Hidden,
     out: Path,
     starts: Starts,
-    *,
-    tours: bool,
-    probability: bool,
+    extras: Extras,
 ) -> Scores:
     if method == AUTHORS:
         assert sample.authors is not None, "only samples with authors.yaml come here"
@@ -246,7 +283,7 @@ def _score(
         return _hidden_scores(hidden, masks) | {"by_door": {}, "not_seen": []}
     prediction, seconds = predict_with(method, sample, starts)
     write_rooms(folder / "rooms.geojson", prediction.rooms)
-    if probability:
+    if extras.probability:
         write_raw_map(folder / "probability", free_probability(prediction, sample.observed))
     unknown = sample.observed.unknown
     masks = [mask & unknown for mask in room_masks(prediction.rooms, sample.observed.frame)]
@@ -263,9 +300,14 @@ def _score(
         theirs = sample.authors.free & unknown
         ours = prediction.grid.on(sample.observed.frame).free & unknown
         scores["agreement"] = round(iou(ours, theirs), 6)
-    if tours and _has_tour(method) and sample.rooms_seen is not None:
+    compared = extras.tours and sample.rooms_seen is not None
+    if _has_tour(method) and (compared or extras.completions):
         try:
-            scores["tour"] = _tours(sample, prediction.grid, sample.rooms_seen, out)
+            own = plan_tour(prediction.grid)
+            if extras.completions:
+                scores["completions"] = score_cost(sample, prediction, own, out, extras.completions)
+            if compared:
+                scores["tour"] = _tours(sample, tour_figures(own), out)
         except (OutputError, ModuleNotFoundError):
             raise
         except Exception as error:
@@ -273,20 +315,23 @@ def _score(
     return scores
 
 
-def _tours(sample: Sample, predicted: OccupancyGrid, rooms_seen: int, out: Path) -> Tour:
-    """The three tours and the errors of the three estimates in percent (paper, sections 5.2 and 5.3)."""
+def _tours(sample: Sample, own: Tour, out: Path) -> Tour:
+    """The three tours and the errors of the three estimates in percent (paper, sections 5.2 and 5.3).
+
+    ``own`` is the one on the predicted map, of a sample that knows how many rooms were seen.
+    """
+    assert sample.rooms_seen is not None, "only such samples come here"
     from closedrooms.coverage.estimates import compare_lengths
 
     closed = kept_tour(out, sample.observed, sample.doors)
     truth = kept_tour(out, sample.truth)
-    own = tour_figures(plan_tour(predicted))
     errors = compare_lengths(
-        closed["length_m"], own["length_m"], truth["length_m"], n_rooms=rooms_seen, n_doors=len(sample.doors)
+        closed["length_m"], own["length_m"], truth["length_m"], n_rooms=sample.rooms_seen, n_doors=len(sample.doors)
     )
     if errors.error_closed is None or errors.error_baseline is None or errors.error_pred is None:
         raise InvalidInputError("a true tour of length 0", expected="a building with more than one place to visit")
     return {
-        "rooms_seen": rooms_seen,
+        "rooms_seen": sample.rooms_seen,
         "closed": closed,
         "predicted": own,
         "truth": truth,

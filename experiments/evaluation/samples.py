@@ -1,6 +1,8 @@
 """Samples on disk: a map, its closed doors and the truth, in one folder each."""
 
-from dataclasses import dataclass
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ from closedrooms.core.numbers import repr_of
 from closedrooms.core.room import Room
 from closedrooms.experiments.dataset.checksums import check, digest
 from closedrooms.experiments.evaluation.listing import SamplePath
+from closedrooms.experiments.evaluation.shard_rows import unpacked
 from closedrooms.predictor.structure.known_window import MAX_CELLS
 
 # Unknown cells kept around what is known when a sample is cropped [m].
@@ -53,6 +56,29 @@ class Sample:
     rooms_seen: int | None = None
 
 
+@contextlib.contextmanager
+def at_hand(sample: SamplePath) -> Iterator[SamplePath]:
+    """Yield the sample with its files in a folder, unpacked where it is in a shard.
+
+    Raises:
+        InvalidInputError: The shard cannot be read; anything of the block that names the folder it was unpacked to,
+            with the name of the shard in its place.
+    """
+    if sample.shard is None:
+        yield sample
+        return
+    with unpacked(sample.shard) as folder:
+        try:
+            yield replace(sample, folder=folder, shard=None)
+        except InvalidInputError as error:
+            raise InvalidInputError(renamed(str(error), folder, sample)) from error
+
+
+def renamed(message: str, folder: Path, sample: SamplePath) -> str:
+    """Name the shard and the sample in a message about a folder that nobody knows."""
+    return message.replace(str(folder), str(sample.folder))
+
+
 def read_sample(sample: SamplePath) -> Sample:
     """Read a sample, check it against its checksums, and bring its grids to one frame.
 
@@ -62,6 +88,9 @@ def read_sample(sample: SamplePath) -> Sample:
     """
     if sample.problem:
         raise InvalidInputError(sample.problem)
+    if sample.shard is not None:
+        with at_hand(sample) as unpacked_sample:
+            return read_sample(unpacked_sample)
     folder = sample.folder
     about = _read_about(sample)
     observed, truth = read_map(folder / "map.yaml"), read_map(folder / "truth.yaml")

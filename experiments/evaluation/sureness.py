@@ -117,7 +117,7 @@ def reliability_rows(scores: Sequence[Scores]) -> list[Row]:
     for method in dict.fromkeys(score["method"] for score in scores):
         own = [room for score in scores if score["method"] == method for room in score.get("sure", {}).get("rooms", [])]
         figures = np.array(own).reshape(-1, 5)
-        for number, group in enumerate(_groups(figures[:, 0])):
+        for number, group in enumerate(_groups(figures[:, 0], figures[:, 1])):
             confidence, iou = figures[group, 0], figures[group, 1]
             rows.append(
                 {
@@ -133,18 +133,23 @@ def reliability_rows(scores: Sequence[Scores]) -> list[Row]:
 
 
 def calibration_error(confidence: FloatArray, iou: FloatArray) -> float:
-    """Expected calibration error: mean distance of confidence from IoU over groups of equally many rooms."""
-    return float(
-        sum(abs(confidence[group].mean() - iou[group].mean()) * len(group) for group in _groups(confidence))
-        / max(len(confidence), 1)
-    )
+    """Expected calibration error: mean distance of confidence from IoU over groups of equally many rooms.
+
+    Rooms of one confidence count with their mean IoU each: which of them fall into a group says nothing.
+    """
+    if not len(confidence):
+        return 0.0
+    _, same = np.unique(confidence, return_inverse=True)
+    usual = (np.bincount(same, weights=iou) / np.bincount(same))[same]
+    groups = _groups(confidence, usual)
+    return float(sum(abs((confidence[group] - usual[group]).mean()) * len(group) for group in groups) / len(iou))
 
 
-def _groups(confidence: FloatArray) -> list[Any]:
-    """Rooms in groups of equal size by their confidence."""
+def _groups(confidence: FloatArray, iou: FloatArray) -> list[Any]:
+    """Rooms in groups of equal size by their confidence, those of one confidence by their IoU."""
     if not len(confidence):
         return []
-    order = np.argsort(confidence, kind="stable")
+    order = np.lexsort((iou, confidence))
     return [group for group in np.array_split(order, BINS) if len(group)]
 
 

@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from closedrooms.core.door import ClosedDoor
+from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import read_json
 from closedrooms.core.files.outgoing import write_json
@@ -25,7 +25,7 @@ CACHE = "tours"
 Tour = dict[str, Any]
 
 
-def plan_tour(grid: OccupancyGrid, doors: Sequence[ClosedDoor] = ()) -> CoverageTour:
+def plan_tour(grid: OccupancyGrid, doors: Sequence[ClosedDoor] = (), *, start: Point = START) -> CoverageTour:
     """Return the tour on a map, which depends on its known cells only.
 
     Raises:
@@ -33,7 +33,7 @@ def plan_tour(grid: OccupancyGrid, doors: Sequence[ClosedDoor] = ()) -> Coverage
     """
     from closedrooms.coverage.tour.tour_planner import plan_coverage
 
-    return plan_coverage(cropped(grid), doors, CoverageConfig(), start=START)
+    return plan_coverage(cropped(grid), doors, CoverageConfig(), start=start)
 
 
 def cropped(grid: OccupancyGrid) -> OccupancyGrid:
@@ -46,7 +46,7 @@ def cropped(grid: OccupancyGrid) -> OccupancyGrid:
     return grid.on(grid.frame.cropped(row - margin, col - margin, rows + 2 * margin, cols + 2 * margin))
 
 
-def kept_tour(out: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor] = ()) -> Tour:
+def kept_tour(out: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor] = (), *, start: Point = START) -> Tour:
     """Figures of the tour on a map, planned once for all samples that share the map.
 
     Kept in ``out/tours`` under the hash of what it depends on; two processes that plan the same tour write the same
@@ -56,7 +56,7 @@ def kept_tour(out: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor] = ()) 
         InvalidInputError: A map without free space.
         OutputError: The folder cannot be written.
     """
-    path = out / CACHE / f"{_key(cropped(grid), doors)}.json"
+    path = out / CACHE / f"{_key(cropped(grid), doors, start)}.json"
     try:
         kept: Tour = read_json(path, what="a kept tour")
         if isinstance(kept["length_m"], float):
@@ -64,7 +64,7 @@ def kept_tour(out: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor] = ()) 
     except (InvalidInputError, KeyError, TypeError):
         pass
     path.parent.mkdir(parents=True, exist_ok=True)
-    figures = tour_figures(plan_tour(grid, doors))
+    figures = tour_figures(plan_tour(grid, doors, start=start))
     write_json(path, figures)
     return figures
 
@@ -79,11 +79,11 @@ def tour_figures(tour: CoverageTour) -> Tour:
     }
 
 
-def _key(grid: OccupancyGrid, doors: Sequence[ClosedDoor]) -> str:
+def _key(grid: OccupancyGrid, doors: Sequence[ClosedDoor], start: Point) -> str:
     frame = grid.frame
     where = [round(value, 6) for value in (frame.resolution, frame.origin_x, frame.origin_y)]
     places = [[door.id, door.midpoint, door.segment, door.width] for door in doors]
-    digest = hashlib.sha256(json.dumps([where, frame.shape, places, START, MARGIN, versions()]).encode())
+    digest = hashlib.sha256(json.dumps([where, frame.shape, places, start, MARGIN, versions()]).encode())
     digest.update(tour_code().encode())
     digest.update(grid.free.tobytes() + grid.occupied.tobytes())
     return digest.hexdigest()[:32]

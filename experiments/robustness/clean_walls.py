@@ -10,7 +10,7 @@ NEAR = 0.15
 
 
 def sampled(grid: OccupancyGrid, frame: GridFrame) -> OccupancyGrid:
-    """Return a grid on another frame of any lattice: each cell takes the value at its centre, unknown outside."""
+    """Sample a grid on another frame of any lattice: by the value at cells' centres, unknown outside."""
     rows, cols = np.meshgrid(np.arange(frame.rows), np.arange(frame.cols), indexing="ij")
     cells = grid.frame.to_cells(frame.to_points(np.stack((rows, cols), axis=-1)))
     inside = grid.frame.contains(cells)
@@ -20,7 +20,7 @@ def sampled(grid: OccupancyGrid, frame: GridFrame) -> OccupancyGrid:
 
 
 def with_clean_walls(disturbed: OccupancyGrid, clean: OccupancyGrid) -> OccupancyGrid:
-    """Return the walls of ``clean`` in the extent of ``disturbed``.
+    """Replace the walls of a disturbed map by those of ``clean``, in the extent of ``disturbed``.
 
     What both know is as in ``clean``. What only ``disturbed`` knows stays where it is free; occupied cells there are
     noise. Walls of ``clean`` that stand at the edge of what ``disturbed`` knows are in it.

@@ -88,10 +88,10 @@ class RobustnessConfig:
     """Shares of the sweeps that arrive without a measurement [0..1]."""
 
     freezes: tuple[float, ...] = (0.0, 2.0, 6.0, 20.0)
-    """How often the odometry stands still for a second and then tells the whole way [1/min]."""
+    """How often the odometry stands still for a second and then reports the whole motion at once [1/min]."""
 
     drops: tuple[float, ...] = (0.0, 1.0, 3.0, 10.0)
-    """How often the way between two sweeps is never counted [1/min]."""
+    """How often the motion between two sweeps is never counted [1/min]."""
 
     unequal: tuple[float, ...] = (0.0, 0.005, 0.01, 0.02)
     """How much larger one wheel is than the other, as a share, below 0.5."""

@@ -19,7 +19,7 @@ SHOWN = 3
 def disturbed_doors(
     doors: Sequence[ClosedDoor], *, missed: float, shift: float, turn: float, seed: int, name: str
 ) -> list[ClosedDoor]:
-    """Doors without those missed, the others shifted and turned.
+    """Disturb doors: leave some out, shift and turn the others.
 
     Every door draws its luck, its direction and its side once, so that a larger level is the same disturbance, only
     larger.
@@ -39,15 +39,15 @@ def disturbed_doors(
             continue
         x, y = door.midpoint
         angle = math.radians(turn) * (1.0 if side < 0.5 else -1.0)
-        way = 2.0 * math.pi * direction
+        heading = 2.0 * math.pi * direction
         # Turned about its middle, then shifted.
         moved = door.moved(Pose2(-x, -y)).moved(Pose2(0.0, 0.0, angle))
-        found.append(moved.moved(Pose2(x + shift * math.cos(way), y + shift * math.sin(way))))
+        found.append(moved.moved(Pose2(x + shift * math.cos(heading), y + shift * math.sin(heading))))
     return found
 
 
 def phantom_doors(plan: FloorPlan, count: int, grid: OccupancyGrid, map_T_world: Pose2, seed: int) -> list[ClosedDoor]:
-    """Doors that are reported on plain walls of the map, map frame; those on walls that it does not show are not.
+    """Draw doors on plain walls of the map, map frame; not on walls that it does not show.
 
     Args:
         plan: The building.
@@ -70,7 +70,7 @@ def phantom_doors(plan: FloorPlan, count: int, grid: OccupancyGrid, map_T_world:
 
 
 def true_doors(plan: FloorPlan, ids: Sequence[str], map_T_world: Pose2) -> list[ClosedDoor]:
-    """Doors of the plan where they really are, map frame."""
+    """Place doors of the plan where they really are, map frame."""
     by_id = {door.id: door for door in plan.doors}
     return [
         ClosedDoor(name, by_id[name].midpoint, by_id[name].segment, by_id[name].width).moved(map_T_world)

@@ -35,7 +35,7 @@ START_CLEAR = 0.6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Drive:
+class RecordedDrive:
     """What ideal sensors saw on one exploration with all doors open.
 
     Attributes:
@@ -55,7 +55,7 @@ class Drive:
 
 def record_drive(
     plan: FloorPlan, sim: SimConfig, mapper: MapperConfig, navigation: NavigationConfig, seed: int
-) -> Drive:
+) -> RecordedDrive:
     """Explore a building with all doors open and ideal sensors.
 
     Args:
@@ -72,11 +72,11 @@ def record_drive(
     with Simulation(plan, (), ideal, seed) as world:
         log = RunLog(world, Silent(), keep_scans=True)
         survey = survey_building(log, Mapper(mapper), navigation)
-        return Drive(plan, ideal, log.recorded(), world.world_T_map, survey.exploration.status)
+        return RecordedDrive(plan, ideal, log.recorded(), world.world_T_map, survey.exploration.status)
 
 
 def map_drive(
-    drive: Drive, noise: NoiseConfig, mapper: MapperConfig, seed: int, faults: FaultConfig | None = None
+    drive: RecordedDrive, noise: NoiseConfig, mapper: MapperConfig, seed: int, faults: FaultConfig | None = None
 ) -> OpenSurvey:
     """Map a drive again as worse sensors would have seen it.
 
@@ -111,11 +111,11 @@ def map_drive(
 
 
 def odometry_noise(times_medium: float) -> NoiseConfig:
-    """Return the odometry of the noise level ``medium``, errors multiplied; an ideal lidar."""
+    """Scale the odometry errors of the noise level ``medium``; the lidar is ideal."""
     medium = NOISE_LEVELS["medium"]
     return replace(
         NOISE_LEVELS["none"],
-        way=medium.way * times_medium,
+        distance=medium.distance * times_medium,
         turn_per_metre=medium.turn_per_metre * times_medium,
         turn=medium.turn * times_medium,
     )
@@ -147,7 +147,7 @@ def _drifted(truth: FloatArray, noise: NoiseConfig, seed: int) -> FloatArray:
 
 
 def furnished(plan: FloorPlan, share: float, seed: int) -> FloorPlan:
-    """Return the plan with a share of the furniture that fills it; the robot starts where it would without.
+    """Furnish a plan anew with a share of what would fill it; the robot starts where it would without.
 
     Args:
         plan: The building; its own furniture is taken out.

@@ -18,7 +18,7 @@ UNITS: dict[Factor, str] = {
     "clutter": "boxes that are moved",
     "lost": "share of sweeps lost",
     "freezes": "freezes of the odometry [1/min]",
-    "drops": "pieces of the way never counted [1/min]",
+    "drops": "motions never counted [1/min]",
     "unequal": "difference of the wheels, as a share",
     "phantoms": "phantom doors",
     "together": "all factors at their n-th level",
@@ -78,12 +78,12 @@ class Case:
 
 
 def first_setting(config: RobustnessConfig) -> Setting:
-    """Return every factor at its first level."""
+    """Set every factor to its first level."""
     return Setting(**{factor: getattr(config, factor)[0] for factor in FACTORS[:-1]})
 
 
 def cases(config: RobustnessConfig) -> list[Case]:
-    """Return every level of every factor asked for; the first levels of all factors are one and the same setting."""
+    """List every level of every factor asked for; the first levels of all factors are one and the same setting."""
     first = first_setting(config)
     found: list[Case] = []
     for factor in config.factors:

@@ -95,7 +95,7 @@ class Onset:
 
 
 def level_results(rows: Sequence[Row], resamples: int) -> list[LevelResult]:
-    """Return every level of every factor, in the order of the rows.
+    """Compute what every level of every factor does, in the order of the rows.
 
     Args:
         rows: Of the trials, with ``factor``, ``number`` and ``level``.
@@ -122,7 +122,7 @@ def level_results(rows: Sequence[Row], resamples: int) -> list[LevelResult]:
 
 
 def onsets(results: Sequence[LevelResult]) -> list[Onset]:
-    """For every factor, where the prediction starts to suffer and which stage gives way first."""
+    """Find for every factor where the prediction starts to suffer and which stage fails first."""
     found = []
     for factor in dict.fromkeys(result.factor for result in results):
         own = [result for result in results if result.factor == factor and result.number > 0]

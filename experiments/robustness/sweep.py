@@ -155,7 +155,7 @@ def _work(worlds: dict[str, str], config: RobustnessConfig, progress: Progress, 
 
 
 def sweep_world(world: tuple[str, str], config: RobustnessConfig) -> str:
-    """Return every level in one world; the reason when it failed, else nothing.
+    """Try every level in one world; the reason when it failed, else nothing.
 
     Args:
         world: The world as it was given, and its name.
@@ -175,14 +175,14 @@ def sweep_world(world: tuple[str, str], config: RobustnessConfig) -> str:
 
 def _do_levels(text: str, world: str, config: RobustnessConfig) -> None:
     """Do one level after the other of what is not there yet."""
-    from closedrooms.experiments.robustness.trial import Building
+    from closedrooms.experiments.robustness.trial import BuildingTrials
 
     key = _fingerprint(text, config)
     distinct = {case.name: case.setting for case in cases(config)}
     missing = {name: s for name, s in distinct.items() if not _kept(_folder(config, world, name), key, s)}
     if not missing:
         return
-    building = Building(text, config)
+    building = BuildingTrials(text, config)
     for name, setting in missing.items():
         folder = _folder(config, world, name)
         try:

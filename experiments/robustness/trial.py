@@ -23,7 +23,7 @@ from closedrooms.experiments.evaluation.tours import cropped, kept_tour, plan_to
 from closedrooms.experiments.robustness.clean_walls import sampled, with_clean_walls
 from closedrooms.experiments.robustness.config import RobustnessConfig
 from closedrooms.experiments.robustness.door_noise import disturbed_doors, phantom_doors, true_doors
-from closedrooms.experiments.robustness.drives import Drive, furnished, map_drive, odometry_noise, record_drive
+from closedrooms.experiments.robustness.drives import RecordedDrive, furnished, map_drive, odometry_noise, record_drive
 from closedrooms.experiments.robustness.levels import Setting, first_setting
 from closedrooms.mapping.trajectory import ate
 from closedrooms.pipeline.reporting.scores import room_iou, rooms_seen
@@ -63,8 +63,8 @@ class Closing:
     wall_distance: FloatArray
 
 
-class Building:
-    """Everything about one building that several settings share."""
+class BuildingTrials:
+    """Everything about one building that its trials share."""
 
     def __init__(self, world: str, config: RobustnessConfig) -> None:
         self._config = config
@@ -77,13 +77,13 @@ class Building:
             draw_closed(self._plan, count, stream(config.seed, "closed doors", self.name, str(repetition)))
             for repetition in range(config.repetitions)
         ]
-        self._drives: dict[Setting, Drive] = {}
+        self._drives: dict[Setting, RecordedDrive] = {}
         self._surveys: dict[Setting, OpenSurvey] = {}
         self._erasers: dict[tuple[Setting, bool], Eraser] = {}
         self._closings: dict[tuple[int, Setting], Closing] = {}
 
     def rows(self, setting: Setting, keep: Path | None = None) -> list[Row]:
-        """Return a row of measures for each set of closed doors.
+        """Measure a row of figures for each set of closed doors.
 
         Args:
             setting: How much everything is disturbed.
@@ -185,7 +185,7 @@ class Building:
             name=f"{self.name} {repetition}",
         )  # fmt: skip
 
-    def _drive(self, setting: Setting) -> Drive:
+    def _drive(self, setting: Setting) -> RecordedDrive:
         place = setting.place
         if place not in self._drives:
             config = self._config
@@ -262,7 +262,7 @@ class Building:
         return iou(sampled(grid, closing.truth.grid.frame).free, closing.open_cells)
 
 
-def _in_map(area: Any, drive: Drive) -> Any:
+def _in_map(area: Any, drive: RecordedDrive) -> Any:
     return shapely.transform(area, drive.world_T_map.inverse().transform)
 
 

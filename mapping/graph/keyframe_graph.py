@@ -13,7 +13,7 @@ from closedrooms.mapping.graph.pose_graph import Edge, PoseGraph, optimise
 from closedrooms.mapping.growing_array import GrowingArray
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
-from closedrooms.mapping.motion import Motion
+from closedrooms.mapping.motion import UncertainMotion
 
 
 class KeyframeGraph:
@@ -65,7 +65,7 @@ class KeyframeGraph:
             sigmas = recovery.break_distance, recovery.break_angle
         else:
             turn = abs(wrap_angle(keyframe.pose.theta - previous.pose.theta))
-            motion = Motion(distance=keyframe.travelled - previous.travelled, turn=turn)
+            motion = UncertainMotion(distance=keyframe.travelled - previous.travelled, turn=turn)
             if not measured:
                 motion = motion.without_odometry(previous.pose.distance(keyframe.pose), turn)
             sigmas = motion.sigmas(self._config.matcher)
@@ -79,7 +79,7 @@ class KeyframeGraph:
         return np.asarray(self._config.loops.point_information * (rotation.T @ hessian @ rotation))
 
     def distances(self) -> FloatArray:
-        """From the latest keyframe to each as the crow flies, shape (keyframes,) [m]."""
+        """Compute how far each keyframe is from the latest as the crow flies, shape (keyframes,) [m]."""
         pose = self.keyframes[-1].pose
         offsets = self._positions.values - (pose.x, pose.y)
         return np.asarray(np.hypot(offsets[:, 0], offsets[:, 1]))

@@ -11,7 +11,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.graph.pose_graph import PoseGraph
-from closedrooms.mapping.matching.correlative_matcher import Search, Window
+from closedrooms.mapping.matching.correlative_matcher import SearchWindow, WindowSearch
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 from closedrooms.mapping.visibility import conflict
@@ -74,14 +74,14 @@ def find_loop(
         [k.pose.transform(k.beams.points) for k in surroundings if k.pose.distance(older.pose) < loops.surroundings]
     )
     points = recent_points(keyframes, loops.recent_distance, config)
-    window = Window(
+    window = SearchWindow(
         float(doubts[older.index]),
         min(loops.window_angle + loops.drift_angle * float(graph.path_lengths[older.index]), 0.5),
     )
     if foreign[older.index]:
-        window = Window(max(window.distance, config.recovery.join_window), math.pi)
+        window = SearchWindow(max(window.distance, config.recovery.join_window), math.pi)
     sigmas, least = (window.distance, window.angle), loops.min_score - 0.15
-    searched = Search(field, points, latest.pose, window, coarse_cells=6, prior_sigmas=sigmas)
+    searched = WindowSearch(field, points, latest.pose, window, coarse_cells=6, prior_sigmas=sigmas)
     found = searched.best(floor=least)
     if found.score < least:
         return None
@@ -124,7 +124,7 @@ def _recent(keyframes: Sequence[Keyframe], distance: float) -> Iterator[Keyframe
 
 
 def recent_points(keyframes: Sequence[Keyframe], distance: float, config: MapperConfig) -> FloatArray:
-    """Tell what was seen on the last ``distance`` [m] of one submap, in the latest keyframe's frame, a point a cell.
+    """Collect what was seen on the last ``distance`` [m] of one submap, in the latest keyframe's frame, a point a cell.
 
     One scan alone fits in many places; the surroundings of several metres do not.
     """

@@ -108,7 +108,7 @@ class PoseGraph:
         self.path_lengths[:] = lengths
 
     def within(self, start: int, limit: float) -> dict[int, float]:
-        """Path length [m] from ``start`` to each keyframe that is at most ``limit`` away along the edges (Dijkstra)."""
+        """Measure the path [m] from ``start`` to each keyframe at most ``limit`` away along the edges (Dijkstra)."""
         done: dict[int, float] = {}
         queue = [(0.0, start)]
         while queue:

@@ -1,6 +1,7 @@
 """Recorded runs of robots; ``reader`` tells the formats apart.
 
-- ROS bags: ``rosbag`` (from a bag to a run), ``bag_messages``, ``bag_scans``, ``transform_tree``, ``bag_options``.
+- ROS bags: ``rosbag`` reads them (``bag_messages``, ``bag_scans``, ``transform_tree``, ``bag_options``), ``bag_writer``
+  writes them; ``clicked_points`` are doors that a person clicked.
 - CARMEN logs: ``carmen``, ``carmen_lines``, ``carmen_odometry``.
 - NumPy archives: ``npz``.
 - All of them: ``clocks``, ``odometry``, ``recorded_run``.

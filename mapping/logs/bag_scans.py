@@ -15,7 +15,7 @@ SCAN, ECHOES = "sensor_msgs/msg/LaserScan", "sensor_msgs/msg/MultiEchoLaserScan"
 
 
 def ranges_of(message: Any) -> tuple[FloatArray, int]:
-    """Ranges of one sweep, the first echo of each beam, and how many others there were."""
+    """Read the ranges of one sweep, the first echo of each beam; returns how many other echoes there were too."""
     if message.__msgtype__ == SCAN:
         return np.array(message.ranges, dtype=np.float64), 0
     beams = [np.asarray(beam.echoes, dtype=np.float64) for beam in message.ranges]
@@ -32,7 +32,7 @@ def _first_echo(echoes: FloatArray, shortest: float) -> float:
 
 
 def scan_of(message: Any, ranges: FloatArray, mount: Mount) -> LaserScan:
-    """Return the sweep, counter-clockwise from above.
+    """Convert a message to a sweep, counter-clockwise from above.
 
     Args:
         message: LaserScan or MultiEchoLaserScan.

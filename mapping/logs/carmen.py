@@ -13,7 +13,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.logs.carmen_lines import WITH_POSES, CarmenLog, ScanLine, flaser_sector
-from closedrooms.mapping.logs.carmen_odometry import Motion, motion_of
+from closedrooms.mapping.logs.carmen_odometry import CarmenOdometry, motion_of
 from closedrooms.mapping.logs.clocks import forward
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 
@@ -101,7 +101,7 @@ def _reading_remarks(log: CarmenLog) -> list[Remark]:
     return remarks
 
 
-def _run(motion: Motion, settings: dict[str, float], remarks: list[Remark]) -> RecordedRun:
+def _run(motion: CarmenOdometry, settings: dict[str, float], remarks: list[Remark]) -> RecordedRun:
     """The scans with their odometry, ready to be mapped."""
     scans = motion.scans
     remarks = [*remarks, *motion.remarks]

@@ -180,7 +180,7 @@ def resolve_sector(start: float, view: float, step: float, beams: int) -> Sector
 
 
 def flaser_sector(beams: int, settings: dict[str, float]) -> tuple[Sector, bool]:
-    """Sector of FLASER lines: by parameters of the log, else half a turn.
+    """Resolve the sector of FLASER lines: by parameters of the log, else half a turn.
 
     Returns:
         The sector, and whether the half turn is a guess.

@@ -25,14 +25,14 @@ SMOOTH, SMOOTH_REST = 0.3, 0.01
 ONLY_ECHOES = 0.8
 """Share of the ODOM lines from which there is nothing but echoes."""
 STANDING = 0.05
-"""Length of odometry, as a share of the way by the scans' poses, below which it says nothing."""
-LEAST_WAY = 0.5
-"""Way [m] below which nothing is concluded from its length."""
+"""Length of odometry, as a share of the distance by the scans' poses, below which it says nothing."""
+LEAST_DISTANCE = 0.5
+"""Travelled distance [m] below which nothing is concluded from its length."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
-    """Scans with their odometry.
+class CarmenOdometry:
+    """Scans of a CARMEN log with their odometry.
 
     Attributes:
         scans: Those that have one.
@@ -51,7 +51,7 @@ class Motion:
     remarks: tuple[Remark, ...] = ()
 
 
-def motion_of(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[str, float]) -> Motion:
+def motion_of(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[str, float]) -> CarmenOdometry:
     """Find the odometry of the scans.
 
     As recorded, a scan carries its own, or has the ODOM lines around it. In logs that a mapping program corrected, the
@@ -74,45 +74,45 @@ def motion_of(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[s
     strays = [robot.distance(moves[s.since - 1].pose) for s, robot in zip(scans, robots, strict=True) if s.since > 0]
     if not echoes and not (strays and max(strays) > STRAY and not corrected):
         if corrected:
-            return Motion(scans, poses, _array([laser for laser, _ in own]))
-        return Motion(scans, poses, None, robots[0].inverse() @ own[0][0])
+            return CarmenOdometry(scans, poses, _array([laser for laser, _ in own]))
+        return CarmenOdometry(scans, poses, None, robots[0].inverse() @ own[0][0])
     raw = _raw_odometry(moves, echoes)
     known = np.array([scan.since > 0 for scan in scans])
-    if echoes and _way(_array(raw)) < STANDING * _way(poses):
+    if echoes and _travelled(_array(raw)) < STANDING * _travelled(poses):
         why = "the ODOM lines only repeat the poses of the scans; found by matching scans alone"
         remark = Remark(action="guessed", what="motion", why=why)
-        return Motion(scans, np.zeros((len(scans), 3)), poses, has_odometry=False, remarks=(remark,))
+        return CarmenOdometry(scans, np.zeros((len(scans), 3)), poses, has_odometry=False, remarks=(remark,))
     kept = [scan for scan in scans if scan.since > 0]
     odometry = _array([raw[scan.since - 1] for scan in kept])
-    return Motion(kept, odometry, poses[known], remarks=tuple(lost_remarks(known)))
+    return CarmenOdometry(kept, odometry, poses[known], remarks=tuple(lost_remarks(known)))
 
 
 def _stuck(robots: Sequence[Pose2], moves: list[OdometryLine]) -> bool:
     """Whether the scans' poses never change while the ODOM lines do: their writer had none."""
-    return _way(_array(robots)) == 0.0 and _way(_array([move.pose for move in moves])) > LEAST_WAY
+    return _travelled(_array(robots)) == 0.0 and _travelled(_array([move.pose for move in moves])) > LEAST_DISTANCE
 
 
-def _paired(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[str, float]) -> Motion:
+def _paired(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[str, float]) -> CarmenOdometry:
     """Scans without poses, with the ODOM lines around them."""
     mount, remarks = _stated_mount(settings)
     if not moves:
         why = "no ODOM lines and no poses in the scans; found by matching scans alone"
         remark = Remark(action="guessed", what="motion", why=why)
         odometry = np.zeros((len(scans), 3))
-        return Motion(scans, odometry, None, mount, has_odometry=False, remarks=(*remarks, remark))
+        return CarmenOdometry(scans, odometry, None, mount, has_odometry=False, remarks=(*remarks, remark))
     clocks = np.array([move.clock for move in moves])
     poses = _array([move.pose for move in moves])
     if (clocks > 0.0).all() and (np.diff(clocks) >= 0.0).all():
         odometry, known, lost = odometry_at(np.column_stack((clocks, poses)), np.array([s.stamp for s in scans]))
         if 2 * len(odometry) >= len(scans):
             kept = [scan for scan, has in zip(scans, known, strict=True) if has]
-            return Motion(kept, odometry, None, mount, remarks=(*remarks, *lost))
+            return CarmenOdometry(kept, odometry, None, mount, remarks=(*remarks, *lost))
     known = np.array([scan.since > 0 for scan in scans])
     why = "clocks of ODOM lines and scans differ; each scan takes the ODOM line before it"
     guessed = Remark(action="guessed", what="scans' odometry", why=why, count=max(int(known.sum()), 1))
     kept = [scan for scan in scans if scan.since > 0]
     odometry = poses[[scan.since - 1 for scan in kept]].reshape(-1, 3)
-    return Motion(kept, odometry, None, mount, remarks=(*remarks, guessed, *lost_remarks(known)))
+    return CarmenOdometry(kept, odometry, None, mount, remarks=(*remarks, guessed, *lost_remarks(known)))
 
 
 def _stated_mount(settings: dict[str, float]) -> tuple[Pose2, tuple[Remark, ...]]:
@@ -155,13 +155,13 @@ def _go_on(lines: list[int], moves: list[OdometryLine]) -> bool:
         duration = now.clock - last.clock
         if last.clock <= before.clock or duration <= 0.0:
             return False
-        way = last.pose.distance(now.pose)
-        if way < 2 * SMOOTH_REST:
+        step = last.pose.distance(now.pose)
+        if step < 2 * SMOOTH_REST:
             continue
         share = duration / (last.clock - before.clock)
         x, y = (b + share * (b - a) for a, b in ((before.pose.x, last.pose.x), (before.pose.y, last.pose.y)))
         driven += 1
-        good += math.hypot(now.pose.x - x, now.pose.y - y) <= SMOOTH * way + SMOOTH_REST
+        good += math.hypot(now.pose.x - x, now.pose.y - y) <= SMOOTH * step + SMOOTH_REST
     return driven > 0 and good >= DRIVEN * driven
 
 
@@ -179,7 +179,7 @@ def _array(poses: Sequence[Pose2]) -> FloatArray:
     return np.array([pose.as_tuple() for pose in poses], dtype=np.float64).reshape(-1, 3)
 
 
-def _way(poses: FloatArray) -> float:
-    """Length of a way [m], a radian of turning as a metre."""
+def _travelled(poses: FloatArray) -> float:
+    """Measure the travelled distance [m], a radian of turning as a metre."""
     turns = (np.diff(poses[:, 2]) + np.pi) % (2 * np.pi) - np.pi
     return float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum() + np.abs(turns).sum())

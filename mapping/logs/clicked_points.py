@@ -17,7 +17,7 @@ MOST = 10_000
 
 
 def is_bag(path: Path) -> bool:
-    """Tell whether a path looks like a bag rather than a list of doors."""
+    """Check whether a path looks like a bag rather than a list of doors."""
     return is_folder(path) or path.suffix.lower() in BAGS
 
 

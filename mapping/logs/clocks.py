@@ -48,14 +48,14 @@ class Times:
         return self.recorded.size < 3 or bool(np.ptp(self.recorded) > 0.0)
 
     def by_header(self) -> FloatArray:
-        """Return the sensor's own times; those that are not set from the recorder."""
+        """Take the sensor's own times; those that are not set come from the recorder."""
         unset = self.header <= 0.0
         if not unset.any() or not self.told:
             return self.header
         return np.where(unset, self.recorded - float(np.median(self.lag)), self.header)
 
     def by_recorder(self) -> FloatArray:
-        """Times on the recorder's clock, as even as the sensor's where that runs alike."""
+        """Take times on the recorder's clock, as even as the sensor's where that runs alike."""
         if not self.told:
             return self.recorded
         low, high = np.percentile(self.lag, (10.0, 90.0))
@@ -65,7 +65,7 @@ class Times:
 
 
 def scan_and_odometry_times(scans: Times, odometry: Times | None) -> tuple[FloatArray, FloatArray, list[Remark]]:
-    """Times of scans and odometry on one clock.
+    """Put the times of scans and odometry on one clock.
 
     Sensors' own clocks, where they agree; else the recorder's: sensors count from their own start, or write zeros.
 
@@ -93,7 +93,7 @@ def scan_and_odometry_times(scans: Times, odometry: Times | None) -> tuple[Float
 
 
 def forward(stamps: FloatArray) -> tuple[FloatArray, list[Remark]]:
-    """Stamps [s] whose clock never runs backwards: a jump back counts as no time."""
+    """Keep a clock from running backwards: a jump back in stamps [s] counts as no time."""
     steps = np.diff(stamps, prepend=stamps[:1])
     back = steps < 0.0
     steps[back] = 0.0

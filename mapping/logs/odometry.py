@@ -100,7 +100,7 @@ def _impossible(poses: FloatArray, steps: FloatArray, durations: FloatArray) -> 
 
 
 def odometry_at(track: FloatArray, stamps: FloatArray) -> tuple[FloatArray, BoolArray, list[Remark]]:
-    """Odometry at the times of scans.
+    """Interpolate the odometry at the times of scans.
 
     Args:
         track: ``stamp, x, y, theta`` in the order of time, shape (m, 4).

@@ -15,6 +15,7 @@ from closedrooms.core.files.incoming import check_regular, is_file, is_folder, r
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
+from closedrooms.mapping.logs.bag_limits import limited
 from closedrooms.mapping.logs.bag_messages import MAX_SCANS, BagMessages, choose_connections, read_messages, stamp_of
 from closedrooms.mapping.logs.bag_options import BagOptions
 from closedrooms.mapping.logs.bag_scans import ranges_of, scan_of
@@ -50,7 +51,7 @@ def read_bag(path: Path, options: BagOptions) -> RecordedRun:
 
 @contextlib.contextmanager
 def opened_bag(path: Path) -> Iterator[Any]:
-    """Return a reader of a bag of any kind.
+    """Open a bag of any kind.
 
     Raises:
         InvalidInputError: ``rosbags`` is not installed, or a broken bag.
@@ -66,6 +67,7 @@ def opened_bag(path: Path) -> Iterator[Any]:
         check_regular(file, "a rosbag")
     with (
         reading(path, "a rosbag"),
+        limited(path),
         _named(path) as named,
         # Bags of ROS 2 before Iron do not carry the definitions of their messages.
         AnyReader([named], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader,

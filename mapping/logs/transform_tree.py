@@ -105,7 +105,7 @@ class TransformTree:
         return twins[0] if len(twins) == 1 else None
 
     def rigid(self, start: str) -> dict[str, FloatArray]:
-        """Return all frames that do not move against ``start``, and ``start_T_frame`` of each, shape (4, 4)."""
+        """Collect all frames that do not move against ``start``, each with ``start_T_frame``, shape (4, 4)."""
         reached = {start: np.eye(4)}
         waiting = deque([start])
         while waiting:
@@ -126,14 +126,14 @@ class TransformTree:
                 yield parent, np.asarray(np.linalg.inv(link.matrix), dtype=np.float64)
 
     def mount(self, base: str, lidar: str) -> Mount:
-        """Tell where the lidar sits on the robot.
+        """Compute where the lidar sits on the robot.
 
         Args:
             base: Frame of the robot.
             lidar: Frame of the scans.
 
         Raises:
-            InvalidInputError: No constant way from one to the other, or a lidar that is not level.
+            InvalidInputError: No constant transforms from one to the other, or a lidar that is not level.
         """
         start, goal = self.find(base, beside=lidar), self.find(lidar, beside=base)
         if clean_name(base) == clean_name(lidar) or (start is not None and start == goal):
@@ -155,7 +155,7 @@ class TransformTree:
         return Mount(Pose2(*_planar(matrix)), upside_down=bool(matrix[2, 2] < 0.0))
 
     def _joined(self, start: str, goal: str) -> bool:
-        """Whether there is a way over moving transforms too."""
+        """Check whether moving transforms lead there too."""
         reached, waiting = {start}, deque([start])
         while waiting:
             name = waiting.popleft()
@@ -167,7 +167,7 @@ class TransformTree:
         return goal in reached
 
     def base_of(self, lidar: str) -> str | None:
-        """Return the frame of the robot that carries the lidar: of a usual name, else the root; ``None`` if unknown."""
+        """Find the frame of the robot that carries the lidar: of a usual name, else the root; ``None`` if unknown."""
         frame = self.find(lidar)
         if frame is None:
             return None
@@ -180,7 +180,7 @@ class TransformTree:
         return roots[0] if roots else None
 
     def odometry(self, lidar: str) -> "TransformOdometry | None":
-        """Return the transform by which the odometry moves the robot that carries the lidar."""
+        """Find the transform by which the odometry moves the robot that carries the lidar."""
         frame = self.find(lidar)
         if frame is None:
             return None
@@ -248,12 +248,12 @@ def _planar(matrix: FloatArray) -> tuple[float, float, float]:
 
 
 def clean_name(name: str) -> str:
-    """Return a frame's name without the slash that old tf began it with."""
+    """Strip from a frame's name the slash that old tf began it with."""
     return name.strip().strip("/")
 
 
 def last_name(name: str) -> str:
-    """Return a frame's name without prefix and namespace."""
+    """Strip prefix and namespace from a frame's name."""
     return clean_name(name).rpartition("/")[2]
 
 

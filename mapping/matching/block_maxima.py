@@ -37,7 +37,7 @@ class BlockMaxima:
         return self._maxima[cells]
 
     def bounds_of(self, angles: IntArray, shifts: IntArray, cells: int) -> FloatArray:
-        """Bounds in some blocks: their turns, shape (b,), and first shifts, shape (b, s, 2); to (b, s)."""
+        """Bound some blocks: by their turns, shape (b,), and first shifts, shape (b, s, 2); returns shape (b, s)."""
         maxima = self._highest(cells)
         flat = self._rows[angles] * maxima.shape[1] + self._cols[angles]
         offsets = shifts[..., 0] * maxima.shape[1] + shifts[..., 1]
@@ -46,7 +46,7 @@ class BlockMaxima:
         return np.asarray(sums.reshape(offsets.shape) * (1.0 / (255.0 * flat.shape[1])), dtype=np.float64)
 
     def bounds(self, half: int, cells: int) -> FloatArray:
-        """Bounds in all blocks, shape (turns, blocks): they start at ``-half``, ``-half + cells``, ..., rows first."""
+        """Bound all blocks, shape (turns, blocks): they start at ``-half``, ``-half + cells``, ..., rows first."""
         side = 2 * half // cells + 1
         if side <= FEW_BLOCKS:
             starts = pairs(np.arange(side) * cells - half)
@@ -71,5 +71,5 @@ class BlockMaxima:
 
 
 def pairs(steps: IntArray) -> IntArray:
-    """Return all pairs of two steps, rows first, shape (steps^2, 2)."""
+    """List all pairs of two steps, rows first, shape (steps^2, 2)."""
     return np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)

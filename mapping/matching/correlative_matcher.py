@@ -13,7 +13,7 @@ from closedrooms.mapping.matching.likelihood_field import Float32Array, Likeliho
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
+class SearchWindow:
     """Half widths of a search: ``distance`` [m] in x and y, ``angle`` [rad]."""
 
     distance: float
@@ -21,7 +21,7 @@ class Window:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class BestPose:
     """Best pose of a window and its mean likelihood [0..1]."""
 
     pose: Pose2
@@ -37,7 +37,7 @@ TIE = 1e-9
 """Mean likelihood by which a later candidate must be better: rounding decides nothing."""
 
 
-class Search:
+class WindowSearch:
     """The poses of a window, on a lattice, and the one of the highest mean likelihood among them, found exactly.
 
     Correlative scan matching after Olson, ICRA 2009, section III: scores on a field of block maxima are upper bounds,
@@ -49,7 +49,7 @@ class Search:
         field: LikelihoodField,
         points: FloatArray,
         guess: Pose2,
-        window: Window,
+        window: SearchWindow,
         *,
         coarse_cells: int = 4,
         prior_sigmas: tuple[float, float] | None = None,
@@ -85,8 +85,8 @@ class Search:
         self._parts = pairs(np.arange(0, coarse_cells, self._small))
         self._inner = pairs(np.arange(self._small))
 
-    def best(self, *, away_from: tuple[Pose2, float, float] | None = None, floor: float = -math.inf) -> Found:
-        """Return the pose of the window with the highest mean likelihood, less what the prior takes.
+    def best(self, *, away_from: tuple[Pose2, float, float] | None = None, floor: float = -math.inf) -> BestPose:
+        """Find the pose of the window with the highest mean likelihood, less what the prior takes.
 
         Args:
             away_from: A pose, and the distance [m] and the turn [rad] within both of which none is taken: finds its
@@ -130,7 +130,7 @@ class Search:
                 best, best_score = float(penalised[k]), float(scores.ravel()[k])
                 dy, dx = flat_fine[k] * self._resolution
                 best_pose = Pose2(guess.x + float(dx), guess.y + float(dy), guess.theta + float(turns[k]))
-        return Found(best_pose, best_score)
+        return BestPose(best_pose, best_score)
 
     def _split(self, angles: IntArray, corners: IntArray, best: float) -> tuple[IntArray, IntArray]:
         """Large blocks cut into small ones, less those whose bound is not above ``best``.

@@ -117,7 +117,7 @@ class _Slopes:
         self._turned, self._uv, self._floors = np.empty((3, 2, len(points)))
 
     def at(self, x: float, y: float, theta: float) -> FloatArray:
-        """Sums of the products of the four terms at a pose (cells, radians), shape (4, 4)."""
+        """Sum the products of the four terms at a pose (cells, radians), shape (4, 4)."""
         c, s = math.cos(theta), math.sin(theta)
         u0, v0 = x - self._origin[0], y - self._origin[1]
         rotation, shift, turned, uv, floors = self._rotation, self._shift, self._turned, self._uv, self._floors
@@ -151,7 +151,7 @@ class _Slopes:
         return np.asarray(self._terms @ self._terms.T)
 
     def score(self) -> float:
-        """Mean likelihood at the last pose [0..1]."""
+        """Compute the mean likelihood at the last pose [0..1]."""
         return 1.0 - float(self._terms[3].mean())
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import RecoveryConfig
-from closedrooms.mapping.matching.correlative_matcher import Search, Window
+from closedrooms.mapping.matching.correlative_matcher import SearchWindow, WindowSearch
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 from closedrooms.mapping.matching.scan_matcher import Match
@@ -48,8 +48,8 @@ def relocalise(
         The match; the one in doubt where nothing fits clearly better (the surroundings have changed); ``None`` where
         no pose fits, or several do (a corridor, rooms of one size in a row).
     """
-    search = Search(
-        field, points, guess, Window(reach, math.pi), coarse_cells=COARSE_CELLS, prior_sigmas=(reach, math.pi)
+    search = WindowSearch(
+        field, points, guess, SearchWindow(reach, math.pi), coarse_cells=COARSE_CELLS, prior_sigmas=(reach, math.pi)
     )
 
     def refined(pose: Pose2) -> _Candidate:

@@ -8,11 +8,11 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MatcherConfig
-from closedrooms.mapping.matching.correlative_matcher import Search, Window
+from closedrooms.mapping.matching.correlative_matcher import SearchWindow, WindowSearch
 from closedrooms.mapping.matching.gauss_newton_matcher import Refined, refine
 from closedrooms.mapping.matching.heading_search import search_heading
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
-from closedrooms.mapping.motion import Motion
+from closedrooms.mapping.motion import UncertainMotion
 
 ADVANTAGE = 0.03
 """Mean likelihood by which a searched pose must beat the refined odometry to replace it."""
@@ -39,7 +39,7 @@ def match_scan(
     field: LikelihoodField,
     points: FloatArray,
     guess: Pose2,
-    motion: Motion,
+    motion: UncertainMotion,
     *,
     usual_score: float,
     config: MatcherConfig,
@@ -48,7 +48,7 @@ def match_scan(
     """Refine the pose that odometry predicts, so that the scan lies on the surfaces of the field.
 
     The prediction is refined at once (:func:`refine`); when the fit is worse than usual, the window that the odometry
-    leaves open is searched (:class:`Search`).
+    leaves open is searched (:class:`~closedrooms.mapping.matching.correlative_matcher.WindowSearch`).
 
     Args:
         field: Surfaces known so far.
@@ -78,14 +78,14 @@ def match_scan(
     if direct.score >= doubted and motion.unmeasured is None:
         return Match(direct.pose, direct.score, direct.hessian)
     if motion.unmeasured is None:
-        window = Window(
+        window = SearchWindow(
             min(max(config.window_sigmas * sigma_distance, 3 * field.lattice.resolution), config.max_window),
             min(max(config.window_sigmas * sigma_angle, 0.05), config.max_window_angle),
         )
     else:
         # The standard deviation is the size of the step itself.
-        window = Window(min(1.5 * sigma_distance, reach), min(1.5 * sigma_angle, math.pi))
-    found = Search(field, points, guess, window, prior_sigmas=(sigma_distance, sigma_angle)).best()
+        window = SearchWindow(min(1.5 * sigma_distance, reach), min(1.5 * sigma_angle, math.pi))
+    found = WindowSearch(field, points, guess, window, prior_sigmas=(sigma_distance, sigma_angle)).best()
     best = direct
     if found.score > 0.0:
         other = refined(found.pose)

@@ -20,7 +20,7 @@ from closedrooms.worlds.truth import reachable
 def drive_metrics(
     drive: DriveResult, plan: FloorPlan, map_T_world: Pose2, truth: Truth, full_knowledge: CoverageTour | None
 ) -> dict[str, Any]:
-    """Figures of a driven tour.
+    """Compute the figures of a driven tour.
 
     Args:
         drive: How it went.
@@ -66,7 +66,7 @@ def drive_metrics(
 
 
 def drive_features(drive: DriveResult) -> list[Feature]:
-    """Return the path that was driven, for ``tour.geojson``, and the vertices that could not be reached."""
+    """List the path that was driven, for ``tour.geojson``, and the vertices that could not be reached."""
     log = drive.log
     features: list[Feature] = [
         (

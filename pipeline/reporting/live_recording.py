@@ -1,6 +1,6 @@
 """Tells the recorder about a run while the robot drives: call after every step of the control loop."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from closedrooms.core.door import ClosedDoor
@@ -95,15 +95,23 @@ class ExplorationRecording:
 class DriveRecording:
     """A driven tour, step by step."""
 
-    def __init__(self, recorder: "Recorder", log: RunLog, reopened: ReopenedMap, follower: TourFollower) -> None:
+    def __init__(
+        self,
+        recorder: "Recorder",
+        log: RunLog,
+        reopened: ReopenedMap,
+        follower: TourFollower,
+        doors_move: Callable[[float], bool],
+    ) -> None:
         self._recorder, self._log, self._reopened, self._follower = recorder, log, reopened, follower
+        self._doors_move = doors_move
         self._told: int | None = None
 
     def __call__(self, step: Step) -> None:
         """Record one step."""
         recorder, follower, stamp = self._recorder, self._follower, step.stamp
         record_step(recorder, self._log, step)
-        if follower.is_waiting(stamp):
+        if self._doors_move(stamp):
             recorder.door_states(self._log.sim.door_states(), stamp)
         if recorder.wants_map(stamp):
             recorder.map(self._reopened.grid(), stamp)

@@ -14,7 +14,7 @@ LIBRARIES = (
 
 
 def versions() -> dict[str, str]:
-    """Version of every library that can change a result."""
+    """Look up the version of every library that can change a result."""
     return dict(_versions())
 
 
@@ -30,13 +30,13 @@ def _versions() -> dict[str, str]:
 
 
 def resolved(config: Any, *, leave_out: tuple[str, ...] = ("out",)) -> dict[str, Any]:
-    """Return a configuration as plain JSON values; fields that hold paths of this run (``leave_out``) are not in it."""
+    """Write a configuration as plain JSON values, without the fields (``leave_out``) that hold paths of this run."""
     values = dataclasses.asdict(config)
     return {name: _plain(value) for name, value in values.items() if name not in leave_out}
 
 
 def input_path(given: str | Path) -> str:
-    """Return an input as a run elsewhere finds it again: the whole path of a file, a name as it is."""
+    """Write an input as a run elsewhere finds it again: a file by its whole path, a name as it is."""
     return str(Path(given).resolve()) if isinstance(given, Path) or Path(given).exists() else given
 
 

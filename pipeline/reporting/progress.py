@@ -56,7 +56,7 @@ class Pace:
         return f"{self.name}: {number}" + ("" if remaining is None else f", {_duration(remaining)} left")
 
     def remaining(self, done: float, now: float) -> float | None:
-        """Seconds that the rest will take; ``None`` while nobody knows."""
+        """Estimate the seconds that the rest will take; ``None`` while nobody knows."""
         if self._first is None:
             self._first = (done, now)
         start, since = self._first

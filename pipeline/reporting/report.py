@@ -21,7 +21,7 @@ def run_report(
     stopped: Mapping[str, str] | None = None,
     remarks: Sequence[Remark] = (),
 ) -> Report:
-    """Return the report of a finished run.
+    """Report on a finished run.
 
     Args:
         folder: The run directory.
@@ -38,6 +38,7 @@ def run_report(
         *_map_rows(manifest),
         *_room_rows(manifest),
         *tour_rows(metrics["tour"]),
+        *spread_rows(metrics.get("completions")),
         *drive_rows(metrics.get("drive")),
         *((f"time: {stage}", f"{seconds:.2f} s") for stage, seconds in durations.items()),
     ]
@@ -78,12 +79,12 @@ def _count(metrics: Mapping[str, Any]) -> str:
 
 
 def figure(value: float | None, form: str, *, scale: float = 1.0) -> str:
-    """Return a figure in words: ``n/a`` where it could not be computed."""
+    """Write a figure in words: ``n/a`` where it could not be computed."""
     return NOT_AVAILABLE if value is None else form.format(value * scale)
 
 
 def tour_rows(tour: Mapping[str, Any]) -> Rows:
-    """Lengths of the tours and the errors of the estimates (paper, section 5.3)."""
+    """List lengths of the tours and errors of the estimates (paper, section 5.3)."""
     names = {"closed": "map with closed doors", "predicted": "predicted map", "truth": "true map"}
     lengths = {name: tour[name]["length_m"] if name in tour else None for name in names}
     rows = [(f"tour on the {text}", figure(lengths[name], "{:.1f} m")) for name, text in names.items()]
@@ -91,8 +92,21 @@ def tour_rows(tour: Mapping[str, Any]) -> Rows:
     return rows + [(f"tour error, {name}", figure(error, "{:.1f} %")) for name, error in errors.items()]
 
 
+def spread_rows(spread: Mapping[str, Any] | None) -> Rows:
+    """Tell what covering the building may cost, as it is drawn from what the rooms may be."""
+    if spread is None:
+        return []
+    share, low, high = 100 * spread["interval"], spread["low_m"], spread["high_m"]
+    rows = [
+        (f"tour, {spread['count']} completions", f"{spread['mean_m']:.1f} m, {share:.0f} %: {low:.1f} to {high:.1f} m")
+    ]
+    if "true_within" in spread:
+        rows.append(("true tour within", "yes" if spread["true_within"] else "no"))
+    return rows
+
+
 def drive_rows(drive: Mapping[str, Any] | None) -> Rows:
-    """Tell how the driven tour went."""
+    """List how the driven tour went."""
     if drive is None:
         return []
     rows: Rows = [
@@ -110,7 +124,7 @@ def drive_rows(drive: Mapping[str, Any] | None) -> Rows:
 
 
 def markdown(report: Report) -> str:
-    """Return the table of results for a recording; times differ from run to run, recordings of equal runs must not."""
+    """Write the table of results for a recording, without times: recordings of equal runs must not differ."""
     head, *rows = report.table()
     lines = [f"| {' | '.join(row)} |" for row in rows if not row[0].startswith("time")]
     return "\n".join([f"# {report.title}", "", f"| {' | '.join(head)} |", "| --- | ---: |", *lines])

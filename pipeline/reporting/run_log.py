@@ -58,5 +58,5 @@ class RunLog:
         return np.array(self._truth).reshape(-1, 3)
 
     def recorded(self) -> RecordedRun:
-        """Return every scan with odometry and true pose, for ``scans.npz``; needs ``keep_scans``."""
+        """Collect every scan with odometry and true pose, for ``scans.npz``; needs ``keep_scans``."""
         return RecordedRun(tuple(self._scans), np.array(self._odometry), self.truth)

@@ -18,7 +18,7 @@ SEEN_SPACING, SEEN_SHARE = 0.25, 0.5
 
 
 def area_mapped(grid: OccupancyGrid, reachable: BoolArray) -> float | None:
-    """Share (0..1) of the reachable true free cells that the map knows; ``None`` when nothing is reachable.
+    """Compute the share (0..1) of reachable true free cells that the map knows; ``None`` when none is reachable.
 
     Args:
         grid: The map.
@@ -29,7 +29,7 @@ def area_mapped(grid: OccupancyGrid, reachable: BoolArray) -> float | None:
 
 
 def room_iou(predicted: Sequence[Room], truth: Sequence[Room]) -> dict[str, float]:
-    """Intersection over union of predicted and true room by door id (paper, section 4.1), 0 without a prediction.
+    """Compute intersection over union of predicted and true rooms by door id (paper, section 4.1), 0 if not predicted.
 
     Args:
         predicted: Predicted rooms, map frame.
@@ -45,7 +45,7 @@ def room_iou(predicted: Sequence[Room], truth: Sequence[Room]) -> dict[str, floa
 
 
 def polygon_iou(a: BaseGeometry, b: BaseGeometry) -> float:
-    """Intersection over union of two areas, 0 where both are empty."""
+    """Compute intersection over union of two areas, 0 where both are empty."""
     # A room whose outline touches itself (slivers at slanted walls) has no clean boundary to intersect.
     a, b = (shape if shape.is_valid else shapely.make_valid(shape) for shape in (a, b))
     union = a.union(b).area
@@ -53,12 +53,12 @@ def polygon_iou(a: BaseGeometry, b: BaseGeometry) -> float:
 
 
 def rounded(value: float | None) -> float | None:
-    """Return a figure as it stands in ``run.json``; ``None`` for one that cannot be computed."""
+    """Round a figure for ``run.json``; ``None`` for one that cannot be computed."""
     return None if value is None else round(value, 5)
 
 
 def mean(figures: Mapping[str, float]) -> float | None:
-    """Mean of some figures, ``None`` without any."""
+    """Average some figures, ``None`` without any."""
     return float(np.mean(list(figures.values()))) if figures else None
 
 
@@ -68,7 +68,7 @@ def rooms_seen(plan: FloorPlan, grid: OccupancyGrid, map_T_world: Pose2) -> int:
 
 
 def room_points(plan: FloorPlan) -> list[FloatArray]:
-    """Points spread evenly over each room that has an inside, shape (n, 2) each, building frame [m]."""
+    """Spread points evenly over each room that has an inside, shape (n, 2) each, building frame [m]."""
     spread = []
     for room in plan.rooms:
         interior = room_interior(plan, room.id)
@@ -83,7 +83,7 @@ def room_points(plan: FloorPlan) -> list[FloatArray]:
 
 
 def count_seen(rooms: Sequence[FloatArray], grid: OccupancyGrid, map_T_world: Pose2) -> int:
-    """:func:`rooms_seen` for many maps of one building, whose :func:`room_points` are computed once."""
+    """Count as :func:`rooms_seen` on many maps of one building, whose :func:`room_points` are computed once."""
     known = grid.known
     seen = 0
     for points in rooms:

@@ -27,6 +27,6 @@ class Stopwatch:
         self._seconds[name] = self._seconds.get(name, 0.0) + seconds
 
     def seconds(self) -> dict[str, float]:
-        """Seconds by stage, rounded to milliseconds, and ``total`` since the stopwatch was made."""
+        """List seconds by stage, rounded to milliseconds, and ``total`` since the stopwatch was made."""
         stages = {name: round(seconds, 3) for name, seconds in self._seconds.items()}
         return stages | {"total": round(time.perf_counter() - self._begin, 3)}

@@ -1,7 +1,7 @@
 """The method ``best``: rectangles between wall faces, chosen jointly by their evidence; ``method`` calls the steps.
 
 - ``scene``: the map along its walls, the doors' poses (``door_pose``, ``door_frame``), in cells of the ``lattice``.
-- ``hypotheses``: rectangles (``candidates``) scored by ``features`` of the ``evidence``; ``symmetry`` of buildings.
+- ``hypotheses``: rectangles (``candidates``) scored by ``features`` of the ``evidence``.
 - ``selection``: all rooms together, by ``pair_features``; ``shared_rooms`` of two doors.
 - ``room_shape``: from rectangles to rooms.
 """

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.room import Alternative, Room
 from closedrooms.predictor.best.door_frame import TurnedMap
 from closedrooms.predictor.best.lattice import in_cells
@@ -35,29 +35,45 @@ def believe(
 
 
 def _believe(scene: Scene, choice: Choice, openings: Sequence[Doorway | None]) -> Belief:
-    overlap = overlaps_of(choice.options.boxes)
-    chosen = choose_diverse(overlap, choice.weights, choice.index)
-    shares = share_nearest(overlap, choice.weights, chosen)
+    boxes, corners, weights = _weigh_all(choice)
+    overlap = overlaps_of(boxes)
+    chosen = choose_diverse(overlap, weights, choice.index)
+    shares = share_nearest(overlap, weights, chosen)
     others = []
-    for at, share in sorted(zip(chosen[1:], shares[1:], strict=True), key=lambda pair: -pair[1]):
-        shape = trace_room(scene, choice, choice.options.corners[at], openings)
+    for at, share in zip(chosen[1:], shares[1:], strict=True):
+        shape = trace_room(scene, choice, corners[at], openings)
         if shape is not None:
             others.append(Alternative(shape, float(share)))
     turned = scene.turned[choice.options.angle]
-    spread = _spread(turned, choice, in_cells(scene.walls.least))
-    evidence = (*_measure_doubt(choice, overlap), *choice.options.measured[choice.index].tolist())
-    return Belief(float(overlap[choice.index] @ choice.weights), tuple(others), spread, evidence)
+    spread = _spread(turned, boxes, weights, in_cells(scene.walls.least))
+    evidence = (
+        *_measure_doubt(choice, overlap[: len(choice.weights), choice.index]),
+        *choice.options.measured[choice.index].tolist(),
+    )
+    return Belief(float(overlap[choice.index] @ weights), tuple(others), spread, evidence)
+
+
+def _weigh_all(choice: Choice) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Collect all rectangles that a room could have, those of its own doors first: cells, corners and probabilities."""
+    lots = [own for own, _ in choice.rivals]
+    others = [weights for _, weights in choice.rivals]
+    left = 1.0 - sum(float(weights.sum()) for weights in others)
+    return (
+        np.concatenate([choice.options.boxes, *(own.boxes for own in lots)]),
+        np.concatenate([choice.options.corners, *(own.corners for own in lots)]),
+        np.concatenate([left * choice.weights, *others]),
+    )
 
 
 def _measure_doubt(choice: Choice, overlap: FloatArray) -> tuple[float, float, float, float]:
-    """Measure how clear a choice is.
+    """Measure how clear a choice is, whose rectangle has these overlaps with all that it could be, shape (n,).
 
     Its score by itself; how much better it is than what overlaps with it by less than :data:`OTHER`; how far areas are
     spread (standard deviation of the logarithm); entropy of the probabilities.
     """
     options, weights = choice.options, choice.weights
     score = float(options.scores[choice.index])
-    apart = overlap[:, choice.index] < OTHER
+    apart = overlap < OTHER
     margin = score - float(options.scores[apart].max() if apart.any() else options.scores.min())
     areas = np.log((options.boxes[:, 2:] - options.boxes[:, :2]).prod(axis=-1))
     spread = float(np.sqrt(weights @ (areas - weights @ areas) ** 2))
@@ -65,14 +81,13 @@ def _measure_doubt(choice: Choice, overlap: FloatArray) -> tuple[float, float, f
     return score / 10.0, margin, spread, entropy
 
 
-def _spread(turned: TurnedMap, choice: Choice, thickness: int) -> Spread:
+def _spread(turned: TurnedMap, boxes: IntArray, weights: FloatArray, thickness: int) -> Spread:
     """Add up all rectangles, each with its probability, where known space and its walls leave room."""
-    boxes = choice.options.boxes
     (x0, y0), (x1, y1) = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
     steps = np.zeros((y1 - y0 + 1, x1 - x0 + 1))
     left, low, right, high = boxes[:, 0] - x0, boxes[:, 1] - y0, boxes[:, 2] - x0, boxes[:, 3] - y0
     for rows, cols, sign in ((low, left, 1), (low, right, -1), (high, left, -1), (high, right, 1)):
-        np.add.at(steps, (rows, cols), sign * choice.weights)
+        np.add.at(steps, (rows, cols), sign * weights)
     share: FloatArray = steps.cumsum(axis=0).cumsum(axis=1)[:-1, :-1]
     share = np.clip(share, 0.0, 1.0) * ~_find_taken(turned, (x0, y0, x1, y1), thickness)
     angle = turned.angle

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.predictor.best.door_frame import DoorFrame, Table, Window
-from closedrooms.predictor.best.door_pose import Entry
+from closedrooms.predictor.best.door_pose import DoorsSeen, Entry
 from closedrooms.predictor.best.evidence import REACH, SLACK, Evidence
 from closedrooms.predictor.best.lattice import in_cells
 
@@ -23,8 +23,6 @@ JAMB, SHALLOWEST = in_cells(0.2), in_cells(1.0)
 BESIDE_DOOR = in_cells(3.0)
 # So many of the strongest positions of a side are tried, so far apart [cells], with so much wall at least [cells].
 STRONGEST, APART, LEAST = 12, in_cells(0.2), 8.0
-# So many walls of the other half of a symmetric building are tried for each side, with so much wall at least [cells].
-MIRRORED, LEAST_MIRRORED = 3, 20.0
 # Sides are tried where nothing shows any, too: so far from the door [cells], and so far before the next door of the
 # wall: a wall further, and right before it. Backs are tried at the depths that rooms often have [cells].
 SIDES = tuple(in_cells(width) for width in (0.5, 2.0, 4.0))
@@ -52,18 +50,22 @@ def window_around(frame: DoorFrame, entry: Entry, largest: int) -> Window:
     )
 
 
-def propose(frame: DoorFrame, evidence: Evidence, entry: Entry, smallest: int, largest: int) -> IntArray:
-    """Propose all rectangles between plausible sides.
+def propose(
+    frame: DoorFrame, evidence: Evidence, entry: Entry, doors: DoorsSeen, smallest: int, largest: int
+) -> tuple[IntArray, BoolArray]:
+    """Propose all rectangles between plausible sides: where another door leads is another room, or the same one.
 
     Args:
         frame: The door's frame.
         evidence: Its tables.
         entry: The door.
+        doors: All others.
         smallest: Width and depth of a room at least [cells].
         largest: Width and depth of a room at most [cells].
 
     Returns:
-        ``u0, v0, u1, v1`` [cells of the frame], shape (n, 4).
+        ``u0, v0, u1, v1`` [cells of the frame], shape (n, 4), and which of the other doors lead there too, shape
+        (n, doors).
     """
     v0 = entry.v0
     # Known space that cuts in behind the door's wall, as far as a side may lie.
@@ -72,22 +74,27 @@ def propose(frame: DoorFrame, evidence: Evidence, entry: Entry, smallest: int, l
     front = Window(min(max(v0 + FRONT[0], 0), rows), near.u0, min(max(v0 + FRONT[1], 0), rows), near.u1)
     cut_at = np.flatnonzero(frame.taken(front).mean(axis=0) > 0.5) + near.u0 if front.cells > 0 else NONE
     right, left = cut_at[cut_at > entry.u + JAMB][:1], cut_at[cut_at < entry.u - JAMB][-1:] + 1
-    right = _find_positions(evidence, entry, frame.thickness, "right", largest, also=right)
-    left = _find_positions(evidence, entry, frame.thickness, "left", largest, also=left)
-    back = _find_positions(evidence, entry, frame.thickness, "top", largest)
+    # A side that another door is in is where that door says.
+    across = [doors.leaves[doors.columns == column, column % 2] for column in (0, 2, 3)]
+    left = _find_positions(evidence, entry, frame.thickness, "left", largest, also=[*left, *across[0]])
+    right = _find_positions(evidence, entry, frame.thickness, "right", largest, also=[*right, *across[1]])
+    back = _find_positions(evidence, entry, frame.thickness, "top", largest, also=across[2])
     u0, u1, v1 = (grid.ravel() for grid in np.meshgrid(left, right, back, indexing="ij"))
     fits = (u1 - u0 >= smallest) & (u1 - u0 <= largest) & (v1 - v0 >= smallest) & (v1 - v0 <= largest)
     boxes = np.stack((u0, np.full_like(u0, v0), u1, v1), axis=-1)[fits]
     taken = evidence.taken.count(boxes[:, 1], boxes[:, 0], boxes[:, 3], boxes[:, 2])
     size = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1])
-    clear = taken <= MAX_OVERLAP * size
-    for pu, pv in entry.others:
-        clear &= ~((boxes[:, 0] < pu) & (pu < boxes[:, 2]) & (boxes[:, 1] < pv) & (pv < boxes[:, 3]))
-    if clear.any():
-        return boxes[clear]
+    clear = np.flatnonzero(taken <= MAX_OVERLAP * size)
+    behind = doors.find_behind(boxes[clear])
+    other = (behind & ~doors.find_entered(boxes[clear])).any(axis=1)
+    clear, behind = clear[~other], behind[~other]
+    if (~behind.any(axis=1)).any():
+        return boxes[clear], behind
     # An alcove: every door that opens to unknown space has some room, here what known space leaves of a small one.
     least = np.array([[round(entry.u) - ALCOVE, v0, round(entry.u) + ALCOVE, v0 + 2 * ALCOVE]])
-    return np.concatenate((least, boxes[np.argsort(taken / np.maximum(size, 1), kind="stable")[:FEW]]))
+    few = boxes[np.argsort(taken / np.maximum(size, 1), kind="stable")[:FEW]]
+    alone = np.zeros((1 + len(few), behind.shape[1]), dtype=np.bool_)
+    return np.concatenate((least, few, boxes[clear])), np.concatenate((alone, behind))
 
 
 def _find_positions(
@@ -117,8 +124,6 @@ def _find_positions(
     strength = total(evidence.same[side], along) + total(evidence.tight[side], along)
     strength += 2.0 * (total(evidence.same[side], near) + total(evidence.tight[side], near))
     found = _find_peaks(positions, strength, STRONGEST, least=LEAST)
-    if evidence.mirrored:
-        found += _find_peaks(positions, total(evidence.mirrored[side], near), MIRRORED, least=LEAST_MIRRORED)
     extra: list[float] = [float(at) for at in also]
     # Where known space begins, less a wall.
     share = total(evidence.closed[side], near) / max(near[1] - near[0], 1)

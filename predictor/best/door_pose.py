@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.predictor.best.door_frame import DoorFrame, TurnedMap, Window
 from closedrooms.predictor.best.lattice import in_cells
@@ -25,6 +25,10 @@ BEHIND = in_cells(0.8)
 # Free space before a door is looked for between these distances from its wall, and goes on over gaps up to GAP_ALONG
 # [cells].
 CORRIDOR, GAP_ALONG = (in_cells(0.25), in_cells(0.9)), in_cells(0.5)
+# A room reaches this far past each of its doors [cells].
+PAST = in_cells(0.3)
+# It begins this near to where each of them says [cells]: two doors of one wall may disagree.
+NEAR_LEAF = in_cells(0.4)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,9 +60,9 @@ class Entry:
         v0: Near face of the room [cells].
         left: Next door of the same wall to the left: its position along the wall [cells], ``None`` where none is.
         right: The same to the right.
-        others: Points that belong to rooms of other doors, ``(u, v)`` [cells], shape (k, 2).
         row: Doors of the same wall, this one included.
         front: First and last edge of the free space before the door, along the wall [cells].
+        span: First and last door of the room in this wall, ``u`` twice for one door [cells].
     """
 
     u: float
@@ -66,9 +70,58 @@ class Entry:
     v0: int
     left: float | None
     right: float | None
-    others: FloatArray
     row: int
     front: tuple[int, int]
+    span: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DoorsSeen:
+    """All doors of a map as seen from one frame, n of them; ``(u, v)`` [cells].
+
+    Attributes:
+        behind: A point of the room behind each, shape (n, 2).
+        leaves: Where each room begins, in the middle of its door, shape (n, 2).
+        columns: The side of its room that each door is in, as a column of ``u0, v0, u1, v1``; -1 for a door in a wall
+            of another direction, shape (n,).
+    """
+
+    behind: FloatArray
+    leaves: FloatArray
+    columns: IntArray
+
+    def without(self, door: int) -> "DoorsSeen":
+        """Leave one door out."""
+        rest = np.arange(len(self.columns)) != door
+        return DoorsSeen(self.behind[rest], self.leaves[rest], self.columns[rest])
+
+    def enter_with(self, entry: Entry, doors: BoolArray) -> Entry:
+        """Make the entry of a room that some of these doors lead to as well as the one of ``entry``."""
+        in_wall = (self.columns == 1) & (np.abs(self.leaves[:, 1] - entry.v0) < SAME_WALL)
+        own = np.append(self.leaves[doors & in_wall, 0], entry.u)
+        first, last = float(own.min()), float(own.max())
+        rest = self.leaves[~doors & in_wall, 0]
+        left, right = rest[rest < first].max(initial=-np.inf), rest[rest > last].min(initial=np.inf)
+        return replace(
+            entry,
+            span=(first, last),
+            left=float(left) if np.isfinite(left) else None,
+            right=float(right) if np.isfinite(right) else None,
+        )
+
+    def find_behind(self, boxes: IntArray) -> BoolArray:
+        """Tell behind which doors each rectangle, ``u0, v0, u1, v1``, reaches, shape (boxes, doors)."""
+        low, high = boxes[:, None, :2], boxes[:, None, 2:]
+        return np.asarray(((low < self.behind) & (self.behind < high)).all(axis=-1))
+
+    def find_entered(self, boxes: IntArray) -> BoolArray:
+        """Tell which doors each rectangle, ``u0, v0, u1, v1``, begins behind, shape (boxes, doors)."""
+        axis = self.columns % 2
+        doors = np.arange(len(axis))
+        across, along = self.leaves[doors, axis], self.leaves[doors, 1 - axis]
+        low, high = boxes[:, 1 - axis], boxes[:, 3 - axis]
+        beside = np.abs(boxes[:, self.columns] - across) <= NEAR_LEAF
+        return np.asarray((self.columns >= 0) & beside & (low <= along - PAST) & (high >= along + PAST))
 
 
 def face_door(door: ClosedDoor, turned: TurnedMap, *, reach: float) -> DoorPose | str:
@@ -133,7 +186,6 @@ def enter(frame: DoorFrame, pose: DoorPose, poses: Sequence[DoorPose]) -> Entry:
     face = low + int(seen.argmax()) - v if seen.size and seen.max() >= LEAST_FACE else 0.0
     v0 = round(v + max(min(face + frame.thickness, frame.thickness / 2), 0.5))
     left = right = None
-    others = []
     row = 1
     for other in poses:
         if other is pose:
@@ -143,17 +195,28 @@ def enter(frame: DoorFrame, pose: DoorPose, poses: Sequence[DoorPose]) -> Entry:
             row += 1
             left = ou if ou < u and (left is None or ou > left) else left
             right = ou if ou > u and (right is None or ou < right) else right
-        behind = other.facing.middle + BEHIND * frame.resolution * other.facing.inward
-        others.append(frame.to_frame(behind))
-    return Entry(u, v, v0, left, right, np.array(others).reshape(-1, 2), row, _find_front(frame.free, u, v))
+    return Entry(u, v, v0, left, right, row, _find_front(frame.free, u, v), (u, u))
 
 
-def enter_between(first: Entry, second: Entry) -> Entry:
-    """Make the entry of a room behind two doors of one wall, ``first`` left of ``second``, between the outer ones."""
-    # The point behind the second door lies straight ahead of it.
-    ahead = (np.abs(first.others[:, 0] - second.u) < 0.5) & (np.abs(first.others[:, 1] - second.v0) < 2 * BEHIND)
-    return replace(
-        first, u=(first.u + second.u) / 2, v0=max(first.v0, second.v0), right=second.right, others=first.others[~ahead]
+def see_doors(frame: DoorFrame, poses: Sequence[DoorPose], entries: Sequence[tuple[DoorFrame, Entry]]) -> DoorsSeen:
+    """See all doors of a map from one frame: where the rooms behind them begin.
+
+    Args:
+        frame: To see them from.
+        poses: Of all doors.
+        entries: Of all doors, each with its own frame.
+    """
+    behind, leaves, columns = [], [], []
+    for pose, (own, entry) in zip(poses, entries, strict=True):
+        middle = pose.facing.middle
+        behind.append(frame.to_frame(middle + BEHIND * frame.resolution * pose.facing.inward))
+        leaves.append(frame.to_frame(own.to_map(np.array([entry.u, entry.v0]))))
+        quarters = (own.angle - frame.angle) / (math.pi / 2)
+        turned = abs(quarters - round(quarters)) > 1e-6
+        # A door that looks to the left is in the right side of its room.
+        columns.append(-1 if turned else (1, 2, 3, 0)[round(quarters) % 4])
+    return DoorsSeen(
+        np.array(behind).reshape(-1, 2), np.array(leaves).reshape(-1, 2), np.array(columns, dtype=np.int64)
     )
 
 

@@ -1,6 +1,6 @@
 """What a door's frame says about every possible side of a room, as tables (method ``best``)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -31,7 +31,6 @@ SPANS = (in_cells(1.0), in_cells(25.0))
 # Free space this many times longer than wide is a corridor: rooms are rarely longer than 3 to 1.
 CORRIDOR_RATIO = 3.5
 
-NOTHING = np.zeros((0, 0), dtype=np.bool_)
 UInt8Array = npt.NDArray[np.uint8]
 
 
@@ -42,8 +41,7 @@ class Evidence:
     Each is a table of edges, indexed [along, position], so that any stretch of a side costs four look-ups: v and u for
     left and right, u and v for the back. ``enclosed`` counts cells between known cells of their row or their column,
     ``taken`` those that a wall of the usual thickness around known space fills. ``seen`` is how usual each width and
-    depth is in the whole frame. ``mirrored`` is ``same`` and ``mirrored_free`` the free cells of the other half of a
-    symmetric building, empty where there is none.
+    depth is in the whole frame.
     """
 
     closed: dict[str, Table]
@@ -55,8 +53,6 @@ class Evidence:
     enclosed: Table
     taken: Table
     seen: dict[str, FloatArray]
-    mirrored: dict[str, Table]
-    mirrored_free: Table
 
 
 def rate_sizes(frame: DoorFrame) -> dict[str, FloatArray]:
@@ -69,44 +65,48 @@ def widen_in_line(frame: DoorFrame, window: Window, side: str) -> Window:
     return window.grown(*((0, 2 * REACH) if side == "top" else (REACH, 0)), frame.known.shape)
 
 
-def gather(frame: DoorFrame, window: Window, seen: dict[str, FloatArray], twin: DoorFrame | None = None) -> Evidence:
+def _widen_across(frame: DoorFrame, window: Window, side: str, reach: int) -> Window:
+    """Widen a window across a side by ``reach`` cells: positions nearer to its edge are cut off again."""
+    return window.grown(*((reach, 0) if side == "top" else (0, reach)), frame.known.shape)
+
+
+def gather(frame: DoorFrame, window: Window, doors: tuple[float, float], seen: dict[str, FloatArray]) -> Evidence:
     """Make the tables for the rectangles in a window of a frame.
 
     Args:
         frame: Seen from the doors.
         window: Where the rectangles lie.
+        doors: The first and the last of the doors along their walls [cells]: left sides lie left of the last one.
         seen: Of the whole frame, from :func:`rate_sizes`.
-        twin: The frame of the mirrored map where the building is symmetric.
     """
+    first, last = max(int(doors[0]), window.u0), min(int(doors[1]) + 2, window.u1)
+    places = {"right": replace(window, u0=first), "left": replace(window, u1=last), "top": window}
     thickness = frame.thickness
-    closed, sliver, gap, tight, same, outer, mirrored = {}, {}, {}, {}, {}, {}, {}
+    closed: dict[str, Table] = {}
+    sliver: dict[str, Table] = {}
+    gap: dict[str, Table] = {}
+    tight, same, outer = {}, {}, {}
     for side, opposite in (("right", "left"), ("left", "right"), ("top", "bottom")):
-        line = widen_in_line(frame, window, side)
-        # As far as anything is looked for behind a side: positions nearer to the edge are cut off again.
-        behind = thickness + GAP + OUTER
-        wide_line = line.grown(*((behind, 0) if side == "top" else (0, behind)), frame.known.shape)
-        known = lay_out(_orient(frame.known[wide_line.of], side))
-        own, other = (_orient(frame.faces(name, wide_line), side) for name in (side, opposite))
-
-        def table(edges: BoolArray, side: str = side, line: Window = line, wide_line: Window = wide_line) -> Table:
-            return _tabulate(edges, side, line, wide_line)
-
-        near = _find_known(known, thickness + SLACK)
-        wide = _find_known(known, thickness + SLIVER)
-        gap[side] = table(_find_known(known, thickness + GAP) & ~wide)
-        wide &= ~near
-        outer[side] = table(_blur(own & ~_find_beyond(known), NEAR_FACE))
+        # What lies behind a side is asked of the rectangles' own sides; walls in line go on beyond them.
+        place = places[side]
+        wide = _widen_across(frame, place, side, thickness + GAP)
+        known = lay_out(_orient(frame.known[wide.of], side))
+        near, strip = _find_known(known, thickness + SLACK), _find_known(known, thickness + SLIVER)
+        apart = _find_known(known, thickness + GAP) & ~strip
+        for tables, edges in ((closed, near), (sliver, strip & ~near), (gap, apart)):
+            tables[side] = _tabulate(edges, side, place, wide)
+        line = widen_in_line(frame, place, side)
+        wide = _widen_across(frame, line, side, thickness + OUTER)
+        known = lay_out(_orient(frame.known[wide.of], side))
+        own, other = (_orient(frame.faces(name, wide), side) for name in (side, opposite))
         shifted = np.zeros_like(other)
         shifted[:, : other.shape[1] - thickness] = other[:, thickness:]
-        closed[side], sliver[side] = table(near), table(wide)
-        tight[side] = table(_blur(shifted, FAR_FACE))
-        same[side] = table(_blur(own, NEAR_FACE))
-        if twin is not None:
-            mirrored[side] = table(_blur(_orient(twin.faces(side, wide_line), side), NEAR_FACE))
+        outer[side] = _tabulate(_blur(own & ~_find_beyond(known), NEAR_FACE), side, line, wide)
+        tight[side] = _tabulate(_blur(shifted, FAR_FACE), side, line, wide)
+        same[side] = _tabulate(_blur(own, NEAR_FACE), side, line, wide)
     enclosed = sum_up(_mark_enclosed(frame, window), window.v0, window.u0)
     taken = sum_up(frame.taken(window), window.v0, window.u0)
-    theirs = sum_up(twin.free[window.of] if twin is not None else NOTHING, window.v0, window.u0)
-    return Evidence(closed, sliver, gap, tight, same, outer, enclosed, taken, seen, mirrored, theirs)
+    return Evidence(closed, sliver, gap, tight, same, outer, enclosed, taken, seen)
 
 
 def _mark_enclosed(frame: DoorFrame, window: Window) -> BoolArray:

@@ -5,9 +5,7 @@ rooms of the 20 bundled worlds (five closed doors each, noise medium) and 54 roo
 plans: those of a log-linear model that expects the largest IoU (L-BFGS, ridge of 0.1 towards a guess by hand), mixed
 0.7 to 0.3 with the previous weights, which were tuned on all 88 of the authors' maps and 18 other plans, then
 coordinate search on the IoU after the joint choice. Those maps are therefore in sample; docs/results/failures.md
-gives the figures with whole buildings held out. The three of symmetric buildings were set by hand, with one of the
-authors' buildings in view; halves and doubles of them were tried on 55 maps of other floors. Features are shares or
-logarithms, so that weights have no unit.
+gives the figures with whole buildings held out. Features are shares or logarithms, so that weights have no unit.
 """
 
 from collections.abc import Callable
@@ -175,7 +173,8 @@ def overlap(r: Rectangles) -> FloatArray:
 
 def door_margin(r: Rectangles) -> FloatArray:
     """Tell how much too near the door is to a side [m]."""
-    margin = np.minimum(r.entry.u - r.u0, r.u1 - r.entry.u) * r.frame.resolution
+    first, last = r.entry.span
+    margin = np.minimum(first - r.u0, r.u1 - last) * r.frame.resolution
     return np.asarray(np.maximum(DOOR_MARGIN - margin, 0.0))
 
 
@@ -184,9 +183,9 @@ def side_middle(r: Rectangles) -> FloatArray:
     entry, thickness = r.entry, r.frame.thickness
     out = np.zeros(len(r.u0))
     if entry.right is not None:
-        out += np.exp(-np.abs(r.u1 - (entry.u + entry.right - thickness) / 2) / OFF_MIDDLE)
+        out += np.exp(-np.abs(r.u1 - (entry.span[1] + entry.right - thickness) / 2) / OFF_MIDDLE)
     if entry.left is not None:
-        out += np.exp(-np.abs(r.u0 - (entry.u + entry.left + thickness) / 2) / OFF_MIDDLE)
+        out += np.exp(-np.abs(r.u0 - (entry.span[0] + entry.left + thickness) / 2) / OFF_MIDDLE)
     return out
 
 
@@ -276,26 +275,6 @@ def depth_seen(r: Rectangles) -> FloatArray:
     return np.asarray(seen[np.clip(r.v1 - r.v0, 0, len(seen) - 1)])
 
 
-def side_mirrored(r: Rectangles) -> FloatArray:
-    """Share of both sides where the other half of a symmetric building shows a wall."""
-    if not r.evidence.mirrored:
-        return np.zeros(len(r.u0))
-    right = r.evidence.mirrored["right"].stretch(r.u1, r.v0, r.v1)
-    return np.asarray((right + r.evidence.mirrored["left"].stretch(r.u0, r.v0, r.v1)) / r.depth)
-
-
-def back_mirrored(r: Rectangles) -> FloatArray:
-    """Share of the back where the other half of a symmetric building shows a wall."""
-    if not r.evidence.mirrored:
-        return np.zeros(len(r.u0))
-    return np.asarray(r.evidence.mirrored["top"].stretch(r.v1, r.u0, r.u1) / r.width)
-
-
-def mirrored_free(r: Rectangles) -> FloatArray:
-    """Share that is free in the other half of a symmetric building."""
-    return np.asarray(r.evidence.mirrored_free.count(r.v0, r.u0, r.v1, r.u1) / (r.width * r.depth))
-
-
 @dataclass(frozen=True, slots=True)
 class Feature:
     """One kind of evidence.
@@ -347,9 +326,6 @@ FEATURES = (
     Feature("passage end", passage_end, weight=0.53),
     Feature("width seen", width_seen, weight=1.93),
     Feature("depth seen", depth_seen, weight=1.95),
-    Feature("sides mirrored", side_mirrored, weight=2.0),
-    Feature("back mirrored", back_mirrored, weight=3.0),
-    Feature("mirrored free", mirrored_free, weight=1.0),
 )
 WEIGHTS = np.array([feature.weight for feature in FEATURES])
 
@@ -371,9 +347,3 @@ def score_rectangles(
     rectangles = Rectangles(frame, evidence, entry, boxes)
     measured = np.stack([feature.measure(rectangles) for feature in FEATURES], axis=-1)
     return np.round(measured @ WEIGHTS, 9), measured
-
-
-def weigh_rectangles(frame: DoorFrame, evidence: Evidence, entry: Entry, boxes: IntArray) -> dict[str, FloatArray]:
-    """Say what each feature counts in :func:`score_rectangles`, by its name, each of shape (n,)."""
-    rectangles = Rectangles(frame, evidence, entry, boxes)
-    return {feature.name: np.asarray(feature.measure(rectangles) * feature.weight) for feature in FEATURES}

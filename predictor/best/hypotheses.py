@@ -1,28 +1,29 @@
 """From doors to the rectangles that their rooms may fill, scored by themselves (method ``best``)."""
 
-import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.best.candidates import propose, window_around
 from closedrooms.predictor.best.door_frame import DoorFrame, TurnedMap, Window, door_frame
-from closedrooms.predictor.best.door_pose import Entry, enter, enter_between
+from closedrooms.predictor.best.door_pose import DoorsSeen, Entry, enter, see_doors
 from closedrooms.predictor.best.evidence import gather, rate_sizes, widen_in_line
 from closedrooms.predictor.best.features import score_rectangles
 from closedrooms.predictor.best.lattice import in_cells
 from closedrooms.predictor.best.scene import Scene
-from closedrooms.predictor.best.symmetry import mirror
 from closedrooms.predictor.config import BestConfig
 
-# A shared room reaches this far past both doors [cells].
-PAST = in_cells(0.3)
 # Rooms share tables up to so many cells in line with their sides: 25 to 50 bytes each. For one door alone they are 2.5
 # million at most.
 MAX_WINDOW = 5_000_000
 
-# The doors of a room: one, or two of one wall, the left one first, by their indices.
+# What the scores of all rectangles of a door say together is that much vaguer than a log-linear model: found on ``fit``
+# for the likelihood of the rectangles near the true rooms, then set with the best of three on ``choose`` in view.
+VAGUE = 3.0
+
+# The doors of a room, by their indices, ascending.
 Doors = tuple[int, ...]
 
 
@@ -50,82 +51,103 @@ class Hypotheses:
     v: float
     measured: FloatArray
 
+    def weigh(self, scores: FloatArray | None = None) -> FloatArray:
+        """Probability of each rectangle by its score, or by ``scores`` that know more, shape (n,)."""
+        scores = self.scores if scores is None else scores
+        weight = np.exp((scores - scores.max()) / VAGUE)
+        return np.asarray(weight / weight.sum())
+
+
+def join_hypotheses(parts: Sequence[Hypotheses]) -> Hypotheses:
+    """Join the rectangles of one room as seen from several doors, best first: in the place of the best one's door."""
+    boxes, corners, scores, measured = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("boxes", "corners", "scores", "measured")
+    )
+    order = np.lexsort((*boxes.T, -scores))
+    first = max(parts, key=lambda part: (part.scores[0], *(-part.boxes[0])))
+    own = boxes[order], corners[order], scores[order]
+    return Hypotheses(*own, first.angle, first.quarter, first.u, first.v, measured[order])
+
 
 @dataclass(frozen=True, slots=True)
 class Proposals:
-    """The rectangles of every door, and of neighbouring doors that may share a room.
+    """The rectangles of every door, and of every set of doors that may lead to one room.
 
     Attributes:
         alone: One a door, in the order of the doors.
-        shared: By the indices of both doors, the left one first.
+        shared: By the indices of two or more doors, ascending; as seen from each of them that proposed any.
     """
 
     alone: list[Hypotheses]
-    shared: dict[tuple[int, int], Hypotheses]
+    shared: dict[Doors, list[Hypotheses]]
 
 
 def propose_rectangles(scene: Scene) -> Proposals:
-    """Propose and score the rectangles of every door, and of every two neighbours in a wall, frame by frame."""
+    """Propose and score the rectangles of every door, and of those that may share a room, frame by frame."""
     poses, thickness = scene.poses, in_cells(scene.walls.usual)
-    found: dict[Doors, Hypotheses] = {}
-    angles = {pose.angle for pose in poses} if scene.config.symmetry else set()
-    twins = {angle: mirror(scene.turned[angle]) for angle in angles}
-    for angle, quarter in sorted({(pose.angle, pose.quarter) for pose in poses}):
-        turned, twin = scene.turned[angle], twins.get(angle)
-        frame = door_frame(turned, quarter, thickness)
-        mirrored = None if twin is None else door_frame(twin, quarter, thickness)
-        entries = {i: enter(frame, pose, poses) for i, pose in enumerate(poses) if pose.looks(angle, quarter)}
-        rooms: dict[Doors, Entry] = {(i,): entry for i, entry in entries.items()}
-        for i, j in itertools.permutations(entries, 2):
-            left, right = entries[i], entries[j]
-            if left.right == right.u and right.left == left.u:
-                rooms[i, j] = enter_between(left, right)
-        for doors, (boxes, scores, measured) in _propose_all(frame, mirrored, rooms, scene.config).items():
-            behind = np.ones(len(boxes), dtype=np.bool_)
-            if len(doors) == 2:
-                behind = _spans(boxes, entries[doors[0]], entries[doors[1]])
-            if behind.any():
-                most = scene.config.shortlist
-                order = np.flatnonzero(behind)[np.lexsort((*boxes[behind].T, -scores[behind]))[:most]]
-                best = boxes[order], scores[order], measured[order]
-                found[doors] = _place(*best, rooms[doors], frame, turned, quarter)
-    shared = {(doors[0], doors[1]): own for doors, own in found.items() if len(doors) == 2}
-    return Proposals([found[i,] for i in range(len(poses))], shared)
+    frames = {
+        key: door_frame(scene.turned[key[0]], key[1], thickness)
+        for key in sorted({(pose.angle, pose.quarter) for pose in poses})
+    }
+    own_frames = [frames[pose.angle, pose.quarter] for pose in poses]
+    entries = [enter(frame, pose, poses) for frame, pose in zip(own_frames, poses, strict=True)]
+    found: dict[Doors, list[Hypotheses]] = {}
+    for (angle, quarter), frame in frames.items():
+        seen = see_doors(frame, poses, list(zip(own_frames, entries, strict=True)))
+        here = {i: entries[i] for i, pose in enumerate(poses) if pose.looks(angle, quarter)}
+        for (i, doors), (boxes, scores, measured) in _propose_all(frame, here, seen, scene.config).items():
+            order = np.lexsort((*boxes.T, -scores))[: scene.config.shortlist]
+            placed = _place(
+                boxes[order], scores[order], measured[order], entries[i], frame, scene.turned[angle], quarter
+            )
+            found.setdefault(doors, []).append(placed)
+    alone = [found.pop((i,))[0] for i in range(len(poses))]
+    return Proposals(alone, found)
 
 
-def _spans(boxes: IntArray, first: Entry, second: Entry) -> BoolArray:
-    """Tell which rectangles lie behind both doors, shape (n,)."""
-    return np.asarray((boxes[:, 0] <= first.u - PAST) & (boxes[:, 2] >= second.u + PAST))
+Scored = tuple[IntArray, FloatArray, FloatArray]
 
 
 def _propose_all(
-    frame: DoorFrame, twin: DoorFrame | None, rooms: dict[Doors, Entry], config: BestConfig
-) -> dict[Doors, tuple[IntArray, FloatArray, FloatArray]]:
-    """Propose the rectangles of every room in a frame with scores and features: one window's tables at a time."""
+    frame: DoorFrame, entries: dict[int, Entry], seen: DoorsSeen, config: BestConfig
+) -> dict[tuple[int, Doors], Scored]:
+    """Propose the rectangles of every door in a frame with scores and features: one window's tables at a time.
+
+    Returns:
+        By the door that they are seen from and all doors that lead there.
+    """
     smallest, largest = in_cells(config.smallest_side), in_cells(config.largest_side)
-    seen = rate_sizes(frame)
-    found: dict[Doors, tuple[IntArray, FloatArray, FloatArray]] = {}
-    for window, together in _share_windows(frame, rooms, largest):
-        evidence = gather(frame, window, seen, twin)
-        for doors in together:
-            boxes = propose(frame, evidence, rooms[doors], smallest, largest)
-            found[doors] = boxes, *score_rectangles(frame, evidence, rooms[doors], boxes)
+    rates = rate_sizes(frame)
+    found: dict[tuple[int, Doors], Scored] = {}
+    for window, together in _share_windows(frame, entries, largest):
+        along = [entries[i].u for i in together]
+        evidence = gather(frame, window, (min(along), max(along)), rates)
+        for i in together:
+            others = seen.without(i)
+            boxes, shared = propose(frame, evidence, entries[i], others, smallest, largest)
+            sets, which = np.unique(shared, axis=0, return_inverse=True)
+            for number, also in enumerate(np.asarray(sets, dtype=np.bool_)):
+                own = boxes[which.ravel() == number]
+                entry = others.enter_with(entries[i], also) if also.any() else entries[i]
+                # The indices of the others as if this one were not left out.
+                doors = tuple(sorted((i, *(k + (k >= i) for k in np.flatnonzero(also).tolist()))))
+                found[i, doors] = own, *score_rectangles(frame, evidence, entry, own)
         del evidence
-    return {doors: found[doors] for doors in rooms}
+    return found
 
 
-def _share_windows(frame: DoorFrame, rooms: dict[Doors, Entry], largest: int) -> list[tuple[Window, list[Doors]]]:
-    """Find windows that hold the rectangles of each room; near rooms share one."""
-    groups: list[tuple[Window, list[Doors]]] = []
-    for doors in sorted(rooms, key=lambda doors: (rooms[doors].v0, rooms[doors].u)):
-        own = window_around(frame, rooms[doors], largest)
+def _share_windows(frame: DoorFrame, entries: dict[int, Entry], largest: int) -> list[tuple[Window, list[int]]]:
+    """Find windows that hold the rectangles of each door; near doors share one."""
+    groups: list[tuple[Window, list[int]]] = []
+    for door in sorted(entries, key=lambda door: (entries[door].v0, entries[door].u)):
+        own = window_around(frame, entries[door], largest)
         for number, (window, together) in enumerate(groups):
             both = own.joined(window)
             if sum(widen_in_line(frame, both, side).cells for side in ("right", "top")) <= MAX_WINDOW:
-                groups[number] = both, [*together, doors]
+                groups[number] = both, [*together, door]
                 break
         else:
-            groups.append((own, [doors]))
+            groups.append((own, [door]))
     return groups
 
 

@@ -154,6 +154,15 @@ def score_pairs(a: Hypotheses, b: Hypotheses, thickness: int) -> tuple[FloatArra
     return np.asarray(_measure(pairs) @ WEIGHTS), pairs.overlap
 
 
+def are_apart(a: Hypotheses, b: Hypotheses, thickness: int) -> bool:
+    """Tell whether two doors' rectangles are all too far from each other to say anything: :func:`score_pairs` is 0."""
+    if a.angle != b.angle or _are_in_one_wall(a, b):
+        return False
+    low = np.maximum(a.boxes[:, :2].min(axis=0), b.boxes[:, :2].min(axis=0))
+    high = np.minimum(a.boxes[:, 2:].max(axis=0), b.boxes[:, 2:].max(axis=0))
+    return bool((low - high).max() > thickness + GAP)
+
+
 def weigh_pairs(a: Hypotheses, b: Hypotheses, thickness: int) -> dict[str, FloatArray]:
     """Say what each feature counts in :func:`score_pairs`, by its name, each of shape (n, m)."""
     if a.angle != b.angle:
@@ -163,9 +172,12 @@ def weigh_pairs(a: Hypotheses, b: Hypotheses, thickness: int) -> dict[str, Float
 
 
 def _pair_up(a: Hypotheses, b: Hypotheses, thickness: int) -> Pairs:
-    in_one_wall = a.quarter == b.quarter and abs(a.v - b.v) < SAME_WALL
-    back = (3, 0, 1, 2)[a.quarter] if in_one_wall else None
+    back = (3, 0, 1, 2)[a.quarter] if _are_in_one_wall(a, b) else None
     return Pairs(a.boxes, b.boxes, back, thickness, agree=float(np.exp(-abs(a.u - b.u) / DEPTH_REACH)))
+
+
+def _are_in_one_wall(a: Hypotheses, b: Hypotheses) -> bool:
+    return a.quarter == b.quarter and abs(a.v - b.v) < SAME_WALL
 
 
 def _measure(pairs: Pairs) -> FloatArray:

@@ -1,26 +1,24 @@
 """All rooms of a map chosen together: each by its own evidence, no two at odds (method ``best``)."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
-from closedrooms.predictor.best.hypotheses import Hypotheses, Proposals
+from closedrooms.predictor.best.hypotheses import Doors, Hypotheses, Proposals, join_hypotheses
 from closedrooms.predictor.best.lattice import in_cells
-from closedrooms.predictor.best.pair_features import score_pairs
+from closedrooms.predictor.best.pair_features import are_apart, score_pairs
 from closedrooms.predictor.best.scene import Scene
-from closedrooms.predictor.best.shared_rooms import merge
+from closedrooms.predictor.best.shared_rooms import LEAST, group_doors, rate_shared
 
 # Rounds of the search, which stopped after 3 to 5 on every map.
 ROUNDS = 20
 # Scores apart by this are e times as likely as each other: the weights were found as those of a log-linear model.
 TEMPERATURE = 1.0
-# What the scores of all rectangles of a door say together is that much vaguer: found on ``fit`` for the likelihood of
-# the rectangles near the true rooms, then set with the best of three on ``choose`` in view. Rounds in which the rooms
-# of a map settle on each other's places.
-VAGUE, SETTLING = 3.0, 3
+# Rounds in which the rooms of a map settle on each other's places.
+SETTLING = 3
 # A safer rectangle may overlap its neighbours by this share more.
 CROWDING = 0.02
 
@@ -34,9 +32,11 @@ class Choice:
         corners: Of its rectangle in the map frame [m], shape (4, 2).
         score: With the others' rooms.
         cut: The search for all rooms ended before nothing got better.
-        options: Its rectangle and all others that it could have.
+        options: Its rectangle and all others that it could have behind these doors.
         index: Of its rectangle among them.
-        weights: Probability of each, shape (n,).
+        weights: Probability of each, shape (n,), one altogether.
+        rivals: The rectangles of rooms behind more or fewer doors, each lot with its weights, in place of that share
+            of the ``options``.
     """
 
     doors: tuple[int, ...]
@@ -46,30 +46,39 @@ class Choice:
     options: Hypotheses
     index: int
     weights: FloatArray
+    rivals: tuple[tuple[Hypotheses, FloatArray], ...] = ()
 
 
 def select_jointly(scene: Scene, proposals: Proposals) -> list[Choice]:
-    """Choose one rectangle a door, or for two doors where that scores better, in the order of the doors."""
-    alone, thickness = proposals.alone, in_cells(scene.walls.usual)
+    """Choose one rectangle a door, or for several doors where they share a room, in the order of the doors."""
+    thickness = in_cells(scene.walls.usual)
+    rated = rate_shared(proposals, thickness)
+    rooms = group_doors(rated, proposals)
+    grouped = {i for doors in rooms for i in doors}
+    rooms |= {(i,): own for i, own in enumerate(proposals.alone) if i not in grouped}
     # By place, so that the order of the doors changes nothing.
-    order = sorted(range(len(alone)), key=lambda i: scene.poses[i].facing.door.midpoint)
-    search = _Search([alone[i] for i in order], thickness)
+    order = sorted(rooms, key=lambda doors: min(scene.poses[i].facing.door.midpoint for i in doors))
+    search = _Search([rooms[doors] for doors in order], thickness)
     places, values, cut = _choose(search, safe=True)
-    chosen = {i: (place, value) for i, place, value in zip(order, places, values, strict=True)}
-    weights = dict(zip(order, search.weigh(), strict=True))
-    mergers = merge(proposals, [chosen[i][0] for i in range(len(alone))], thickness)
-    choices = []
-    for i in range(len(alone)):
-        merger = next((m for m in mergers if i in (m.first, m.second)), None)
-        if merger is None:
-            at, value = chosen[i]
-            choices.append(Choice((i,), alone[i].corners[at], value, cut, alone[i], at, weights[i]))
-        elif i == min(merger.first, merger.second):
-            both = proposals.shared[merger.first, merger.second]
-            doors = tuple(sorted((merger.first, merger.second)))
-            at = merger.index
-            choices.append(Choice(doors, both.corners[at], merger.score, cut, both, at, _soften(both.scores)))
-    return choices
+    weights = search.weigh()
+    choices = [
+        Choice(doors, own.corners[at], value, cut, own, at, weight, find_rivals(doors, proposals, rated))
+        for doors, own, at, value, weight in zip(order, search.hypotheses, places, values, weights, strict=True)
+    ]
+    return sorted(choices, key=lambda choice: choice.doors)
+
+
+def find_rivals(
+    doors: Doors, proposals: Proposals, rated: Mapping[Doors, float]
+) -> tuple[tuple[Hypotheses, FloatArray], ...]:
+    """Find what else a room could be: joined with another door's, or parted, with the share of belief in that."""
+    if len(doors) > 1:
+        lots = [(proposals.alone[i], (1.0 - rated[doors]) / len(doors)) for i in doors]
+    else:
+        odds = {both: chance / (1.0 - chance) for both, chance in rated.items() if doors[0] in both and chance > LEAST}
+        whole = 1.0 + sum(odds.values())
+        lots = [(join_hypotheses(proposals.shared[both]), odds[both] / whole) for both in odds]
+    return tuple((own, share * own.weigh()) for own, share in lots)
 
 
 def choose(
@@ -113,6 +122,8 @@ class _Search:
         self.links: list[list[tuple[int, FloatArray]]] = [[] for _ in hypotheses]
         self.overlaps: list[list[tuple[int, FloatArray]]] = [[] for _ in hypotheses]
         for i, j in itertools.combinations(range(len(hypotheses)), 2):
+            if are_apart(hypotheses[i], hypotheses[j], thickness):
+                continue
             table, overlap = score_pairs(hypotheses[i], hypotheses[j], thickness)
             if overlap.max(initial=0.0) > 0.0:
                 self.overlaps[i].append((j, overlap))
@@ -135,13 +146,13 @@ class _Search:
 
         Mean field: door by door, the others' rectangles count by their probabilities.
         """
-        weights = [_soften(own.scores) for own in self.hypotheses]
+        weights = [own.weigh() for own in self.hypotheses]
         for _ in range(SETTLING):
             for i, own in enumerate(self.hypotheses):
                 score = own.scores.copy()
                 for j, table in self.links[i]:
                     score += table @ weights[j]
-                weights[i] = _soften(score)
+                weights[i] = own.weigh(score)
         return weights
 
     def safest(self, i: int, chosen: list[int]) -> int:
@@ -190,12 +201,6 @@ class _Search:
             if both[a, b] > both[chosen[i], chosen[j]] + 1e-9:
                 chosen[i], chosen[j], changed = a, b, True
         return changed
-
-
-def _soften(scores: FloatArray) -> FloatArray:
-    """Probabilities of rectangles by their scores, shape (n,)."""
-    weight = np.exp((scores - scores.max()) / VAGUE)
-    return np.asarray(weight / weight.sum())
 
 
 def overlaps_of(boxes: IntArray) -> FloatArray:

@@ -1,64 +1,153 @@
-"""Two closed doors of one wall that lead to one room: decided by score (method ``best``)."""
+"""Closed doors that lead to one room: how likely, and which rectangles such a room may fill (method ``best``)."""
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from closedrooms.predictor.best.hypotheses import Proposals
-from closedrooms.predictor.best.pair_features import Pairs, score_pairs
+from closedrooms.core.arrays import FloatArray
+from closedrooms.predictor.best import features
+from closedrooms.predictor.best.hypotheses import Doors, Hypotheses, Proposals, join_hypotheses
+from closedrooms.predictor.best.lattice import RESOLUTION
+from closedrooms.predictor.best.pair_features import score_pairs
 
-# The rectangle of two doors must score this much better than the mean of their own. Over 75 pairs of neighbouring doors
-# that each have a room of their own (20 bundled worlds, 29 of the authors' maps) the gain stayed below 5.2; for two
-# doors into one room of 4 x 5 m between known rooms it was 6.4 to 8.7 (the building of the tests).
-MARGIN = 5.5
-# Share of the smaller of two rooms that a shared room may take of a third.
-OVERLAP = 0.05
+# Doors share a room from this probability on. A shared room that is less likely than the other is not thought of.
+SHARED, LEAST = 0.5, 0.05
+OPEN = [feature.name for feature in features.FEATURES].index("open")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Together:
+    """Some doors and the rooms that they may lead to.
+
+    Attributes:
+        alone: Rectangles of each door by itself.
+        weights: Probability of each of those, by door.
+        both: Of a room that all of them lead to, best first.
+        thickness: Usual thickness of walls [cells].
+    """
+
+    alone: Sequence[Hypotheses]
+    weights: Sequence[FloatArray]
+    both: Hypotheses
+    thickness: int
+
+    @property
+    def sides(self) -> FloatArray:
+        """Width and height of the best room of all, in the turned map [m]."""
+        return np.asarray((self.both.boxes[0, 2:] - self.both.boxes[0, :2]) * RESOLUTION)
+
+    @property
+    def quarters(self) -> set[int]:
+        """Where the rooms lie as seen from the doors."""
+        return {own.quarter for own in self.alone}
+
+
+def gain(t: Together) -> float:
+    """Tell how much better the room of all scores than the worst of the doors' own."""
+    return float(t.both.scores[0] - min(own.scores[0] for own in t.alone))
+
+
+def crowd(t: Together) -> float:
+    """Tell how much the rooms of each are expected to overlap: where there is no room for two, there is one."""
+    lots = list(zip(t.alone, t.weights, strict=True))
+    found = [p @ score_pairs(a, b, t.thickness)[1] @ q for (a, p), (b, q) in itertools.combinations(lots, 2)]
+    return float(np.mean(found))
+
+
+def one_wall(t: Together) -> float:
+    """Tell whether all doors are in one wall."""
+    return float(len(t.quarters) == 1)
+
+
+def facing_walls(t: Together) -> float:
+    """Tell whether the doors are in two walls that face each other."""
+    return float(len(t.quarters) == 2 and len({quarter % 2 for quarter in t.quarters}) == 1)
+
+
+def count_doors(t: Together) -> float:
+    """Count the doors."""
+    return float(len(t.alone))
+
+
+def wall_filled(t: Together) -> float:
+    """Share of the width between the outer doors of one wall: those of one room are near its ends."""
+    if not one_wall(t):
+        return 0.0
+    places = [own.u for own in t.alone]
+    return float((max(places) - min(places)) * RESOLUTION / t.sides[t.alone[0].quarter % 2])
+
+
+def log_short_side(t: Together) -> float:
+    """Rooms that are not narrow."""
+    return float(np.log(t.sides.min()))
+
+
+def open_share(t: Together) -> float:
+    """Share of the room with nothing known beyond it."""
+    return float(t.both.measured[0, OPEN])
 
 
 @dataclass(frozen=True, slots=True)
-class Merger:
-    """Two doors that share a room.
+class SharedFeature:
+    """One kind of evidence that doors lead to one room.
 
     Attributes:
-        first: Index of one door.
-        second: Index of the other.
-        index: Of the rectangle in their shared hypotheses.
-        score: Of that rectangle.
+        name: For people.
+        measure: Of some doors.
+        weight: What it counts: logistic regression on ``fit`` (``benchmarks/fit_shared_rooms.py``).
     """
 
-    first: int
-    second: int
-    index: int
-    score: float
+    name: str
+    measure: Callable[[Together], float]
+    weight: float
 
 
-def merge(proposals: Proposals, chosen: Sequence[int], thickness: int) -> list[Merger]:
-    """Find the pairs of doors whose shared room explains them better than two rooms, best first, no door twice.
+FEATURES = (
+    SharedFeature("always", lambda _: 1.0, weight=0.65),
+    SharedFeature("gain", gain, weight=0.17),
+    SharedFeature("crowd", crowd, weight=1.19),
+    SharedFeature("one wall", one_wall, weight=-4.88),
+    SharedFeature("facing walls", facing_walls, weight=-1.21),
+    SharedFeature("doors", count_doors, weight=-1.85),
+    SharedFeature("wall filled", wall_filled, weight=5.3),
+    SharedFeature("log short side", log_short_side, weight=1.24),
+    SharedFeature("open", open_share, weight=-1.34),
+)
+WEIGHTS = np.array([feature.weight for feature in FEATURES])
+
+
+def measure_shared(proposals: Proposals, thickness: int) -> dict[Doors, FloatArray]:
+    """Measure every set of doors that may lead to one room, in the order of :data:`FEATURES`.
 
     Args:
-        proposals: Rectangles of every door by itself and of two doors each.
-        chosen: Rectangle of every door.
+        proposals: Rectangles of every door by itself and of the sets.
         thickness: Usual thickness of walls [cells].
     """
-    alone = proposals.alone
-    found = []
-    for (i, j), both in proposals.shared.items():
-        a, b = alone[i], alone[j]
-        beside = float(score_pairs(a, b, thickness)[0][chosen[i], chosen[j]])
-        apart = (float(a.scores[chosen[i]] + b.scores[chosen[j]]) + beside) / 2
-        blocked = np.zeros(len(both.scores), dtype=np.bool_)
-        for k, (other, at) in enumerate(zip(alone, chosen, strict=True)):
-            if k not in (i, j) and other.angle == both.angle:
-                blocked |= Pairs(both.boxes, other.boxes[at][None], None, thickness).overlap[:, 0] > OVERLAP
-        score = np.where(blocked, -np.inf, both.scores)
-        best = int(score.argmax())
-        if score[best] > apart + MARGIN:
-            found.append((float(score[best] - apart), Merger(i, j, best, float(score[best]))))
-    taken: set[int] = set()
-    kept = []
-    for _, merger in sorted(found, key=lambda item: (-item[0], alone[item[1].first].u)):
-        if not taken & {merger.first, merger.second}:
-            kept.append(merger)
-            taken |= {merger.first, merger.second}
-    return kept
+    measured = {}
+    weights = [own.weigh() for own in proposals.alone]
+    for doors, parts in proposals.shared.items():
+        together = Together(
+            [proposals.alone[i] for i in doors], [weights[i] for i in doors], join_hypotheses(parts), thickness
+        )
+        measured[doors] = np.array([feature.measure(together) for feature in FEATURES])
+    return measured
+
+
+def rate_shared(proposals: Proposals, thickness: int) -> dict[Doors, float]:
+    """Rate how likely the doors of every set lead to one room, as :func:`measure_shared` sees them."""
+    measured = measure_shared(proposals, thickness)
+    return {doors: float(1.0 / (1.0 + np.exp(-(values @ WEIGHTS)))) for doors, values in measured.items()}
+
+
+def group_doors(rated: Mapping[Doors, float], proposals: Proposals) -> dict[Doors, Hypotheses]:
+    """Group doors into rooms with several, no door twice, with the rectangles of each room.
+
+    The larger sets go first: that all of some doors share a room is never likelier than that two of them do.
+    """
+    groups: dict[Doors, Hypotheses] = {}
+    for doors, chance in sorted(rated.items(), key=lambda item: (-len(item[0]), -round(item[1], 9), item[0])):
+        if chance > SHARED and not any({*doors} & {*other} for other in groups):
+            groups[doors] = join_hypotheses(proposals.shared[doors])
+    return groups

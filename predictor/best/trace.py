@@ -7,17 +7,13 @@ import shapely
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.room import Room
-from closedrooms.predictor.best.candidates import window_around
-from closedrooms.predictor.best.door_frame import DoorFrame, TurnedMap, Window, door_frame, find_faces_in
-from closedrooms.predictor.best.door_pose import enter, enter_between
-from closedrooms.predictor.best.evidence import gather, rate_sizes
-from closedrooms.predictor.best.features import weigh_rectangles
+from closedrooms.predictor.best.door_frame import Window, find_faces_in
+from closedrooms.predictor.best.features import FEATURES
 from closedrooms.predictor.best.hypotheses import Hypotheses, Proposals
 from closedrooms.predictor.best.lattice import in_cells
 from closedrooms.predictor.best.pair_features import weigh_pairs
 from closedrooms.predictor.best.scene import Scene
 from closedrooms.predictor.best.selection import Choice
-from closedrooms.predictor.best.symmetry import find_axis, mirror
 from closedrooms.predictor.prediction import Level, WeighedRoom, WeighedTrace
 
 # Shorter stretches of a wall face are not drawn: in a map turned to one direction, walls of another are full of them
@@ -48,8 +44,7 @@ def trace_of(scene: Scene, proposals: Proposals, choices: Sequence[Choice], room
     return WeighedTrace(
         faces=faces,
         directions=directions,
-        axes=_find_axes(scene),
-        rooms=_weigh(scene, proposals, choices),
+        rooms=_weigh(scene, choices),
         levels=(Level(0, alone, scores), Level(1, together, joint)),
     )
 
@@ -79,36 +74,17 @@ def _find_runs(edges: BoolArray) -> tuple[IntArray, IntArray, IntArray]:
     return row[long], low[long], high[long]
 
 
-def _find_axes(scene: Scene) -> FloatArray:
-    """Find the axes about which the map was mirrored, across the whole of it, shape (k, 4)."""
-    lines = []
-    for turned in scene.turned.values() if scene.config.symmetry else ():
-        rows, cols = turned.free.shape
-        upright = find_axis(turned.free, turned.known)
-        if upright is not None:
-            lines.append(_in_map(turned, [[upright.total / 2, 0], [upright.total / 2, rows]]))
-        level = find_axis(turned.free.T, turned.known.T)
-        if level is not None:
-            lines.append(_in_map(turned, [[0, level.total / 2], [cols, level.total / 2]]))
-    return np.array(lines).reshape(-1, 4)
-
-
-def _in_map(turned: TurnedMap, ends: Sequence[Sequence[float]]) -> FloatArray:
-    return turned.to_map(np.array(ends, dtype=np.float64)).ravel()
-
-
-def _weigh(scene: Scene, proposals: Proposals, choices: Sequence[Choice]) -> tuple[WeighedRoom, ...]:
+def _weigh(scene: Scene, choices: Sequence[Choice]) -> tuple[WeighedRoom, ...]:
     """Take the evidence of every room's candidates apart, beside the rooms that were chosen for the others."""
-    candidates = [_candidates_of(proposals, choice) for choice in choices]
-    taken = [_find_chosen(own, choice) for own, choice in zip(candidates, choices, strict=True)]
-    frames: dict[tuple[float, int], tuple[DoorFrame, DoorFrame | None]] = {}
     weighed = []
-    for number, (choice, own, chosen) in enumerate(zip(choices, candidates, taken, strict=True)):
-        terms = _weigh_alone(scene, choice, own, frames)
-        for other, (theirs, at) in enumerate(zip(candidates, taken, strict=True)):
-            if other == number:
+    for choice in choices:
+        own, chosen = choice.options, choice.index
+        terms = {feature.name: own.measured[:, column] * feature.weight for column, feature in enumerate(FEATURES)}
+        for other in choices:
+            if other is choice:
                 continue
-            for name, term in weigh_pairs(own, _only(theirs, at), in_cells(scene.walls.usual)).items():
+            theirs = _only(other.options, other.index)
+            for name, term in weigh_pairs(own, theirs, in_cells(scene.walls.usual)).items():
                 label = f"neighbours: {name}"
                 terms[label] = terms.get(label, np.zeros(len(own.scores))) + term[:, 0]
         joint = np.asarray(sum(terms.values(), start=np.zeros(len(own.scores))))
@@ -121,49 +97,12 @@ def _weigh(scene: Scene, proposals: Proposals, choices: Sequence[Choice]) -> tup
     return tuple(weighed)
 
 
-def _candidates_of(proposals: Proposals, choice: Choice) -> Hypotheses:
-    if len(choice.doors) == 1:
-        return proposals.alone[choice.doors[0]]
-    first, second = choice.doors
-    both = proposals.shared
-    return both[first, second] if (first, second) in both else both[second, first]
-
-
-def _find_chosen(own: Hypotheses, choice: Choice) -> int:
-    return int(np.abs(own.corners - choice.corners).max(axis=(1, 2)).argmin())
-
-
 def _only(own: Hypotheses, at: int) -> Hypotheses:
     """One rectangle of several."""
     one = slice(at, at + 1)
     return Hypotheses(
         own.boxes[one], own.corners[one], own.scores[one], own.angle, own.quarter, own.u, own.v, own.measured[one]
     )
-
-
-def _weigh_alone(
-    scene: Scene,
-    choice: Choice,
-    own: Hypotheses,
-    frames: dict[tuple[float, int], tuple[DoorFrame, DoorFrame | None]],
-) -> dict[str, FloatArray]:
-    """Say what each feature counts for each candidate by itself."""
-    key = own.angle, own.quarter
-    if key not in frames:
-        turned = scene.turned[own.angle]
-        twin = mirror(turned) if scene.config.symmetry else None
-        thickness = in_cells(scene.walls.usual)
-        mirrored = None if twin is None else door_frame(twin, own.quarter, thickness)
-        frames[key] = door_frame(turned, own.quarter, thickness), mirrored
-    frame, mirrored = frames[key]
-    entries = [enter(frame, scene.poses[i], scene.poses) for i in choice.doors]
-    entries.sort(key=lambda entry: entry.u)
-    entry = entries[0] if len(entries) == 1 else enter_between(entries[0], entries[1])
-    window = window_around(frame, entry, in_cells(scene.config.largest_side))
-    evidence = gather(frame, window, rate_sizes(frame), mirrored)
-    cells = np.rint(frame.to_frame(own.corners)).astype(np.int64)
-    boxes = np.concatenate((cells.min(axis=1), cells.max(axis=1)), axis=-1)
-    return weigh_rectangles(frame, evidence, entry, boxes)
 
 
 def _find_runner_up(own: Hypotheses, joint: FloatArray, chosen: int) -> int | None:

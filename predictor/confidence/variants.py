@@ -112,7 +112,7 @@ class RoomVariants:
         chosen = choose_diverse(overlap, weights, SAME)
         shares = share_nearest(overlap, weights, chosen)
         others = []
-        for at, share in sorted(zip(chosen[1:], shares[1:], strict=True), key=lambda pair: -pair[1]):
+        for at, share in zip(chosen[1:], shares[1:], strict=True):
             shape = self._trace(self.masks[at])
             if shape is not None:
                 others.append(Alternative(shape, float(share)))

@@ -50,7 +50,7 @@ class Arrangement:
 
 
 def arrange(lines: Sequence[Line], boundary: Sequence[Line]) -> Arrangement:
-    """Node all lines and polygonize them inside the box.
+    """Divide the box into faces: node all lines and polygonize them.
 
     Args:
         lines: Representative lines and splits.
@@ -71,8 +71,8 @@ def arrange(lines: Sequence[Line], boundary: Sequence[Line]) -> Arrangement:
     return _connect((*lines, *boundary), faces, box)
 
 
-def joined(faces: Sequence[Polygon]) -> Polygon | MultiPolygon:
-    """Return the union of faces, valid.
+def unite_faces(faces: Sequence[Polygon]) -> Polygon | MultiPolygon:
+    """Unite faces to one valid area.
 
     Where three lines cross in nearly one point, two faces may end at corners a rounding error apart; their union then
     comes out as the one with the other as a hole outside of it.
@@ -84,7 +84,7 @@ def joined(faces: Sequence[Polygon]) -> Polygon | MultiPolygon:
 
 
 def box_of(boundary: Sequence[Line]) -> Polygon:
-    """Return the parallelogram between two pairs of parallel boundary lines."""
+    """Span the parallelogram between two pairs of parallel boundary lines."""
     a, b, c, d = boundary
     return Polygon([_crossing(p, q) for p, q in ((a, c), (a, d), (b, d), (b, c))])
 

@@ -28,14 +28,14 @@ class BorderRoom:
     depth: float
 
     def polygon(self) -> Polygon:
-        """Return the rectangle [m]."""
+        """Build the rectangle [m]."""
         reach = self.depth * self.outward
         ring = Polygon((self.start, self.end, self.end + reach, self.start + reach))
         return shapely.geometry.polygon.orient(ring)
 
 
 def border_rooms(growth: Growth, config: PaperConfig) -> dict[int, BorderRoom]:
-    """Rooms of border faces, by number: squares of the size of the door's edge.
+    """Make the rooms of border faces, by number: squares of the size of the door's edge.
 
     Where the boundary cuts the door's edge, its length says nothing: the square takes the size of the other side of
     the initial face. Adjacent ones of the same outward direction share their mean depth.

@@ -9,7 +9,7 @@ from closedrooms.core.arrays import BoolArray, IntArray
 from closedrooms.predictor.config import PaperConfig
 from closedrooms.predictor.paper.arrangement import Arrangement
 from closedrooms.predictor.paper.initial_faces import Entrance
-from closedrooms.predictor.paper.layout_score import FaceSet, evaluate, face_set
+from closedrooms.predictor.paper.layout_score import FaceSet, face_set, score_layouts
 from closedrooms.predictor.paper.subsets import best_subset
 
 
@@ -48,32 +48,32 @@ class Growth:
         return np.asarray(self.unknown & (self.owner < 0))
 
     def layout(self, room: int) -> IntArray:
-        """Return the faces of a room."""
+        """List the faces of a room."""
         return np.flatnonzero(self.owner == room)
 
     def is_border(self, room: int) -> bool:
-        """Tell whether a room starts in a border face (paper, section 3.6)."""
+        """Check whether a room starts in a border face (paper, section 3.6)."""
         return bool(self.arrangement.border[self.entrances[room].face])
 
     def candidates(self, room: int) -> IntArray:
-        """``F_r^k``: unknown faces of no room beside the layout; border faces never."""
+        """List ``F_r^k``: unknown faces of no room beside the layout, never border faces."""
         free = self.free & ~self.arrangement.border
         beside = {g for f in self.layout(room) for g in self.arrangement.neighbours[f] if free[g]}
         return np.array(sorted(beside), dtype=np.int64)
 
     def touches(self, room: int) -> set[int]:
-        """Other rooms with a face beside this room's layout."""
+        """List the other rooms with a face beside this room's layout."""
         beside = {int(self.owner[g]) for f in self.layout(room) for g in self.arrangement.neighbours[f]}
         return beside - {-1, room}
 
     def position(self, room: int) -> tuple[float, ...]:
-        """To break ties between rooms: how far its door is from the middle of all doors, then where it is [m]."""
+        """Rank rooms that tie: by how far the door is from the middle of all doors, then by where it is [m]."""
         doors = np.array([entrance.door.midpoint for entrance in self.entrances])
         away = float(np.hypot(*(doors[room] - doors.mean(axis=0))))
         return (round(away, 6), *self.entrances[room].door.midpoint)
 
     def face_set(self, room: int, faces: IntArray, returnable: BoolArray) -> FaceSet:
-        """Return the faces that a layout of a room may be made of."""
+        """List the faces that a layout of a room may be made of."""
         return face_set(self.arrangement, faces, returnable, self.free, self.entrances[room].facing.along)
 
 
@@ -144,4 +144,4 @@ def _score(growth: Growth, room: int, config: PaperConfig) -> None:
     pool = growth.face_set(room, layout, np.zeros(layout.size, dtype=np.bool_))
     growth.dependent[room] = bool(growth.touches(room))
     terms = pool.terms(np.ones((1, layout.size), dtype=np.bool_))
-    growth.scores[room] = float(evaluate(terms, config.weights, config.phi, dependent=growth.dependent[room])[0])
+    growth.scores[room] = float(score_layouts(terms, config.weights, config.phi, dependent=growth.dependent[room])[0])

@@ -6,7 +6,7 @@ from shapely.geometry import Polygon
 from closedrooms.core.room import Room, RoomKind
 from closedrooms.predictor.config import PaperConfig
 from closedrooms.predictor.disjoint_rooms import NO_ROOM, part_rooms
-from closedrooms.predictor.paper.arrangement import joined
+from closedrooms.predictor.paper.arrangement import unite_faces
 from closedrooms.predictor.paper.border import BorderRoom, border_rooms
 from closedrooms.predictor.paper.expansion import Growth
 from closedrooms.predictor.paper.initial_layouts import Start
@@ -58,6 +58,6 @@ def _gather_shapes(start: Start, growth: Growth, border: dict[int, BorderRoom]) 
 
 def unite(growth: Growth, room: int) -> Polygon:
     """Unite the faces of a room's layout [m]."""
-    whole = joined([growth.arrangement.faces[face] for face in growth.layout(room)])
+    whole = unite_faces([growth.arrangement.faces[face] for face in growth.layout(room)])
     assert isinstance(whole, Polygon), "a layout is connected by edges"
     return whole

@@ -44,7 +44,7 @@ def enter_face(arrangement: Arrangement, door: ClosedDoor, edge: int, face: int)
 
 
 def distances_to_edges(arrangement: Arrangement, point: FloatArray) -> FloatArray:
-    """Distance of a point to every edge [m], shape (m,)."""
+    """Measure the distance of a point to every edge [m], shape (m,)."""
     start, span = arrangement.edges[:, 0], arrangement.edges[:, 1] - arrangement.edges[:, 0]
     along = ((point - start) * span).sum(axis=1) / np.maximum((span**2).sum(axis=1), 1e-18)
     foot = start + np.clip(along, 0.0, 1.0)[:, None] * span
@@ -54,7 +54,7 @@ def distances_to_edges(arrangement: Arrangement, point: FloatArray) -> FloatArra
 def find_entrance(
     arrangement: Arrangement, unknown: BoolArray, door: ClosedDoor, *, reach: float, slack: float = 0.25
 ) -> Entrance | str:
-    """Return the closest edge between a known and an unknown face, and the unknown one of the two.
+    """Find the closest edge between a known and an unknown face, and the unknown one of the two.
 
     An edge with an unknown face on both sides is taken only where none of the former is within ``slack`` of the
     closest edge: a door in a thick wall lies between the lines of its two sides.
@@ -111,7 +111,7 @@ def _behind(arrangement: Arrangement, unknown: BoolArray, edge: int, point: Floa
 
 
 def splits_between(arrangement: Arrangement, entrances: Sequence[Entrance]) -> list[Line]:
-    """Lines that part doors with the same initial face.
+    """Draw lines that part doors with the same initial face.
 
     Doors on one edge: the perpendicular through the middle of two neighbouring doors. Doors on two edges of one
     face, of which the text says nothing: the perpendicular of the line from door to door, through its middle, turned

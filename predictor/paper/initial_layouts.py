@@ -45,7 +45,7 @@ Started = tuple[Start | None, dict[str, str]]
 
 
 def start_rooms(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesConfig) -> Started:
-    """Structure, faces and initial faces of a map: the same for every method with the same structure.
+    """Find structure, faces and initial faces of a map: the same for every method with the same structure.
 
     Args:
         grid: The map, of any resolution and size.
@@ -100,7 +100,7 @@ def _split_until_apart(
 
 
 def unusable(doors: Sequence[ClosedDoor], distance: float) -> dict[str, str]:
-    """Doors at the place of another one, of which that with the smallest id stays, and those that no map reaches.
+    """Find doors at the place of another, of which the smallest id stays, and those that no map reaches.
 
     Args:
         doors: Closed doors in any order.

@@ -38,12 +38,12 @@ class Terms:
 
 
 def free_faces_penalty(terms: Terms, phi: Phi) -> FloatArray:
-    """``FFP``: faces with two free edges count 1; with three, 1 as printed and 5 as the logs show."""
+    """Compute ``FFP``: a face with two free edges counts 1; with three, 1 as printed and 5 as the logs show."""
     return terms.two_free + (5.0 if phi == "as-run" else 1.0) * terms.more_free
 
 
-def evaluate(terms: Terms, weights: Weights, phi: Phi, *, dependent: bool) -> FloatArray:
-    """``Phi_dep`` or ``Phi_ind`` of each layout, shape (k,).
+def score_layouts(terms: Terms, weights: Weights, phi: Phi, *, dependent: bool) -> FloatArray:
+    """Compute ``Phi_dep`` or ``Phi_ind`` of each layout, shape (k,).
 
     ``as-run`` counts free edges a face where the text takes the ratio of lengths, subtracts the penalty for free
     faces from independent rooms too where the text adds it, takes the hull ratio from 1 and the proportion beyond 2.
@@ -106,7 +106,7 @@ class FaceSet:
     corners: tuple[FloatArray, ...]
 
     def terms(self, chosen: BoolArray, *, hulls: bool = True) -> Terms:
-        """Terms of layouts given as rows of ``chosen``, shape (k, n).
+        """Compute the terms of layouts given as rows of ``chosen``, shape (k, n).
 
         Without ``hulls`` the hull is taken as the area itself, its lower bound: the value is then an upper bound.
         """
@@ -133,7 +133,7 @@ class FaceSet:
         )
 
     def hull(self, chosen: BoolArray) -> float:
-        """Area of the convex hull [m2] of the faces chosen, shape (n,)."""
+        """Measure the convex hull [m2] of the faces chosen, shape (n,)."""
         points = np.concatenate([self.corners[i] for i in np.flatnonzero(chosen)])
         return float(shapely.area(shapely.convex_hull(shapely.multipoints(points))))
 

@@ -39,7 +39,7 @@ class Line:
         return np.array([-math.sin(self.angle), math.cos(self.angle)])
 
     def distance(self, points: FloatArray) -> FloatArray:
-        """Signed distance of points (..., 2) [m]."""
+        """Compute signed distances of points (..., 2) [m]."""
         return np.asarray(points @ self.normal - self.offset)
 
 
@@ -165,7 +165,7 @@ def _median(values: FloatArray, weights: FloatArray) -> float:
 
 
 def boundary_lines(segments: FloatArray, directions: Directions, config: LinesConfig) -> tuple[Line, ...]:
-    """Four lines around all segments, at ``border_margin``, along the two strongest directions.
+    """Draw four lines around all segments, at ``border_margin``, along the two strongest directions.
 
     Where the second direction is within twice the kernel of the first, or missing, the perpendicular of the first
     takes its place: a box of two nearly parallel directions would have no bounded extent.

@@ -8,7 +8,7 @@ from closedrooms.predictor.config import LinesConfig
 
 
 def find_segments(grid: OccupancyGrid, config: LinesConfig) -> FloatArray:
-    """Straight pieces of wall.
+    """Find straight wall segments by the probabilistic Hough transform (paper, section 3.1).
 
     Canny edge detection, then the progressive probabilistic Hough transform, on a picture with occupied cells black
     and all others white: each thin wall shows twice, once from either side.
@@ -42,12 +42,12 @@ def find_segments(grid: OccupancyGrid, config: LinesConfig) -> FloatArray:
 
 
 def lengths_of(segments: FloatArray) -> FloatArray:
-    """Length of each segment [m], shape (n,)."""
+    """Measure each segment [m], shape (n,)."""
     lengths: FloatArray = np.hypot(segments[:, 2] - segments[:, 0], segments[:, 3] - segments[:, 1])
     return lengths
 
 
 def angles_of(segments: FloatArray) -> FloatArray:
-    """Direction of each segment without sense, in [0, pi) [rad], shape (n,)."""
+    """Compute the direction of each segment without sense, in [0, pi) [rad], shape (n,)."""
     angles: FloatArray = np.arctan2(segments[:, 3] - segments[:, 1], segments[:, 2] - segments[:, 0]) % np.pi
     return angles

@@ -8,14 +8,14 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.predictor.config import Phi, Weights
-from closedrooms.predictor.paper.layout_score import FaceSet, Terms, evaluate
+from closedrooms.predictor.paper.layout_score import FaceSet, Terms, score_layouts
 
 # Scores closer than this are equal, and geometry decides: far above rounding, far below any real difference.
 TIE = 1e-7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
+class BestLayout:
     """The best layout.
 
     Attributes:
@@ -39,8 +39,8 @@ def best_subset(
     door: FloatArray,
     exact: int,
     max_nodes: int,
-) -> Found:
-    """``argmax Phi(layout + F)`` over all subsets F of the candidates.
+) -> BestLayout:
+    """Find ``argmax Phi(layout + F)`` over all subsets F of the candidates.
 
     Args:
         pool: The layout's faces and the candidates.
@@ -65,21 +65,21 @@ def best_subset(
     else:
         chosen, cut = _promising(pool, fixed, weights, phi, dependent=dependent, max_nodes=max_nodes)
     row, score = _best_row(pool, fixed, chosen, weights, phi, dependent=dependent, door=door)
-    return Found(row, score, cut)
+    return BestLayout(row, score, cut)
 
 
 def _best_row(
     pool: FaceSet, fixed: BoolArray, chosen: BoolArray, weights: Weights, phi: Phi, *, dependent: bool, door: FloatArray
 ) -> tuple[BoolArray, float]:
     """The best of the layouts in ``chosen``, shape (k, n); hulls only while the bound allows a better one."""
-    bounds = evaluate(pool.terms(chosen, hulls=False), weights, phi, dependent=dependent)
+    bounds = score_layouts(pool.terms(chosen, hulls=False), weights, phi, dependent=dependent)
     best: tuple[float, ...] = ()
     top, winner = -np.inf, fixed
     for i in np.argsort(-bounds, kind="stable"):
         if bounds[i] < top - TIE:
             break
         terms = pool.terms(chosen[i : i + 1])
-        score = float(evaluate(terms, weights, phi, dependent=dependent)[0])
+        score = float(score_layouts(terms, weights, phi, dependent=dependent)[0])
         if score < top - TIE:
             continue
         key = (
@@ -111,7 +111,7 @@ def _promising(
     undecided = np.flatnonzero(~fixed)
     order = undecided[np.argsort(-pool.areas[undecided].round(6), kind="stable")]
     layouts = [fixed]
-    top = float(evaluate(pool.terms(fixed[None, :]), weights, phi, dependent=dependent)[0])
+    top = float(score_layouts(pool.terms(fixed[None, :]), weights, phi, dependent=dependent)[0])
     counter = itertools.count()
     heap: list[tuple[float, int, int, BoolArray]] = [(-np.inf, next(counter), 0, fixed)]
     for _ in range(max_nodes):
@@ -124,7 +124,7 @@ def _promising(
             child = chosen.copy()
             child[order[depth]] = take
             if take:
-                score = float(evaluate(pool.terms(child[None, :]), weights, phi, dependent=dependent)[0])
+                score = float(score_layouts(pool.terms(child[None, :]), weights, phi, dependent=dependent)[0])
                 layouts.append(child)
                 top = max(top, score)
             bound = _bound(pool, child, order[depth + 1 :], weights, phi, dependent=dependent)
@@ -156,4 +156,4 @@ def _bound(pool: FaceSet, taken: BoolArray, open_: IntArray, weights: Weights, p
         more_free=np.array([more]),
         proportion=np.ones(1),
     )
-    return float(evaluate(terms, weights, phi, dependent=dependent)[0])
+    return float(score_layouts(terms, weights, phi, dependent=dependent)[0])

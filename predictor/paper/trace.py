@@ -10,14 +10,14 @@ from closedrooms.predictor.prediction import Level, PredictionTrace
 
 
 def level_of(k: int, growth: Growth) -> Level:
-    """Return the layouts as they are after step ``k``."""
+    """List the layouts as they are after step ``k``."""
     names = [entrance.door.id for entrance in growth.entrances]
     shapes = {name: unite(growth, room) for room, name in enumerate(names)}
     return Level(k, shapes, dict(zip(names, growth.scores, strict=True)))
 
 
 def trace_of(start: Start, levels: list[Level]) -> PredictionTrace:
-    """Return every stage of a prediction, for recordings and pictures.
+    """Collect every stage of a prediction, for recordings and pictures.
 
     Args:
         start: Structure, faces and entrances.

@@ -121,7 +121,7 @@ def _count(
 
 
 def unknown_faces(arrangement: Arrangement, grid: OccupancyGrid, *, min_unknown: float, max_free: float) -> BoolArray:
-    """Faces that were not observed, shape (n,).
+    """Mark the faces that were not observed, shape (n,).
 
     At least ``min_unknown`` of the face is unknown, or at most ``max_free`` of it is free.
     """

@@ -31,7 +31,7 @@ class WallLines:
 
 
 def find_structure(grid: OccupancyGrid, config: FacesConfig) -> WallLines | None:
-    """Segments, directions and lines of a map (section 3.1, or 4.2 where there is nothing to find directions with).
+    """Find segments, directions and lines of a map (section 3.1, or 4.2 where there are no directions to find).
 
     Args:
         grid: The map at the working resolution, cropped to what is known with unknown cells around it.

@@ -99,7 +99,7 @@ def find_edges(
         own = slice(first - low, last - low)
         gx, gy = (cv2.Sobel(drawn, cv2.CV_32F, dx, 1 - dx)[own] for dx in (1, 0))
         free = is_free(grid.cells[first:last])
-        slope = np.hypot(gx, gy)
+        slope = cv2.magnitude(gx, gy)
         if among_free:
             slope *= free
         steepest = max(steepest, float(slope.max(initial=0.0)))

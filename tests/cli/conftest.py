@@ -1,5 +1,4 @@
 import json
-import textwrap
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,7 +8,6 @@ import pytest
 from closedrooms.cli.commands import main
 from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.predictor import methods
 
 Call = Callable[..., int]
 OneLine = Callable[[], str]
@@ -62,45 +60,7 @@ def corridor(tmp_path: Path) -> Path:
     return tmp_path
 
 
-PACKAGE = {
-    "third_party_rooms_cli.py": """
-        from dataclasses import dataclass
-
-        from closedrooms.core.room import Room
-        from closedrooms.predictor.methods import Method
-        from closedrooms.predictor.prediction import Prediction
-        from shapely.geometry import Point
-
-
-        @dataclass(frozen=True, kw_only=True)
-        class RoundConfig:
-            radius: float = 2.0
-
-
-        def predict_round(grid, doors, config):
-            rooms = tuple(Room(Point(door.midpoint).buffer(config.radius), (door.id,)) for door in doors)
-            return Prediction(grid, rooms)
-
-
-        METHOD = Method("round", "a disc behind every door", RoundConfig, predict_round, disjoint=False)
-        """,
-    "third_party_rooms_cli-1.0.dist-info/METADATA": "Name: third-party-rooms-cli\nVersion: 1.0\n",
-    "third_party_rooms_cli-1.0.dist-info/entry_points.txt": """
-        [closedrooms.methods]
-        round = third_party_rooms_cli:METHOD
-        """,
-}
-
-
 @pytest.fixture
-def third_party(tmp_path_factory, monkeypatch):
+def third_party(install_round: Callable[..., None]) -> None:
     """A package installed beside us that brings a method."""
-    folder = tmp_path_factory.mktemp("site")
-    for name, text in PACKAGE.items():
-        path = folder / name
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(textwrap.dedent(text))
-    monkeypatch.syspath_prepend(folder)
-    methods._entries.cache_clear()
-    yield folder
-    methods._entries.cache_clear()
+    install_round("third_party_rooms_cli")

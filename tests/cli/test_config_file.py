@@ -134,7 +134,7 @@ def test_options_on_the_line_win_over_the_file(settings):
     config = read("run", "office-01", "--config", path, "--seed", "4", "--sim.noise.turn", "0.25")
     assert (config.seed, config.close) == (4, 2)
     assert (config.sim.noise.turn, config.sim.noise.range_sd) == (0.25, 0.2)
-    assert config.sim.noise.way == NOISE_LEVELS["medium"].way
+    assert config.sim.noise.distance == NOISE_LEVELS["medium"].distance
 
 
 def test_the_line_names_doors_where_the_file_counts_rooms(settings):
@@ -244,7 +244,7 @@ def test_settings_that_are_missing_are_asked_for(settings, call, one_line):
 
 def test_values_are_laid_over_what_is_there():
     start = SimConfig(noise=NOISE_LEVELS["high"])
-    assert overlaid(start, {"noise": {"turn": 0}}).noise.way == start.noise.way
+    assert overlaid(start, {"noise": {"turn": 0}}).noise.distance == start.noise.distance
     assert overlaid(start, {}) == start
     assert overlaid(PaperConfig(), {"directions": None}).directions is None
     assert overlaid(PaperConfig(directions=None), {"directions": {"min_share": 0.5}}).directions.min_share == 0.5

@@ -8,12 +8,11 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
-from shapely.geometry import box
 
 from closedrooms.cli.commands import main
 from closedrooms.core.errors import InvalidInputError
@@ -23,46 +22,16 @@ from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.layout import alone, write_metadata, write_sums
 from closedrooms.experiments.dataset.variants import (
     World,
+    count_variants,
     find_variants,
     find_worlds,
     split_buildings,
 )
-from closedrooms.worlds.formats.native import write_plan
 from closedrooms.worlds.library import bundled_names
-from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom, Wall
 
 COMMAND = [sys.executable, "-c", "import sys; from closedrooms.cli.commands import main; sys.exit(main())"]
+WriteWorld = Callable[[Path, str, float], Path]
 QUICK = ["--sim.lidar.beams", "180", "--repetitions", "2", "--max-closed", "2", "--seed", "5"]
-
-
-def write_world(folder: Path, name: str, width: float) -> Path:
-    """A corridor with two rooms of ``width`` [m]."""
-    w = width
-    rooms = (
-        PlanRoom("corridor", "corridor", box(0, 0, 2 * w, 2)),
-        PlanRoom("left", "office", box(0, 2, w, 5)),
-        PlanRoom("right", "office", box(w, 2, 2 * w, 5)),
-    )
-    lines = [
-        ((0, 0), (2 * w, 0)), ((2 * w, 0), (2 * w, 5)), ((2 * w, 5), (0, 5)), ((0, 5), (0, 0)), ((0, 2), (2 * w, 2)),
-        ((w, 2), (w, 5)),
-    ]  # fmt: skip
-    walls = tuple(
-        Wall(f"w{i}", ((float(a[0]), float(a[1])), (float(b[0]), float(b[1]))), 0.12) for i, (a, b) in enumerate(lines)
-    )
-    doors = (
-        PlanDoor("d1", ((w / 2, 2.0), (w / 2 + 0.9, 2.0)), ("corridor", "left"), opens_into="left"),
-        PlanDoor("d2", ((1.5 * w, 2.0), (1.5 * w + 0.9, 2.0)), ("corridor", "right"), opens_into="right"),
-    )
-    path = folder / f"{name}.json"
-    write_plan(path, FloorPlan(name, rooms, walls, doors, (), (w, 1.0, 0.0)))
-    return path
-
-
-@pytest.fixture(scope="module")
-def worlds(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    folder = tmp_path_factory.mktemp("worlds")
-    return [str(write_world(folder, name, width)) for name, width in (("a", 3.0), ("b", 3.4), ("c", 3.8))]
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +105,7 @@ def test_a_sample_is_a_map_with_the_truth_on_one_frame(made: Path) -> None:
 def test_doors_stay_closed_and_the_first_differs_between_repetitions(tmp_path: Path) -> None:
     config = DatasetConfig(worlds=("office-03",), out=tmp_path, repetitions=11, max_closed=15)
     (world,) = find_worlds(config)
-    variants = find_variants(world, config)
+    variants = list(find_variants(world, config))
     assert len(variants) == 11 * len(world.closable)
     by_order: dict[int, list[tuple[str, ...]]] = {}
     for variant in variants:
@@ -150,7 +119,7 @@ def test_all_bundled_worlds_in_fifteen_orders_are_the_papers_3885_maps(tmp_path:
     config = DatasetConfig(worlds=("all",), out=tmp_path)
     worlds = find_worlds(config)
     assert [world.name for world in worlds] == sorted(bundled_names())
-    assert sum(len(find_variants(world, config)) for world in worlds) == 3885
+    assert count_variants(worlds, config) == sum(1 for w in worlds for _ in find_variants(w, config)) == 3885
 
 
 def test_splits_take_whole_buildings_and_some_of_each() -> None:
@@ -267,7 +236,9 @@ def test_an_unreachable_scheduler_is_one_line(
     assert "no scheduler answers" in capsys.readouterr().err.splitlines()[-1]
 
 
-def test_two_worlds_of_one_name_are_told_apart_by_their_folders(worlds: list[str], tmp_path: Path) -> None:
+def test_two_worlds_of_one_name_are_told_apart_by_their_folders(
+    worlds: list[str], tmp_path: Path, write_world: WriteWorld
+) -> None:
     (tmp_path / "elsewhere").mkdir()
     other = write_world(tmp_path / "elsewhere", "a", 5.0)
     found = find_worlds(DatasetConfig(worlds=(worlds[0], str(other)), out=tmp_path))
@@ -276,7 +247,7 @@ def test_two_worlds_of_one_name_are_told_apart_by_their_folders(worlds: list[str
     assert all(name.endswith("-a") for name in names)
 
 
-def test_two_worlds_whose_names_make_one_folder_are_refused(tmp_path: Path) -> None:
+def test_two_worlds_whose_names_make_one_folder_are_refused(tmp_path: Path, write_world: WriteWorld) -> None:
     sources = [str(write_world(tmp_path, name, 5.0)) for name in ("a b", "a-b")]
     with pytest.raises(InvalidInputError, match="two worlds named 'a-b'"):
         find_worlds(DatasetConfig(worlds=tuple(sources), out=tmp_path))

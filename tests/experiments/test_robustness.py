@@ -16,7 +16,7 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.experiments.robustness.clean_walls import sampled, with_clean_walls
 from closedrooms.experiments.robustness.config import RobustnessConfig
 from closedrooms.experiments.robustness.door_noise import disturbed_doors, phantom_doors
-from closedrooms.experiments.robustness.drives import Drive, furnished, map_drive, odometry_noise
+from closedrooms.experiments.robustness.drives import RecordedDrive, furnished, map_drive, odometry_noise
 from closedrooms.experiments.robustness.levels import cases, first_setting
 from closedrooms.experiments.robustness.onset import LevelResult, level_results, onsets
 from closedrooms.experiments.robustness.sweep import sweep_world
@@ -134,7 +134,7 @@ def test_doors_missed_at_a_low_level_are_missed_at_every_higher_one() -> None:
     assert 20 <= len(kept[-1]) <= 40
 
 
-def room_drive(steps: int = 40) -> Drive:
+def room_drive(steps: int = 40) -> RecordedDrive:
     """A way along a hall of 8 x 4 m, as ideal sensors see it."""
     plan = load_world("office-01")
     angles = -math.pi + 2.0 * math.pi / 360 * np.arange(360)
@@ -146,7 +146,7 @@ def room_drive(steps: int = 40) -> Drive:
             across = 2.0 / np.abs(np.sin(angles))
         scans.append(LaserScan(np.minimum(along, across), -math.pi, 2.0 * math.pi / 360, 20.0, 0.1, number * 0.1))
     sim = replace(SimConfig(), noise=NOISE_LEVELS["none"])
-    return Drive(plan, sim, RecordedRun(tuple(scans), poses, poses), Pose2(), "complete")
+    return RecordedDrive(plan, sim, RecordedRun(tuple(scans), poses, poses), Pose2(), "complete")
 
 
 def test_ideal_sensors_map_a_drive_where_it_was_and_worse_ones_less_well() -> None:

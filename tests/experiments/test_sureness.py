@@ -68,6 +68,18 @@ def test_calibration_error_is_the_distance_from_the_diagonal() -> None:
     assert calibration_error(confidence, confidence - 0.1) == pytest.approx(0.1)
 
 
+def test_rooms_of_one_confidence_count_the_same_in_any_order() -> None:
+    rng = np.random.default_rng(0)
+    confidence, iou = np.repeat([0.3, 0.6, 0.9], [7, 20, 14]), rng.random(41)
+    found = set()
+    for _ in range(5):
+        order = rng.permutation(41)
+        found.add(round(calibration_error(confidence[order], iou[order]), 12))
+    assert len(found) == 1
+    # Groups that hold one confidence each are off by the distance of its mean.
+    assert calibration_error(np.repeat([0.2, 0.8], 50), np.tile([0.0, 1.0], 50)) == pytest.approx(0.3)
+
+
 def test_ranks_tell_found_rooms_from_others() -> None:
     iou = np.array([0.1, 0.2, 0.6, 0.9])
     assert auroc(np.array([0.1, 0.2, 0.3, 0.4]), iou > 0.5) == 1.0

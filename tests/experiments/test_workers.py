@@ -1,5 +1,6 @@
 """Work that is handed out, and workers that die of it."""
 
+import json
 import math
 import os
 import subprocess
@@ -122,6 +123,17 @@ def test_workers_use_one_thread(workers: int) -> None:
         assert set(pools) == {1}
 
 
+def test_a_worker_keeps_the_memory_that_it_frees(monkeypatch: pytest.MonkeyPatch) -> None:
+    # As Dask's nanny starts one: what is freed goes back to the system, and comes again page by page.
+    monkeypatch.setenv("MALLOC_TRIM_THRESHOLD_", "65536")
+    faults = "__import__('resource').getrusage(__import__('resource').RUSAGE_SELF).ru_minflt"
+    work = f"[{faults}, [__import__('numpy').ones(4_000_000, 'u1').sum() for _ in range(50)], {faults}]"
+    crew: Crew[str, object] = Crew(2)
+    ((_, (before, _, after)),) = crew.do(DO, [work])  # type: ignore[misc]
+    # An array has a thousand pages: it is new to the process once or twice, not fifty times.
+    assert after - before < 10_000
+
+
 @pytest.fixture
 def scheduler() -> Iterator[str]:
     """The address of a scheduler in this process, with one worker of two threads in a process of its own."""
@@ -150,3 +162,46 @@ def test_a_cluster_does_the_same_a_few_jobs_ahead_with_one_thread(scheduler: str
     absent = "(_ for _ in ()).throw(ModuleNotFoundError('gone', name='pybullet'))"
     with pytest.raises(MissingPackageError, match="closedrooms dataset needs pybullet"):
         list(Crew(1, scheduler, by="closedrooms dataset").do(DO, [absent] * 4))
+
+
+LOST = """
+import sys
+from closedrooms.core.errors import ClosedroomsError
+from closedrooms.experiments.workers import Crew
+try:
+    for job, outcome in Crew(1, sys.argv[1]).do(eval, ["__import__('time').sleep(0.05)"] * 10_000):
+        print(job, flush=True)
+except ClosedroomsError as error:
+    sys.exit(str(error))
+"""
+
+
+def test_a_scheduler_that_dies_is_one_line(tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="needs closedrooms[cluster]")
+    where, log = tmp_path / "scheduler.json", tmp_path / "dask.log"
+    common = ["--scheduler-file", str(where), "--host", "127.0.0.1", "--no-dashboard"]
+
+    def begin(*words: str) -> "subprocess.Popen[bytes]":
+        with log.open("ab") as file:
+            return subprocess.Popen([sys.executable, "-m", "dask", *words, *common], stdout=file, stderr=file)
+
+    scheduler = begin("scheduler", "--port", "0")
+    worker = begin("worker", "--nthreads", "1", "--no-nanny", "--local-directory", str(tmp_path))
+    try:
+        while not (where.is_file() and where.read_text().rstrip().endswith("}")):
+            assert scheduler.poll() is None, log.read_text()
+            time.sleep(0.05)
+        words = [sys.executable, "-c", LOST, json.loads(where.read_text())["address"]]
+        with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
+            assert child.stdout is not None
+            child.stdout.readline()  # the work has begun
+            scheduler.kill()
+            _, said = child.communicate(timeout=60)
+    finally:
+        for process in (worker, scheduler):
+            process.kill()
+            process.wait()
+    assert child.returncode == 1
+    assert said.splitlines() == [
+        "the Dask scheduler was lost; the same command goes on where it stopped once there is one again"
+    ]

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.beams import clean, hit_points, steadied, thin
+from closedrooms.mapping.beams import clean, hit_points, steadied, thin_points
 
 FULL = 2 * np.pi / 360
 
@@ -89,10 +89,10 @@ def test_hit_points_leave_out_what_is_no_hit_and_apply_the_mount() -> None:
 def test_thinning_evens_out_near_and_far() -> None:
     near = np.column_stack((np.linspace(0, 1, 200), np.ones(200)))
     far = np.column_stack((np.linspace(5, 15, 50), np.ones(50)))
-    kept = thin(np.vstack((near, far)), 0.1, 1000)
+    kept = thin_points(np.vstack((near, far)), 0.1, 1000)
     assert 9 <= (kept[:, 0] <= 1.0).sum() <= 12
     assert (kept[:, 0] >= 5).sum() >= 49
-    assert len(thin(near, 0.001, 40)) <= 41
+    assert len(thin_points(near, 0.001, 40)) <= 41
 
 
 def room(angles: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import ate
 
 TOUR = [(1.0, 1.0), (2.4, 1.0), (2.4, 4.5), (2.4, 1.0), (7.4, 1.0), (7.4, -2.0)]
-NOISE: dict[str, float] = {"way_noise": 0.02, "turn_noise": 0.02, "noise": 0.03, "beams": 360}
+NOISE: dict[str, float] = {"distance_noise": 0.02, "turn_noise": 0.02, "noise": 0.03, "beams": 360}
 WITHOUT = MapperConfig(recovery=RecoveryConfig(enabled=False))
 
 

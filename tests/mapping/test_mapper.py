@@ -13,9 +13,9 @@ from closedrooms.mapping.trajectory import ate
 TOUR = [(1.0, 1.0), (2.4, 1.0), (2.4, 4.5), (2.4, 1.0), (7.4, 1.0), (7.4, -2.0), (7.4, 1.0), (11.0, 1.0)]
 ROUND = [(1.0, 1.0), (19.0, 1.0), (19.0, 15.0), (1.0, 15.0), (1.0, 1.0), (8.0, 1.0)]
 MEDIUM: dict[str, float] = {
-    "way_noise": 0.03, "turn_noise": 0.026, "noise": 0.03, "outliers": 0.002, "dropouts": 0.005, "beams": 360,
+    "distance_noise": 0.03, "turn_noise": 0.026, "noise": 0.03, "outliers": 0.002, "dropouts": 0.005, "beams": 360,
 }  # fmt: skip
-HIGH = {**MEDIUM, "way_noise": 0.08, "turn_noise": 0.07, "noise": 0.05, "outliers": 0.01, "dropouts": 0.02}
+HIGH = {**MEDIUM, "distance_noise": 0.08, "turn_noise": 0.07, "noise": 0.05, "outliers": 0.01, "dropouts": 0.02}
 
 
 def mapped(drive: Any, config: MapperConfig | None = None) -> Mapper:
@@ -62,7 +62,7 @@ def test_half_a_turn_of_view_is_enough(office: Any) -> None:
 
 def test_a_loop_takes_out_what_scan_matching_drifted(ring: Any) -> None:
     # A short-sighted sensor in a smooth corridor cannot see how far it went along.
-    noise = {"way_noise": 0.05, "turn_noise": 0.04, "noise": 0.03, "view": np.pi, "beams": 121}
+    noise = {"distance_noise": 0.05, "turn_noise": 0.04, "noise": 0.03, "view": np.pi, "beams": 121}
     drive = ring.drive(ROUND, seed=3, step=0.15, bias=0.003, **noise)
     without = mapped(drive, MapperConfig(loops=LoopConfig(enabled=False)))
     closed = mapped(drive)
@@ -146,7 +146,7 @@ def test_a_robot_that_stands_still_adds_no_keyframes(office: Any) -> None:
     assert mapper.pose.distance(Pose2()) < 0.01
 
 
-def test_a_mapper_without_scans_has_an_unknown_map_and_no_way() -> None:
+def test_a_mapper_without_scans_has_an_unknown_map_and_no_trajectory() -> None:
     mapper = Mapper()
     mapper.finish()
     assert not mapper.grid().known.any()

@@ -5,7 +5,7 @@ import pytest
 
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.beams import clean, hit_points, thin
+from closedrooms.mapping.beams import clean, hit_points, thin_points
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.scan_preparation import TOGETHER, sweeps
@@ -45,7 +45,7 @@ def test_many_scans_at_once_give_what_each_gives_alone(scans: list[LaserScan]) -
     for scan, sweep in zip(scans, sweeps(scans, CONFIG), strict=True):
         alone = clean(scan, max_range=CONFIG.max_range)
         hits = hit_points(scan, max_range=CONFIG.max_range)
-        assert sweep.points == pytest.approx(thin(hits, matcher.point_spacing, matcher.max_points), abs=1e-12)
+        assert sweep.points == pytest.approx(thin_points(hits, matcher.point_spacing, matcher.max_points), abs=1e-12)
         assert sweep.beams.points == pytest.approx(alone.points, abs=1e-12)
         assert sweep.beams.outline == pytest.approx(alone.outline, abs=1e-12)
         assert sweep.beams.origin == pytest.approx(alone.origin)

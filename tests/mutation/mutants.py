@@ -1,11 +1,13 @@
 """Changes one operator of a module at a time and looks whether the tests of its folder notice.
 
-    python tests/mutation/mutants.py [FOLDER | FOLDER/MODULE.py ...] [--sample 5] [--seed 0] [--out mutants.json]
+    python tests/mutation/mutants.py [FOLDER | FOLDER/MODULE.py ...] [--sample 5 | --each 20] [--seed 0] [--out FILE]
 
 cosmic-ray makes the mutants, in a copy of the checkout; its own runner is not used, since it knows neither our layout
 (folders at the root that are imported as ``closedrooms.*``) nor which tests to begin with. Of every module a sample is
-drawn with a fixed seed, ``--sample 0`` takes all. First the test files that name the module are run, then the rest of
-its folder. What is told: killed and survived by module, and the diff of each survivor.
+drawn with a fixed seed, ``--sample 0`` takes all; ``--each`` draws so many of a folder, spread over its modules. First
+the test files that name the module are run, then the rest of its folder. What is told: killed and survived by module,
+and the diff of each survivor. ``survivors.csv`` beside this judges those that were looked at: survivors that change
+nothing a caller could see are equivalent and count for neither side.
 """
 
 import argparse
@@ -15,11 +17,14 @@ import json
 import os
 import random
 import re
+import resource
 import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from itertools import groupby, islice, zip_longest
 from pathlib import Path
 
 from cosmic_ray.ast import ast_nodes, get_ast
@@ -35,8 +40,10 @@ ARITHMETIC = {
 }  # fmt: skip
 # Operators that need arguments, and what no test is for: identity in place of equality, the kind of an exception.
 LEFT_OUT = re.compile(r"_Is|Is_|IsNot|_Invert|_UAdd|UAdd_|USub_Not|Variable|ExceptionReplacer|RemoveDecorator")
-# A mutant that hangs is killed after this time [s].
-PATIENCE = 240
+# Tests that take more processor time than this hang: all of one folder take two minutes [s].
+HANGS = 400
+# After this time on a busy machine it cannot be told [s].
+PATIENCE = 1800
 
 
 @dataclass(frozen=True)
@@ -60,23 +67,23 @@ class Mutant:
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a mutant: ``killed``, ``survived`` or ``timeout`` (counted as killed)."""
+    """What became of a mutant, ``killed``, ``survived`` or ``timeout`` (counts for neither side), and by which test."""
 
     module: str
     operator: str
     occurrence: int
     line: int
     outcome: str
+    noticed: str
     diff: str
 
 
-def mutants(path: Path, module: str, sample: int, rng: random.Random) -> list[Mutant]:
+def mutants(source: str, module: str, sample: int, rng: random.Random) -> list[Mutant]:
     """A sample of the mutants of a module that are other programs: no annotations, no texts.
 
     Places are drawn first and then an operator for each, so that operators with many variants do not crowd out the
     others.
     """
-    source = path.read_text()
     skipped, tree = _annotations(source), get_ast(source)
     places: dict[tuple[int, int], list[tuple[str, int]]] = {}
     for name in operator_names():
@@ -98,6 +105,20 @@ def mutants(path: Path, module: str, sample: int, rng: random.Random) -> list[Mu
         if changed is not None and _differs(source, changed):
             found.append(Mutant(module, name.removeprefix("core/"), occurrence, place[0], changed))
     return found
+
+
+def spread(modules: Sequence[str], root: Path, each: int, seed: int) -> list[Mutant]:
+    """So many mutants of a folder: one of each module in turn, in an order and at places that the seed draws."""
+    order = list(modules)
+    random.Random(f"{seed} {Path(order[0]).parts[0]}").shuffle(order)
+    piles = []
+    for module in order:
+        rng = random.Random(f"{seed} {module}")
+        pile = mutants((root / module).read_text(), module, -(-each // len(order)) * 2, rng)
+        rng.shuffle(pile)
+        piles.append(pile)
+    rounds = (mutant for turn in zip_longest(*piles) for mutant in turn if mutant is not None)
+    return list(islice(rounds, each))
 
 
 def _annotations(source: str) -> set[tuple[int, int]]:
@@ -132,8 +153,12 @@ def test_files(root: Path, module: str) -> list[list[Path]]:
     return [first, [file for file in everything if file not in first]]
 
 
-def fate(root: Path, mutant: Mutant, pytest: str) -> str:
-    """Put a mutant in its place, run the tests and put the module back."""
+def fate(root: Path, mutant: Mutant, pytest: str) -> tuple[str, str]:
+    """Put a mutant in its place, run the tests and put the module back.
+
+    Returns:
+        What became of it, and the test that noticed.
+    """
     path = root / mutant.module
     original = path.read_text()
     environment = os.environ | {
@@ -150,15 +175,21 @@ def fate(root: Path, mutant: Mutant, pytest: str) -> str:
             words = [pytest, "-x", "-q", "-p", "no:cacheprovider", *map(str, lot)]
             try:
                 done = subprocess.run(
-                    words, cwd=root, env=environment, capture_output=True, timeout=PATIENCE, check=False
-                )
+                    words, cwd=root, env=environment, capture_output=True, timeout=PATIENCE, check=False,
+                    preexec_fn=_end_hangs,
+                )  # fmt: skip
             except subprocess.TimeoutExpired:
-                return "timeout"
+                return "timeout", ""
             if done.returncode not in {0, 5}:
-                return "killed"
-        return "survived"
+                noticed = re.search(rb"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
+                return "killed", noticed[1].decode() if noticed else f"status {done.returncode}"
+        return "survived", ""
     finally:
         path.write_text(original)
+
+
+def _end_hangs() -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (HANGS, HANGS))
 
 
 def _copy(root: Path) -> None:
@@ -191,6 +222,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("wanted", nargs="*", default=list(FOLDERS))
     parser.add_argument("--sample", type=int, default=5, help="places a module; 0 for all")
+    parser.add_argument("--each", type=int, default=0, help="places a folder, in place of --sample")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--pytest", default=str(Path(sys.executable).with_name("pytest")))
     parser.add_argument("--out", type=Path, default=Path("mutants.json"))
@@ -199,31 +231,36 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="mutants-") as scratch:
         root = Path(scratch)
         _copy(root)
-        for module in _modules(options.wanted):
-            # Of its own for each module: what one holds does not change the draw of the next.
-            rng = random.Random(f"{options.seed} {module}")
-            own: list[Result] = []
-            source = (root / module).read_text()
-            for mutant in mutants(root / module, module, options.sample, rng):
-                outcome = fate(root, mutant, options.pytest)
-                lines = difflib.unified_diff(source.splitlines(), mutant.changed.splitlines(), n=0, lineterm="")
-                diff = "\n".join(line for line in lines if not line.startswith(("---", "+++", "@@")))
-                own.append(Result(module, mutant.operator, mutant.occurrence, mutant.line, outcome, diff))
-                if outcome == "survived":
-                    sys.stdout.write(f"survived {module}:{mutant.line} {mutant.operator}\n{diff}\n")
-                    sys.stdout.flush()
-            if own:
-                killed = sum(result.outcome != "survived" for result in own)
-                sys.stdout.write(f"{module:<50} {killed} of {len(own)} killed\n")
-                sys.stdout.flush()
-            results += own
+        for mutant in _drawn(root, options):
+            outcome, noticed = fate(root, mutant, options.pytest)
+            before = (root / mutant.module).read_text()
+            lines = difflib.unified_diff(before.splitlines(), mutant.changed.splitlines(), n=0, lineterm="")
+            diff = "\n".join(line for line in lines if not line.startswith(("---", "+++", "@@")))
+            place = (mutant.module, mutant.operator, mutant.occurrence, mutant.line)
+            results.append(Result(*place, outcome, noticed, diff))
+            sys.stdout.write(f"{outcome:<8} {mutant.module}:{mutant.line} {mutant.operator}\n")
+            sys.stdout.write(f"{diff}\n" if outcome != "killed" else "")
+            sys.stdout.flush()
             options.out.write_text(json.dumps([asdict(result) for result in results], indent=1) + "\n")
-    for folder in FOLDERS:
-        own = [result for result in results if result.module.startswith(f"{folder}/")]
+    for place in [*dict.fromkeys(result.module for result in results), *FOLDERS]:
+        own = [result.outcome for result in results if result.module == place or result.module.startswith(f"{place}/")]
         if own:
-            killed = sum(result.outcome != "survived" for result in own)
-            sys.stdout.write(f"{folder:<12} {killed:4d} of {len(own):4d} killed, {killed / len(own):.0%}\n")
+            killed, decided = own.count("killed"), len(own) - own.count("timeout")
+            sys.stdout.write(f"{place:<50} {killed:4d} of {decided:4d} killed, {len(own) - decided} without answer\n")
     return 0
+
+
+def _drawn(root: Path, options: argparse.Namespace) -> Iterator[Mutant]:
+    """The mutants that are asked for, folder by folder."""
+    modules = _modules(options.wanted)
+    if options.each:
+        for _, own in groupby(modules, key=lambda module: Path(module).parts[0]):
+            yield from spread(list(own), root, options.each, options.seed)
+        return
+    for module in modules:
+        # Of its own for each module: what one holds does not change the draw of the next.
+        rng = random.Random(f"{options.seed} {module}")
+        yield from mutants((root / module).read_text(), module, options.sample, rng)
 
 
 if __name__ == "__main__":

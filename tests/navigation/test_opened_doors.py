@@ -70,6 +70,17 @@ def test_a_door_that_did_not_open_is_seen_again() -> None:
     assert (_leaf_cells(reopened.grid()) > 65).any()
 
 
+def test_a_door_that_waits_is_unknown_until_it_opens_and_seen_from_then_on() -> None:
+    mapper, stamp = _mapper_after_many_passes()
+    reopened = ReopenedMap(mapper, [DOOR], waiting=("d00",))
+    stamp = _drive(mapper, np.arange(0.0, 2.6, 0.2), [*WALLS, LEAF], stamp)
+    assert (_leaf_cells(reopened.grid()) < 65).all()  # not even what was seen since: it will open
+    reopened.note_opened(["d00"])
+    _drive(mapper, np.arange(2.6, 0.0, -0.2), [*WALLS, *ROOM], stamp)
+    assert (np.abs(_leaf_cells(reopened.grid())) < 20).all()
+    assert (_leaf_cells(reopened.grid()) >= 0).all()
+
+
 def test_all_but_the_doorways_stays_as_the_mapper_has_it() -> None:
     mapper, stamp = _mapper_after_many_passes()
     reopened = ReopenedMap(mapper, [DOOR])

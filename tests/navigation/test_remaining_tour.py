@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shapely.geometry import Point, box
 
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.coverage.config import CoverageConfig, GraphConfig
@@ -107,3 +108,16 @@ def test_an_open_tour_runs_from_here_to_home_by_the_shortest_way(places: list[tu
     length = distances[order[:-1], order[1:]].sum()
     best = min(distances[[0, *middle], [*middle, 1]].sum() for middle in itertools.permutations(range(2, len(places))))
     assert length == pytest.approx(best, rel=1e-6)
+
+
+def test_stops_within_shapes_come_first_shape_by_shape_and_the_others_keep_their_order(stops: RemainingTour) -> None:
+    before = [tuple(place) for place in stops.left]
+    third, first = box(9.6, 3.2, 13.6, 7.2), box(1.0, 3.2, 5.0, 7.2)
+    inside = [[place for place in before if shape.contains(Point(place))] for shape in (third, first)]
+    assert inside[0]
+    assert inside[1]
+    stops.put_first([third, first])
+    rest = [place for place in before if place not in {*inside[0], *inside[1]}]
+    assert [tuple(place) for place in stops.left] == [*inside[0], *inside[1], *rest]
+    stops.put_first([])
+    assert [tuple(place) for place in stops.left] == [*inside[0], *inside[1], *rest]

@@ -1,11 +1,9 @@
 import subprocess
 import sys
-import textwrap
 
 import pytest
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.predictor import methods
 from closedrooms.predictor.config import BestConfig, PaperConfig
 from closedrooms.predictor.methods import METHODS, find_method, predict
 
@@ -37,50 +35,10 @@ def test_a_method_without_stages_ignores_the_wish_for_a_trace(mapped):
     assert predict(scene.grid, scene.doors, "best", BestConfig(), trace=True).trace is not None
 
 
-PACKAGE = {
-    "third_party_rooms.py": """
-        from dataclasses import dataclass
-
-        from closedrooms.core.room import Room
-        from closedrooms.predictor.methods import Method
-        from closedrooms.predictor.prediction import Prediction
-        from shapely.geometry import Point
-
-
-        @dataclass(frozen=True, kw_only=True)
-        class RoundConfig:
-            radius: float = 2.0
-
-
-        def predict_round(grid, doors, config):
-            rooms = tuple(Room(Point(door.midpoint).buffer(config.radius), (door.id,)) for door in doors)
-            return Prediction(grid, rooms)
-
-
-        METHOD = Method("round", "a disc behind every door", RoundConfig, predict_round, disjoint=False)
-        NOTHING = 3
-        """,
-    "third_party_rooms-1.0.dist-info/METADATA": "Metadata-Version: 2.1\nName: third-party-rooms\nVersion: 1.0\n",
-    "third_party_rooms-1.0.dist-info/entry_points.txt": """
-        [closedrooms.methods]
-        round = third_party_rooms:METHOD
-        missing = third_party_rooms:ABSENT
-        wrong = third_party_rooms:NOTHING
-        """,
-}
-
-
 @pytest.fixture
-def third_party(tmp_path, monkeypatch):
+def third_party(install_round):
     """A package installed beside us that brings a method, one that is not there and one that is none."""
-    for name, text in PACKAGE.items():
-        path = tmp_path / name
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(textwrap.dedent(text))
-    monkeypatch.syspath_prepend(tmp_path)
-    methods._entries.cache_clear()
-    yield tmp_path
-    methods._entries.cache_clear()
+    install_round("third_party_rooms", missing="ABSENT", wrong="NOTHING")
 
 
 @pytest.mark.usefixtures("third_party")

@@ -70,12 +70,12 @@ def test_passes_a_gap_two_millimetres_wider_than_itself_and_not_a_narrower_one()
     st.floats(0.001, 0.3),
 )
 def test_a_moved_disc_is_never_inside_and_touches_within_two_millimetres(
-    corners: list[tuple[float, float]], direction: float, way: float
+    corners: list[tuple[float, float]], direction: float, length: float
 ) -> None:
     hull = shapely.convex_hull(shapely.multipoints(corners))
     if not isinstance(hull, Polygon) or hull.area < 1e-3 or hull.distance(Point(0, 0)) < RADIUS + SKIN:
         return
-    dx, dy = way * math.cos(direction), way * math.sin(direction)
+    dx, dy = length * math.cos(direction), length * math.sin(direction)
     moved = move_disc(0.0, 0.0, dx, dy, RADIUS, [tuple(e) for e in edges_of(hull).tolist()])
     gap = hull.distance(Point(moved.x, moved.y)) - RADIUS
     assert gap >= 0.0

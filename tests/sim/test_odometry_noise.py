@@ -1,4 +1,4 @@
-"""The odometry's errors: as large as set, however the way is cut."""
+"""The odometry's errors: as large as set, however the path is cut."""
 
 import math
 
@@ -13,7 +13,7 @@ from closedrooms.sim.differential_drive import Motion
 from closedrooms.sim.odometry import Odometry
 
 RUNS = 700
-QUIET = NoiseConfig(way=0.0, turn_per_metre=0.0, turn=0.0)
+QUIET = NoiseConfig(distance=0.0, turn_per_metre=0.0, turn=0.0)
 
 
 def errors(noise: NoiseConfig, motion: Motion, pieces: int) -> np.ndarray:
@@ -38,7 +38,7 @@ def assert_sd(values: np.ndarray, expected: float) -> None:
 def test_after_one_metre_the_spread_is_that_of_the_level(level: str, pieces: int) -> None:
     noise = NOISE_LEVELS[level]
     poses = errors(noise, Motion(1.0, 0.0, 0.0), pieces)
-    assert_sd(poses[:, 0], noise.way)
+    assert_sd(poses[:, 0], noise.distance)
     assert_sd(poses[:, 2], noise.turn_per_metre)
     # A heading that drifts as a Brownian motion leads sideways by a third of its final variance.
     assert_sd(poses[:, 1], noise.turn_per_metre / math.sqrt(3))
@@ -55,10 +55,10 @@ def test_after_one_full_turn_the_spread_is_that_of_the_level(level: str, pieces:
     assert np.abs(turned.mean()) < 4 * noise.turn * 2 * math.pi / math.sqrt(RUNS)
 
 
-def test_the_variance_grows_linearly_with_the_way() -> None:
+def test_the_variance_grows_linearly_with_the_travelled_distance() -> None:
     noise = NOISE_LEVELS["medium"]
     assert_sd(errors(noise, Motion(9.0, 0.0, 0.0), 9)[:, 2], 3 * noise.turn_per_metre)
-    assert_sd(errors(noise, Motion(0.25, 0.0, 0.0), 1)[:, 0], noise.way / 2)
+    assert_sd(errors(noise, Motion(0.25, 0.0, 0.0), 1)[:, 0], noise.distance / 2)
 
 
 def test_the_levels_are_those_that_were_asked_for() -> None:
@@ -70,12 +70,12 @@ def test_the_levels_are_those_that_were_asked_for() -> None:
     }
     for name, numbers in expected.items():
         n = NOISE_LEVELS[name]
-        given_numbers = (n.range_sd, n.dropouts, n.outliers, n.way, math.degrees(n.turn_per_metre), n.turn)
+        given_numbers = (n.range_sd, n.dropouts, n.outliers, n.distance, math.degrees(n.turn_per_metre), n.turn)
         assert given_numbers == pytest.approx(numbers)
 
 
 def test_alphas_are_the_variances_per_metre_and_per_radian() -> None:
-    alpha1, alpha2, alpha3, alpha4 = NoiseConfig(way_per_turn=0.1).alphas
+    alpha1, alpha2, alpha3, alpha4 = NoiseConfig(distance_per_turn=0.1).alphas
     assert alpha1 * 2 * math.pi == pytest.approx((0.03 * 2 * math.pi) ** 2)
     assert alpha2 == pytest.approx(math.radians(1.5) ** 2)
     assert alpha3 == pytest.approx(0.03**2)
@@ -83,7 +83,7 @@ def test_alphas_are_the_variances_per_metre_and_per_radian() -> None:
 
 
 def test_a_bias_is_the_same_in_every_run_and_needs_no_noise() -> None:
-    noise = NoiseConfig(way=0.0, turn_per_metre=0.0, turn=0.0, bias_way=0.05, bias_turn_per_metre=0.02)
+    noise = NoiseConfig(distance=0.0, turn_per_metre=0.0, turn=0.0, bias_distance=0.05, bias_turn_per_metre=0.02)
     poses = [Odometry(noise, seed) for seed in (0, 1)]
     for odometry in poses:
         odometry.add(Motion(2.0, 0.0, 0.0))
@@ -93,7 +93,7 @@ def test_a_bias_is_the_same_in_every_run_and_needs_no_noise() -> None:
 
 
 def test_a_bias_of_turns_scales_them() -> None:
-    odometry = Odometry(NoiseConfig(way=0.0, turn_per_metre=0.0, turn=0.0, bias_turn=-0.1), 0)
+    odometry = Odometry(NoiseConfig(distance=0.0, turn_per_metre=0.0, turn=0.0, bias_turn=-0.1), 0)
     odometry.add(Motion(0.0, 0.0, 2.0))
     assert odometry.pose.theta == pytest.approx(1.8)
 
@@ -102,9 +102,9 @@ motions = st.builds(Motion, st.floats(-1, 1), st.floats(-1, 1), st.floats(-3, 3)
 
 
 @given(st.lists(motions, max_size=8))
-def test_without_noise_the_odometry_is_the_true_way(way: list[Motion]) -> None:
+def test_without_noise_the_odometry_is_the_true_path(path: list[Motion]) -> None:
     odometry, true = Odometry(QUIET, 0), Pose2()
-    for motion in way:
+    for motion in path:
         odometry.add(motion)
         true = true @ Pose2(*motion)
     assert odometry.pose.distance(true) < 1e-9
@@ -113,8 +113,8 @@ def test_without_noise_the_odometry_is_the_true_way(way: list[Motion]) -> None:
 
 def test_errors_of_the_way_leave_those_of_the_heading_alone() -> None:
     headings = []
-    for way in (0.0, 0.03, 0.5):
-        odometry = Odometry(NoiseConfig(way=way), 7)
+    for distance in (0.0, 0.03, 0.5):
+        odometry = Odometry(NoiseConfig(distance=distance), 7)
         for _ in range(50):
             odometry.add(Motion(0.1, 0.0, 0.05))
         headings.append(odometry.pose.theta)

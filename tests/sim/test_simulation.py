@@ -56,7 +56,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_does_not(plan: FloorPlan
 def test_noise_of_one_source_leaves_the_others_alone(plan: FloorPlan) -> None:
     base = noise_level("high")
     first, _ = drive_around(plan, SimConfig(noise=base), 4, 5)[-1]
-    odometry, _ = drive_around(plan, SimConfig(noise=dataclasses.replace(base, way=0.5)), 4, 5)[-1]
+    odometry, _ = drive_around(plan, SimConfig(noise=dataclasses.replace(base, distance=0.5)), 4, 5)[-1]
     assert first.odometry != odometry.odometry
     np.testing.assert_array_equal(first.scan.ranges, odometry.scan.ranges)
     dropouts, _ = drive_around(plan, SimConfig(noise=dataclasses.replace(base, dropouts=0.5)), 4, 5)[-1]
@@ -185,7 +185,7 @@ def test_settings_that_make_no_sense_are_refused() -> None:
         lambda: RobotConfig(radius=-0.1),
         lambda: RobotConfig(max_speed=math.inf),
         lambda: NoiseConfig(dropouts=1.5),
-        lambda: NoiseConfig(way=math.nan),
+        lambda: NoiseConfig(distance=math.nan),
         lambda: SimConfig(heading=math.nan),
         lambda: SimConfig(lidar=LidarConfig(mount=(0.5, 0.0, 0.0))),
         lambda: noise_level("loud"),

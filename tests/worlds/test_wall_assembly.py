@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from shapely.geometry import Polygon, box
 
 from closedrooms.core.door import Segment
-from closedrooms.worlds.wall_assembly import STRAIGHT, joined, without_gaps
+from closedrooms.worlds.wall_assembly import STRAIGHT, join_segments, without_gaps
 
 WALL = 0.16
 
@@ -56,7 +56,7 @@ def test_a_jittered_line_becomes_one_run_as_long_as_it_is(angle: float, jitter: 
     c, s = math.cos(angle), math.sin(angle)
     points = [(c * x - s * y, s * x + c * y) for x, y in enumerate(jitter)]
     pieces = list(zip(points[1:], points, strict=False))
-    (run,) = joined(pieces)
+    (run,) = join_segments(pieces)
     assert set(run) == {points[0], points[-1]}
 
 
@@ -65,11 +65,11 @@ def test_a_slow_bend_is_cut_into_runs_that_stay_on_it(corners: int) -> None:
     """Each two neighbours of 300 are as good as straight, all of them are a circle."""
     points = [(math.cos(2 * math.pi * k / corners), math.sin(2 * math.pi * k / corners)) for k in range(corners)]
     pieces: list[Segment] = list(zip(points, points[1:] + points[:1], strict=True))
-    runs = joined(pieces)
+    runs = join_segments(pieces)
     near = shapely.union_all([shapely.LineString(run) for run in runs]).buffer(1.01 * STRAIGHT)
     assert near.covers(shapely.MultiLineString(pieces))
     assert sum(math.dist(*run) for run in runs) == pytest.approx(sum(math.dist(*piece) for piece in pieces), rel=0.01)
 
 
 def test_pieces_that_do_not_touch_stay_apart() -> None:
-    assert joined([((0, 0), (1, 0)), ((1.5, 0), (2, 0))]) == [((0, 0), (1, 0)), ((1.5, 0), (2, 0))]
+    assert join_segments([((0, 0), (1, 0)), ((1.5, 0), (2, 0))]) == [((0, 0), (1, 0)), ((1.5, 0), (2, 0))]

@@ -162,8 +162,8 @@ def _evidence(layout: Layout) -> rrb.Container:
     return rrb.Grid(
         _from_above(
             layout,
-            "Wall faces by the way they face (violet: axis of symmetry)",
-            [*plain, "+ /prediction/wall_faces", "+ /prediction/symmetry"],
+            "Wall faces by the way they face",
+            [*plain, "+ /prediction/wall_faces"],
             aspect=aspect,
         ),
         _from_above(

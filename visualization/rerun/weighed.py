@@ -64,18 +64,15 @@ LEVELS = (
 
 
 def _draw_faces(stream: RecordingStream, trace: "WeighedTrace", *, staged: bool) -> None:
-    """Wall faces, a colour for each way that they face, and the axes of symmetry."""
+    """Wall faces, a colour for each way that they face."""
     faces = np.asarray(trace.faces).reshape(-1, 2, 2)
     ways = np.round(np.degrees(trace.directions)).astype(int) % 360
     distinct = sorted(set(ways.tolist()))
     if staged:
         stream.at(stage=Stage.SEGMENTS)
-        axes = f", symmetric about {len(trace.axes)} axes" if len(trace.axes) else ", no axis of symmetry"
-        stream.say("Wall faces", f"{len(faces)} stretches that face {len(distinct)} ways{axes}")
+        stream.say("Wall faces", f"{len(faces)} stretches that face {len(distinct)} ways")
     chosen = [colours.ROOM_COLOURS[distinct.index(way) % len(colours.ROOM_COLOURS)] for way in ways.tolist()]
     stream.log("prediction/wall_faces", drawables.strips(list(faces), *chosen, radius=drawables.THICK))
-    axes_lines = list(np.asarray(trace.axes).reshape(-1, 2, 2))
-    stream.log("prediction/symmetry", drawables.strips(axes_lines, colours.LOOP, z=drawables.Z_PATH))
 
 
 def _draw_candidates(stream: RecordingStream, room: "WeighedRoom", palette: Mapping[str, Colour]) -> None:

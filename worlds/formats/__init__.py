@@ -1,7 +1,9 @@
 """Floor plans in the formats of others: one file a format, each reads into a :class:`~closedrooms.worlds.FloorPlan`.
 
-``settlement`` is every importer's last step. ``portals`` and ``room_outlines`` serve formats of rooms without walls,
-``hallways`` pyrobosim, ``raster_rooms`` and ``raster_walls`` maps, ``xml_text`` XML.
+Read: ``luperto``, ``kth``, ``houseexpo``, ``rmf`` (by ``rmf_level``), ``pyrobosim``, ``rosmap``, ``native``; written:
+``native``, ``sdf``, ``stage``, ``mesh`` (OBJ and URDF). ``settlement`` is every importer's last step. ``portals`` and
+``room_outlines`` serve formats of rooms without walls, ``hallways`` pyrobosim, ``raster_rooms`` and ``raster_walls``
+maps, ``xml_text`` XML.
 """
 
 from typing import TYPE_CHECKING

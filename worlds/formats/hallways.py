@@ -65,10 +65,10 @@ class JoinedRooms:
         """The door through the walls of two rooms that face each other; ``None`` where a robot fits between them."""
         start, end = self._floors[hallway.start], self._floors[hallway.end]
         between = hallway.line.difference(shapely.union_all([start, end]))
-        ways = [part for part in shapely.get_parts(between) if max(part.distance(start), part.distance(end)) < 1e-6]
-        if len(ways) != 1:
+        gaps = [part for part in shapely.get_parts(between) if max(part.distance(start), part.distance(end)) < 1e-6]
+        if len(gaps) != 1:
             return None
-        square = _square_to(start, ways[0], end)
+        square = _square_to(start, gaps[0], end)
         if square is None:
             return None
         first, last = square
@@ -100,7 +100,7 @@ class JoinedRooms:
 
 
 def extend_into_rooms(points: list[Point], start: Polygon, end: Polygon) -> LineString:
-    """Return the line through points, drawn on into the rooms at its ends where it stops short of them."""
+    """Extend a line into the rooms at its ends where it stops short of them."""
     line = [*points]
     for room, at in ((start, 0), (end, len(points) + 1)):
         last = shapely.Point(points[0] if at == 0 else points[-1])
@@ -114,15 +114,15 @@ def extend_into_rooms(points: list[Point], start: Polygon, end: Polygon) -> Line
     return LineString(line)
 
 
-def _square_to(start: Polygon, way: LineString, end: Polygon) -> tuple[FloatArray, FloatArray] | None:
-    """The shortest way from one room to the other through the middle of ``way``, square to the first room's face."""
-    middle = way.interpolate(0.5, normalized=True)
+def _square_to(start: Polygon, gap: LineString, end: Polygon) -> tuple[FloatArray, FloatArray] | None:
+    """Join two rooms by the shortest line through the middle of ``gap``, square to the first room's face."""
+    middle = gap.interpolate(0.5, normalized=True)
     near = shapely.ops.nearest_points(start, middle)[0]
     centre = np.array([middle.x, middle.y])
     normal = centre - np.array([near.x, near.y])
     if np.hypot(*normal) < 1e-6:
         return None
-    reach = 10.0 * way.length * normal / np.hypot(*normal)
+    reach = 10.0 * gap.length * normal / np.hypot(*normal)
     ends = []
     for room, tip in ((start, centre - reach), (end, centre + reach)):
         hit = LineString([centre, tip]).intersection(room)

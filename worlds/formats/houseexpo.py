@@ -18,7 +18,7 @@ from closedrooms.worlds.formats.room_outlines import repaired
 from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom
-from closedrooms.worlds.wall_assembly import Edge, coverage, shared_edges, walls_along
+from closedrooms.worlds.wall_assembly import RoomEdge, coverage, shared_edges, walls_along
 
 WHAT = "a HouseExpo home (JSON)"
 # The outline is the edge of free space: walls take half of this from it [m].
@@ -141,9 +141,9 @@ def _parts(area: BaseGeometry, smallest: float) -> list[Polygon]:
     return sorted(parts, key=lambda part: (round(part.bounds[0], 3), round(part.bounds[1], 3)))
 
 
-def _doors(edges: list[Edge], rooms: tuple[PlanRoom, ...]) -> list[PlanDoor]:
+def _doors(edges: list[RoomEdge], rooms: tuple[PlanRoom, ...]) -> list[PlanDoor]:
     """A door between each two rooms that touch, on their longest common edge that has room for one."""
-    longest: dict[tuple[int, int], Edge] = {}
+    longest: dict[tuple[int, int], RoomEdge] = {}
     for edge in edges:
         first, second = edge.rooms
         if second is None or edge.length < NARROWEST:

@@ -11,7 +11,7 @@ from shapely.geometry import Polygon
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.formats.portals import Portal, paired, plan_of_portals
+from closedrooms.worlds.formats.portals import Portal, pair_portals, plan_of_portals
 from closedrooms.worlds.formats.room_outlines import GAP, clean_outlines, hull_areas, outline_lines, repaired
 from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
 from closedrooms.worlds.formats.xml_text import attribute, child, descendants, parse_xml, text
@@ -150,7 +150,7 @@ def _portals(
     if outside:
         why = "they lead outside or to a room that is not there"
         remarks.append(Remark(action="dropped", what="portals", why=why, names=tuple(outside), count=len(outside)))
-    portals = paired(found, within=SAME_DOOR)
+    portals = pair_portals(found, within=SAME_DOOR)
     single = 2 * len(portals) - len(found)
     if single:
         remarks.append(Remark(action="guessed", what="doors", why="they stand on one contour only", count=single))

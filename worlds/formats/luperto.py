@@ -11,7 +11,7 @@ from shapely.geometry import Polygon
 from closedrooms.core.door import Point
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.formats.portals import Portal, paired, plan_of_portals
+from closedrooms.worlds.formats.portals import Portal, pair_portals, plan_of_portals
 from closedrooms.worlds.formats.room_outlines import GAP, clean_outlines, hull_areas, outline_lines, repaired
 from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
 from closedrooms.worlds.formats.xml_text import attribute, child, children, parse_xml, text
@@ -146,7 +146,7 @@ def _portals(spaces: list[Any], gone: set[str | None], metres: float, remarks: l
             pair = (min(number, others[0]), max(number, others[0]))
             explicit = text(child(portal, "type")).strip().upper() != "IMPLICIT"
             found.append((number, Portal(place, pair, explicit, name=name)))
-    return paired(found)
+    return pair_portals(found)
 
 
 def _useless(name: str, place: Point | None, others: int, to_dropped_room: bool) -> Remark:

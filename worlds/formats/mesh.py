@@ -9,7 +9,7 @@ import shapely
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.names import xml_text
-from closedrooms.worlds.boxes import Leaf, door_leaves
+from closedrooms.worlds.boxes import BoxLeaf, box_leaves
 from closedrooms.worlds.door_hinges import without_entrances
 from closedrooms.worlds.extrusion import WALL_HEIGHT, extrude
 from closedrooms.worlds.formats.sdf import CLEARANCE, DOOR_HEIGHT, FURNITURE_HEIGHT, LEAF_MASS, OPEN
@@ -66,13 +66,13 @@ def write_urdf(path: Path, plan: FloorPlan) -> None:
         geometry = SubElement(SubElement(walls, tag), "geometry")
         SubElement(geometry, "mesh", filename=mesh.name)
     for door in plan.doors:
-        for number, leaf in enumerate(door_leaves(plan, door)):
+        for number, leaf in enumerate(box_leaves(plan, door)):
             _add_leaf(robot, xml_text(door.id if number == 0 else f"{door.id}_{number}"), leaf)
     indent(robot)
     write_bytes(path, b'<?xml version="1.0"?>\n' + tostring(robot) + b"\n")
 
 
-def _add_leaf(robot: Element, name: str, leaf: Leaf) -> None:
+def _add_leaf(robot: Element, name: str, leaf: BoxLeaf) -> None:
     """A link whose origin is the hinge, or the middle of a sliding leaf, and the joint that holds it."""
     box, sliding = leaf.box, leaf.hinge is None
     x, y = leaf.hinge if leaf.hinge is not None else (box.x, box.y)

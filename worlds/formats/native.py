@@ -39,7 +39,7 @@ def write_plan(path: str | Path, plan: FloorPlan) -> None:
 
 
 def plan_text(plan: FloorPlan) -> str:
-    """Return the JSON text of a plan; the same plan gives the same bytes."""
+    """Write a plan as JSON text; the same plan gives the same bytes."""
     head: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
@@ -109,7 +109,7 @@ def read_plan(path: str | Path) -> FloorPlan:
 
 
 def plan_from(data: Any, path: Path) -> FloorPlan:
-    """Return the validated plan that parsed JSON ``data`` of the file ``path`` holds; see :func:`read_plan`."""
+    """Validate the plan in the parsed JSON ``data`` of the file ``path``; see :func:`read_plan`."""
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise InvalidInputError("no closedrooms plan", expected=f"format {FORMAT!r}", where=path)
     if data.get("version") != VERSION:
@@ -183,7 +183,7 @@ class _Reader:
     def each(
         self, data: dict[str, Any], key: str, read: Callable[[dict[str, Any]], Passage], remarks: list[Remark]
     ) -> list[Passage]:
-        """Return the doors or openings that can be read; each of the others becomes a remark."""
+        """Read the doors or openings that can be read; each of the others becomes a remark."""
         found = []
         for number, row in enumerate(self._list(data, key)):
             self._element = f"{key}[{number}]"

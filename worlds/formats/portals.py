@@ -13,7 +13,7 @@ from closedrooms.worlds.connectivity import connected_parts
 from closedrooms.worlds.door_hinges import hung, is_circulation
 from closedrooms.worlds.geometry import distance_along
 from closedrooms.worlds.plan import DoorKind, FloorPlan, Opening, PlanDoor, PlanRoom, Wall
-from closedrooms.worlds.wall_assembly import Edge, free_spans, shared_edges, walls_along
+from closedrooms.worlds.wall_assembly import RoomEdge, free_spans, shared_edges, walls_along
 
 # Usual outer and inner walls, where a file gives walls no thickness [m].
 OUTER_WALL, INNER_WALL = 0.3, 0.15
@@ -67,8 +67,8 @@ class DeepDoor:
     beside: float
 
 
-def paired(listed: Sequence[tuple[int, Portal]], *, within: float = SAME) -> list[Portal]:
-    """Portals, each once although both of its rooms list it.
+def pair_portals(listed: Sequence[tuple[int, Portal]], *, within: float = SAME) -> list[Portal]:
+    """Pair portals: each is one although both of its rooms list it.
 
     Args:
         listed: Index of the room that lists a portal, and the portal.
@@ -122,7 +122,7 @@ def plan_of_portals(
     doors, openings = _passages(portals, rooms, edges, fits, remarks)
     walls = walls_along(edges, lambda edge: outer if edge.rooms[1] is None else inner)
     for deep in deep_doors:
-        frame = Edge(deep.segment, deep.rooms)
+        frame = RoomEdge(deep.segment, deep.rooms)
         walls.append(
             Wall(f"w{len(walls):03d}", frame.part(frame.length / 2, frame.length + 2 * deep.beside), deep.depth)
         )
@@ -135,7 +135,7 @@ def plan_of_portals(
 def _passages(
     portals: Sequence[Portal],
     rooms: tuple[PlanRoom, ...],
-    edges: list[Edge],
+    edges: list[RoomEdge],
     fits: tuple[tuple[float, float], ...],
     remarks: list[Remark],
 ) -> tuple[list[PlanDoor], list[Opening]]:
@@ -174,7 +174,7 @@ def _place(
     portal: Portal,
     name: str,
     widest: float,
-    edges: list[Edge],
+    edges: list[RoomEdge],
     taken: list[Segment],
     fits: tuple[tuple[float, float], ...],
     remarks: list[Remark],
@@ -196,7 +196,7 @@ def _place(
 
 
 def _nearest(
-    portal: Portal, widest: float, edges: list[Edge], taken: list[Segment], margin: float, narrowest: float
+    portal: Portal, widest: float, edges: list[RoomEdge], taken: list[Segment], margin: float, narrowest: float
 ) -> tuple[float, Segment] | None:
     """The free piece of wall nearest to a portal, and how far away it is [m]; ``None`` where nothing fits."""
     point = shapely.Point(portal.point)

@@ -86,7 +86,7 @@ def find_boxes(labels: Labels) -> IntArray:
 
 
 def box_corners(boxes: IntArray, frame: GridFrame) -> tuple[FloatArray, ...]:
-    """``x_min, y_min, x_max, y_max`` of boxes of cells, map frame [m], exact to 0.1 mm."""
+    """Convert boxes of cells to ``x_min, y_min, x_max, y_max``, map frame [m], exact to 0.1 mm."""
     y0, y1 = (np.round(frame.origin_y + boxes[:, k] * frame.resolution, 4) for k in (0, 1))
     x0, x1 = (np.round(frame.origin_x + boxes[:, k] * frame.resolution, 4) for k in (2, 3))
     return x0, y0, x1, y1

@@ -23,7 +23,7 @@ SMALLEST = 0.2
 
 
 def repaired(polygon: Polygon, name: str, remarks: list[Remark]) -> Polygon | None:
-    """Return a valid outline of usable size, or ``None``; what was done is added to ``remarks``."""
+    """Repair an outline, ``None`` if it stays of no usable size; what was done is added to ``remarks``."""
     if not polygon.is_valid:
         reason = shapely.is_valid_reason(polygon).split("[")[0]
         parts = shapely.get_parts(areal(shapely.make_valid(polygon)))
@@ -40,7 +40,7 @@ def repaired(polygon: Polygon, name: str, remarks: list[Remark]) -> Polygon | No
 def clean_outlines(
     outlines: Sequence[Polygon | None], remarks: list[Remark], *, names: Sequence[str]
 ) -> list[Polygon | None]:
-    """Outlines that share their edges: overlaps cut, narrow gaps closed, jogs of the drawing straightened.
+    """Make outlines share their edges: cut overlaps, close narrow gaps, straighten jogs of the drawing.
 
     Args:
         outlines: Valid polygons [m]; ``None`` stays ``None``.
@@ -75,7 +75,7 @@ def clean_outlines(
 
 
 def hull_areas(corners: Sequence[Sequence[Point]]) -> list[float]:
-    """Rough areas of rooms whose outlines may be broken: of the convex hulls of their corners."""
+    """Estimate areas of rooms whose outlines may be broken, by the convex hulls of their corners."""
     return [float(shapely.MultiPoint(points).convex_hull.area) for points in corners if len(points) >= 3]
 
 
@@ -86,7 +86,7 @@ def _on_grid(outline: Polygon) -> Polygon:
 
 
 def outline_lines(outlines: Sequence[Polygon | None], kept: Sequence[Polygon | None]) -> BaseGeometry:
-    """Return the walls of a file that draws rooms: the outlines of those that became rooms, as they were given.
+    """List the walls of a file that draws rooms: the outlines of those that became rooms, as they were given.
 
     Where two rooms claim the same floor, one of them lost it and its wall there; that stands in the remarks already.
     """

@@ -6,7 +6,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.names import xml_text
-from closedrooms.worlds.boxes import Box, Leaf, door_leaves, wall_boxes
+from closedrooms.worlds.boxes import Box, BoxLeaf, box_leaves, wall_boxes
 from closedrooms.worlds.door_hinges import without_entrances
 from closedrooms.worlds.extrusion import WALL_HEIGHT
 from closedrooms.worlds.plan import FloorPlan
@@ -46,7 +46,7 @@ def write_sdf(path: Path, plan: FloorPlan) -> None:
     _text(fixed, "parent", "world")
     _text(fixed, "child", "walls")
     for door in plan.doors:
-        for number, leaf in enumerate(door_leaves(plan, door)):
+        for number, leaf in enumerate(box_leaves(plan, door)):
             name = xml_text(door.id if number == 0 else f"{door.id}_{number}")
             _leaf(model, name, leaf)
     indent(root)
@@ -101,7 +101,7 @@ def _polyline(link: Element, name: str, points: list[tuple[float, float]]) -> No
         _text(shape, "height", _numbers(FURNITURE_HEIGHT))
 
 
-def _leaf(model: Element, name: str, leaf: Leaf) -> None:
+def _leaf(model: Element, name: str, leaf: BoxLeaf) -> None:
     """A link whose origin is the hinge, or the middle of a sliding leaf, and the joint that holds it."""
     box = leaf.box
     x, y = leaf.hinge if leaf.hinge is not None else (box.x, box.y)

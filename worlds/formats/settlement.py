@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.geometry import WallLines, wall_area
+from closedrooms.worlds.geometry import WallAxes, wall_area
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
 from closedrooms.worlds.validation import passage_faults, validate
 
@@ -44,7 +44,7 @@ class Source:
 
 
 def settle(plan: FloorPlan, remarks: Iterable[Remark], source: Source, path: Path) -> FloorPlan:
-    """Return the plan without its bad doors, valid, with every remark on it.
+    """Leave out a plan's bad doors, validate it, and put every remark on it.
 
     Args:
         plan: As the importer made it.
@@ -71,7 +71,7 @@ def settle(plan: FloorPlan, remarks: Iterable[Remark], source: Source, path: Pat
 
 
 def merged(remarks: Iterable[Remark]) -> list[Remark]:
-    """Remarks of one kind put together, in the order of their first."""
+    """Merge remarks of one kind, in the order of their first."""
     kinds: dict[tuple[str, str, str, bool], Remark] = {}
     for remark in remarks:
         key = (remark.action, remark.what, remark.why, remark.loss)
@@ -120,7 +120,7 @@ def _lost_walls(plan: FloorPlan, source: Source) -> list[Remark]:
     if source.walls is not None:
         near = shapely.union_all([*lines, *passages]).buffer(source.within, quad_segs=4)
         lost.append(("in the file but not in the plan", source.walls.difference(near).length))
-    gaps = WallLines(plan)
+    gaps = WallAxes(plan)
     solid = shapely.union_all([wall_area(plan), *(gaps.gap(passage.segment) for passage in plan.passages)])
     bare = shapely.union_all(lines).difference(solid).length
     lost.append(("in the plan but not among the solids that block robot and rays", bare))
@@ -150,7 +150,7 @@ def _odd_rooms(areas: Sequence[float]) -> list[Remark]:
 
 
 def no_rooms(expected: str, areas: Sequence[float], remarks: Sequence[Remark], path: Path) -> InvalidInputError:
-    """Return the error of a file none of whose rooms can be used, with the reason.
+    """Make the error of a file none of whose rooms can be used, with the reason.
 
     Args:
         expected: What a file of this format holds.

@@ -10,7 +10,7 @@ from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.grid import GridFrame
 from closedrooms.core.names import shown, stage_text
 from closedrooms.core.pose import Pose2
-from closedrooms.worlds.boxes import door_leaves, opened
+from closedrooms.worlds.boxes import box_leaves, open_leaf
 from closedrooms.worlds.door_hinges import without_entrances
 from closedrooms.worlds.geometry import wall_area
 from closedrooms.worlds.plan import FloorPlan, Furniture
@@ -58,8 +58,8 @@ def _text(plan: FloorPlan, picture: str, bounds: tuple[float, float, float, floa
         f" size [{box.length:.4f} {box.thickness:.4f} 2.0]"
         f" pose [{box.x:.4f} {box.y:.4f} 0 {math.degrees(box.angle):.3f}] )"
         for door in plan.doors
-        for number, leaf in enumerate(door_leaves(plan, door))
-        for box in [opened(leaf)]
+        for number, leaf in enumerate(box_leaves(plan, door))
+        for box in [open_leaf(leaf)]
     ]
     things = [_thing(thing) for thing in plan.furniture]
     lines = [

@@ -38,29 +38,29 @@ def parse_xml(path: Path, *, what: str) -> Any:
 
 
 def child(element: Any, name: str) -> Any:
-    """Return the first child called ``name`` in any case; ``None`` without one, or of ``None``."""
+    """Find the first child called ``name`` in any case; ``None`` without one, or of ``None``."""
     return next(iter(children(element, name)), None)
 
 
 def children(element: Any, name: str) -> list[Any]:
-    """Return the children called ``name`` in any case."""
+    """List the children called ``name`` in any case."""
     if element is None:
         return []
     return [c for c in element if isinstance(c.tag, str) and c.tag.rpartition("}")[2].lower() == name.lower()]
 
 
 def descendants(element: Any, name: str) -> list[Any]:
-    """Return all elements called ``name`` below ``element``, in any case, in the order of the file."""
+    """List all elements called ``name`` below ``element``, in any case, in the order of the file."""
     if element is None:
         return []
     return [e for e in element.iter() if isinstance(e.tag, str) and e.tag.rpartition("}")[2].lower() == name.lower()]
 
 
 def attribute(element: Any, name: str) -> str | None:
-    """Return an attribute spelt in any case."""
+    """Look up an attribute spelt in any case."""
     return next((value for key, value in element.attrib.items() if key.lower() == name.lower()), None)
 
 
 def text(element: Any) -> str:
-    """Return the text of an element, empty without one."""
+    """Read the text of an element, empty without one."""
     return "" if element is None else (element.text or "")

@@ -62,7 +62,7 @@ RECIPES: dict[str, Recipe] = {
 
 
 def bundled_plan(name: str) -> FloorPlan:
-    """Return a bundled world made anew by the generator."""
+    """Generate a bundled world anew."""
     recipe = RECIPES[name]
     return generate(
         recipe.kind,
@@ -76,5 +76,5 @@ def bundled_plan(name: str) -> FloorPlan:
 
 
 def bundled_text(name: str) -> str:
-    """Return the JSON text of a bundled world made anew; equal to its file, byte for byte."""
+    """Generate the JSON text of a bundled world anew, byte for byte that of its file."""
     return plan_text(bundled_plan(name))

@@ -10,7 +10,7 @@ from closedrooms.core.door import Segment
 from closedrooms.worlds.door_hinges import hung
 from closedrooms.worlds.generation.sketch import CORRIDOR, Sketch, SketchPassage
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom
-from closedrooms.worlds.wall_assembly import Edge, coverage, free_spans, shared_edges, walls_along, without_gaps
+from closedrooms.worlds.wall_assembly import RoomEdge, coverage, free_spans, shared_edges, walls_along, without_gaps
 
 # Slits and notches between rooms up to this width are given to a neighbour [m].
 SLIT = 2.0
@@ -19,7 +19,7 @@ DOOR_MARGIN = 0.3
 
 
 def turned_sketch(sketch: Sketch, angle: float) -> Sketch:
-    """Return the sketch with shared edges, turned, its lower left corner at the origin, on a grid of 0.1 mm."""
+    """Turn a sketch, with edges shared and the lower left corner at the origin, on a grid of 0.1 mm."""
     polygons, _ = without_gaps(sketch.polygons, SLIT, fixed=1, branches=False)
     polygons = coverage(polygons, gap=SLIT, snap=0.01)
     c, s = math.cos(angle), math.sin(angle)
@@ -35,7 +35,7 @@ def build_plan(rng: np.random.Generator, sketch: Sketch) -> FloorPlan:
     corridor = float(rng.choice([0.15, 0.2, 0.24]))
     partition = float(rng.choice([0.1, 0.12, 0.15]))
 
-    def thickness(edge: Edge) -> float:
+    def thickness(edge: RoomEdge) -> float:
         if edge.rooms[1] is None:
             return outer
         return corridor if edge.rooms[0] == CORRIDOR else partition
@@ -64,7 +64,7 @@ def build_plan(rng: np.random.Generator, sketch: Sketch) -> FloorPlan:
     return FloorPlan("", rooms, tuple(walls_along(edges, thickness)), hung(doors, openings, rooms), tuple(openings))
 
 
-def _place_all(passages: list[SketchPassage], edges: list[Edge]) -> list[tuple[SketchPassage, Segment]]:
+def _place_all(passages: list[SketchPassage], edges: list[RoomEdge]) -> list[tuple[SketchPassage, Segment]]:
     taken: list[Segment] = []
     placed = []
     for passage in passages:
@@ -75,7 +75,7 @@ def _place_all(passages: list[SketchPassage], edges: list[Edge]) -> list[tuple[S
     return placed
 
 
-def _place(passage: SketchPassage, edges: list[Edge], taken: list[Segment]) -> Segment | None:
+def _place(passage: SketchPassage, edges: list[RoomEdge], taken: list[Segment]) -> Segment | None:
     """The passage on the longest free stretch between its rooms."""
     best: tuple[float, Segment] | None = None
     for edge in edges:

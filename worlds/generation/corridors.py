@@ -37,7 +37,7 @@ class Run:
     deepest: float = 0.0
 
     def box(self, s0: float, s1: float, t0: float, t1: float) -> Polygon:
-        """Return the rectangle from ``s0`` to ``s1`` along the run and ``t0`` to ``t1`` away from the corridor."""
+        """Make the rectangle from ``s0`` to ``s1`` along the run and ``t0`` to ``t1`` away from the corridor [m]."""
         c, s = math.cos(self.angle), math.sin(self.angle)
         (x, y), n = self.origin, self.side
         return Polygon(
@@ -77,19 +77,19 @@ def _step(value: float) -> float:
 
 
 def bar(rng: np.random.Generator, m: Measures) -> Skeleton:
-    """Return one straight corridor, with rooms on both sides or, now and then, on one."""
+    """Draw one straight corridor, with rooms on both sides or, now and then, on one."""
     one_sided = rng.random() < 0.25
     return _along([(0.0, 0.0), (m.legs[0], 0.0)], m, [(m.depths[0], 0.0 if one_sided else m.depths[1])])
 
 
 def ell(rng: np.random.Generator, m: Measures) -> Skeleton:
-    """Two wings at a right angle."""
+    """Draw two wings at a right angle."""
     points = [(0.0, 0.0), (m.legs[0], 0.0), (m.legs[0], m.legs[1])]
     return _along(points, m, _sides(rng, m, 2))
 
 
 def you(rng: np.random.Generator, m: Measures) -> Skeleton:
-    """Three wings around a court that is open on one side."""
+    """Draw three wings around a court that is open on one side."""
     court = m.width + 2 * m.depths[0] + _step(rng.uniform(4.0, 9.0))
     base = max(m.legs[0], court)
     points = [(0.0, m.legs[1]), (0.0, 0.0), (base, 0.0), (base, m.legs[2])]
@@ -97,12 +97,12 @@ def you(rng: np.random.Generator, m: Measures) -> Skeleton:
 
 
 def tee(rng: np.random.Generator, m: Measures) -> Skeleton:
-    """Return a wing that leaves the middle of another at a right angle."""
+    """Draw a wing that leaves the middle of another at a right angle."""
     return _branched(rng, m, RIGHT_ANGLE)
 
 
 def slanted(rng: np.random.Generator, m: Measures) -> Skeleton:
-    """Return a straight building with a wing that leaves its end, or its middle, at another angle."""
+    """Draw a straight building with a wing that leaves its end, or its middle, at another angle."""
     turn = math.radians(float(rng.integers(20, 46)))
     if rng.random() < 0.4:
         return _branched(rng, m, RIGHT_ANGLE - turn / 2)
@@ -111,7 +111,7 @@ def slanted(rng: np.random.Generator, m: Measures) -> Skeleton:
 
 
 def ring(rng: np.random.Generator, m: Measures) -> Skeleton:
-    """Corridors all around a core of rooms or a court."""
+    """Draw corridors all around a core of rooms or a court."""
     core_depth = _step(rng.uniform(3.6, 5.0))
     court = rng.random() < 0.3
     inner_x = max(m.legs[0] - 2 * m.depths[0], 12.0)

@@ -12,7 +12,7 @@ from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.generation.construction import build_plan, turned_sketch
 from closedrooms.worlds.generation.corridors import SHAPES
 from closedrooms.worlds.generation.room_programme import BAYS, measures
-from closedrooms.worlds.generation.sketch import draw_rooms
+from closedrooms.worlds.generation.sketch import sketch_rooms
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start_pose import start_pose
 from closedrooms.worlds.validation import validate
@@ -83,7 +83,7 @@ def _version_1(
     while True:
         dimensions = measures(rng, kind, size)
         skeleton = SHAPES[shape](rng, dimensions)
-        sketch = draw_rooms(rng, kind, skeleton)
+        sketch = sketch_rooms(rng, kind, skeleton)
         sketch = turned_sketch(sketch, math.radians(angle))
         plan = build_plan(rng, sketch)
         if closable_rooms(plan):

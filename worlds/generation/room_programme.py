@@ -77,7 +77,7 @@ LENGTHS = {
 
 
 def measures(rng: np.random.Generator, kind: str, size: str) -> Measures:
-    """Widths, depths and lengths of one building."""
+    """Draw widths, depths and lengths of one building."""
     low, high = LENGTHS[kind][size]
     if kind == "office":
         width, depths = rng.uniform(1.6, 2.4), rng.uniform(4.4, 6.2, size=2)
@@ -90,8 +90,8 @@ def measures(rng: np.random.Generator, kind: str, size: str) -> Measures:
     )
 
 
-def fill(rng: np.random.Generator, kind: str, length: float, counts: dict[str, int]) -> list[tuple[Bay, float]]:
-    """Bays whose widths add up to ``length``.
+def draw_bays(rng: np.random.Generator, kind: str, length: float, counts: dict[str, int]) -> list[tuple[Bay, float]]:
+    """Draw bays whose widths add up to ``length``.
 
     Args:
         rng: Draws kinds and widths.

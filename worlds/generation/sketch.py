@@ -9,7 +9,7 @@ from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.door import Point
 from closedrooms.worlds.generation.corridors import Run, Skeleton
-from closedrooms.worlds.generation.room_programme import BAYS, END_ROOMS, Bay, fill
+from closedrooms.worlds.generation.room_programme import BAYS, END_ROOMS, Bay, draw_bays
 
 # Rooms that lose more than this to their neighbours at a bend are left out.
 KEPT_SHARE = 0.45
@@ -49,7 +49,7 @@ class Sketch:
     passages: list[SketchPassage]
 
 
-def draw_rooms(rng: np.random.Generator, kind: str, skeleton: Skeleton) -> Sketch:
+def sketch_rooms(rng: np.random.Generator, kind: str, skeleton: Skeleton) -> Sketch:
     """Draw rooms along every run and at dead ends, none overlapping another."""
     sketch = Sketch(["corridor"], [skeleton.corridor], [])
     counts: dict[str, int] = {}
@@ -64,7 +64,7 @@ def draw_rooms(rng: np.random.Generator, kind: str, skeleton: Skeleton) -> Sketc
 
 
 def _draw_run(rng: np.random.Generator, kind: str, run: Run, sketch: Sketch, counts: dict[str, int]) -> None:
-    bays = fill(rng, kind, run.length - run.corner, counts)
+    bays = draw_bays(rng, kind, run.length - run.corner, counts)
     at, section, stepped = 0.0, 1.0, 0
     last: int | None = None
     previous = run.depth

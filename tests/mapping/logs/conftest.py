@@ -143,10 +143,10 @@ class BagMaker:
                 self.scan(stamp)
         return self
 
-    def write(self) -> Path:
-        """The bag on disk."""
+    def write(self, compression: str = "") -> Path:
+        """The bag on disk; compressed by ``bz2`` or ``lz4`` (ROS 1), ``file`` or ``message`` (ROS 2)."""
         from rosbags.rosbag1 import Writer as Writer1
-        from rosbags.rosbag2 import StoragePlugin, Writer
+        from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
         if self._storage == "ros1":
             writer: Any = Writer1(self._path.with_suffix(".bag"))
@@ -155,6 +155,10 @@ class BagMaker:
             plugin = StoragePlugin.MCAP if self._storage == "mcap" else StoragePlugin.SQLITE3
             writer = Writer(self._path, version=9, storage_plugin=plugin)
             serialize = self._store.serialize_cdr
+        if compression and self._storage == "ros1":
+            writer.set_compression(writer.CompressionFormat[compression.upper()])
+        elif compression:
+            writer.set_compression(CompressionMode[compression.upper()], CompressionFormat.ZSTD)
         with writer:
             connections: dict[str, Any] = {}
             for recorded, topic, message in sorted(self._messages, key=lambda entry: entry[0]):
@@ -176,3 +180,9 @@ def new_bag(tmp_path: Path) -> Callable[[], BagMaker]:
     """Makes MCAP bags."""
     made = iter(range(100))
     return lambda: BagMaker(tmp_path / f"bag{next(made)}", "mcap")
+
+
+@pytest.fixture
+def bag_maker() -> type[BagMaker]:
+    """Makes bags of any storage."""
+    return BagMaker

@@ -6,14 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from closedrooms.core.pose import Pose2
-from closedrooms.mapping.beams import hit_points, thin
+from closedrooms.mapping.beams import hit_points, thin_points
 from closedrooms.mapping.config import MatcherConfig
-from closedrooms.mapping.matching.correlative_matcher import Search, Window
+from closedrooms.mapping.matching.correlative_matcher import SearchWindow, WindowSearch
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.heading_search import search_heading
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 from closedrooms.mapping.matching.scan_matcher import match_scan
-from closedrooms.mapping.motion import Motion
+from closedrooms.mapping.motion import UncertainMotion
 
 
 def shape(n: int = 240) -> np.ndarray:
@@ -63,7 +63,7 @@ def test_points_outside_the_field_do_no_harm() -> None:
 def test_the_search_finds_what_trying_every_pose_finds(dx: float, dy: float, turn: float, coarse: int) -> None:
     points = 0.997 * shape(120) + 0.0031  # off the borders of cells, where rounding decides
     guess = Pose2(dx, dy, turn)
-    found = Search(FIELD, points, guess, Window(0.25, 0.03), coarse_cells=coarse).best()
+    found = WindowSearch(FIELD, points, guess, SearchWindow(0.25, 0.03), coarse_cells=coarse).best()
     step = math.sqrt((points**2).sum() / len(points))
     step = min(max(2 * 0.05 / max(step, 1.0), 0.004), 0.04)
     best = 0.0
@@ -86,7 +86,7 @@ def test_the_search_finds_what_trying_every_pose_finds(dx: float, dy: float, tur
 def test_the_search_recovers_a_metre_and_fifteen_degrees() -> None:
     truth = Pose2(0.9, -0.8, 0.26)
     field = field_of(truth.transform(shape(900)))
-    found = Search(field, shape(), Pose2(), Window(1.2, 0.35)).best()
+    found = WindowSearch(field, shape(), Pose2(), SearchWindow(1.2, 0.35)).best()
     assert found.pose.distance(truth) < 0.08
     assert abs(found.pose.theta - truth.theta) < 0.04
 
@@ -95,7 +95,7 @@ def test_the_prior_settles_ties_in_favour_of_the_odometry() -> None:
     x = np.arange(-10, 10, 0.05)
     walls = np.vstack((np.column_stack((x, np.full(400, 1.0))), np.column_stack((x, np.full(400, -1.0)))))
     points = walls[np.abs(walls[:, 0]) < 5]
-    found = Search(field_of(walls), points, Pose2(), Window(0.5, 0.05), prior_sigmas=(0.1, 0.05)).best()
+    found = WindowSearch(field_of(walls), points, Pose2(), SearchWindow(0.5, 0.05), prior_sigmas=(0.1, 0.05)).best()
     assert abs(found.pose.x) <= 0.1
 
 
@@ -106,21 +106,21 @@ def test_a_heading_is_found_by_looking_round() -> None:
 
 def test_too_few_points_and_places_that_fit_nowhere_are_no_match() -> None:
     config = MatcherConfig()
-    motion = Motion(0.1, 0.1)
+    motion = UncertainMotion(0.1, 0.1)
     assert match_scan(FIELD, shape(10), Pose2(), motion, usual_score=0.8, config=config) is None
     assert match_scan(FIELD, shape(), Pose2(50, 50, 0), motion, usual_score=0.8, config=config) is None
 
 
 def test_a_guess_half_a_metre_off_is_found() -> None:
     match = match_scan(
-        FIELD, shape(), Pose2(0.55, -0.5, 0.3), Motion(4.0, 0.5), usual_score=0.8, config=MatcherConfig()
+        FIELD, shape(), Pose2(0.55, -0.5, 0.3), UncertainMotion(4.0, 0.5), usual_score=0.8, config=MatcherConfig()
     )
     assert match is not None
     assert match.pose.distance(Pose2()) < 0.038
 
 
 def test_a_turn_is_believed_possible_for_a_moment_after_odometry_reads_zero() -> None:
-    turning = Motion().then(0.0, 0.15).matched().then(0.0, 0.0)
+    turning = UncertainMotion().then(0.0, 0.15).matched().then(0.0, 0.0)
     assert not turning.still
     assert turning.sigmas(MatcherConfig())[1] > 0.04
     for _ in range(20):
@@ -133,9 +133,9 @@ def test_a_scan_of_a_room_is_matched_to_a_centimetre(office) -> None:  # type: i
     rng = np.random.default_rng(1)
     field = field_of(at.transform(hit_points(office.scan(at, noise=0.02, rng=rng), max_range=25.0)))
     moved = at @ Pose2(0.15, 0.05, 0.1)
-    points = thin(hit_points(office.scan(moved, noise=0.02, rng=rng), max_range=25.0), 0.1, 320)
+    points = thin_points(hit_points(office.scan(moved, noise=0.02, rng=rng), max_range=25.0), 0.1, 320)
     guess = at @ Pose2(0.12, 0.08, 0.06)
-    match = match_scan(field, points, guess, Motion(0.15, 0.1), usual_score=0.8, config=MatcherConfig())
+    match = match_scan(field, points, guess, UncertainMotion(0.15, 0.1), usual_score=0.8, config=MatcherConfig())
     assert match is not None
     assert match.pose.distance(moved) < 0.02
     assert abs(match.pose.theta - moved.theta) < 0.008
@@ -153,8 +153,8 @@ def test_a_place_that_repeats_has_a_rival(repeated: bool, least: float, most: fl
     field.add(corner)
     if repeated:
         field.add(corner + np.array((0.0, 2.5)))
-    window = Window(3.0, 0.1)
-    searched = Search(field, corner, Pose2(0.2, 0.1, 0.0), window, prior_sigmas=(3.0, 0.1))
+    window = SearchWindow(3.0, 0.1)
+    searched = WindowSearch(field, corner, Pose2(0.2, 0.1, 0.0), window, prior_sigmas=(3.0, 0.1))
     best = searched.best()
     rival = searched.best(away_from=(best.pose, 1.0, math.inf))
     assert best.pose.distance(Pose2()) < 0.06
@@ -167,8 +167,8 @@ def test_a_place_that_repeats_has_a_rival(repeated: bool, least: float, most: fl
 @settings(max_examples=12, deadline=None)
 @given(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8), st.floats(-0.2, 0.2), st.floats(0.0, 1.0))
 def test_a_floor_hides_only_what_lies_below_it(dx: float, dy: float, turn: float, floor: float) -> None:
-    guess, window = Pose2(dx, dy, turn), Window(0.6, 0.1)
-    searched = Search(FIELD, shape(120), guess, window, prior_sigmas=(0.6, 0.1))
+    guess, window = Pose2(dx, dy, turn), SearchWindow(0.6, 0.1)
+    searched = WindowSearch(FIELD, shape(120), guess, window, prior_sigmas=(0.6, 0.1))
     best = searched.best()
     found = searched.best(floor=floor)
     if best.score >= floor:
@@ -178,5 +178,5 @@ def test_a_floor_hides_only_what_lies_below_it(dx: float, dy: float, turn: float
 
 
 def test_nothing_is_found_where_nothing_reaches_the_floor() -> None:
-    found = Search(FIELD, shape(120), Pose2(30.0, 0.0, 0.0), Window(0.6, 0.1)).best(floor=0.3)
+    found = WindowSearch(FIELD, shape(120), Pose2(30.0, 0.0, 0.0), SearchWindow(0.6, 0.1)).best(floor=0.3)
     assert found.score == 0.0

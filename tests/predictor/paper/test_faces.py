@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.predictor.paper.arrangement import arrange, box_of, joined
+from closedrooms.predictor.paper.arrangement import arrange, box_of, unite_faces
 from closedrooms.predictor.paper.initial_faces import find_entrance, splits_between
 from closedrooms.predictor.paper.lines import Line
 from closedrooms.predictor.paper.unknown_faces import observed_shares, unknown_faces
@@ -101,7 +101,7 @@ def test_faces_whose_corners_are_a_rounding_error_apart_are_joined():
         (-15.27470246699104, -5.5722097099289085), (-12.225000000000003, -5.572694593050399),
         (-12.225000000000003, -1.1754372323525097), (-15.274003331306744, -1.1749524603891062),
     ])  # fmt: skip
-    both = joined([west, east])
+    both = unite_faces([west, east])
     assert both.is_valid
     assert both.geom_type == "Polygon"
     assert both.area == pytest.approx(west.area + east.area, abs=1e-5)

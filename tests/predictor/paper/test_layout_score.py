@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from closedrooms.predictor.config import Weights
 from closedrooms.predictor.paper.arrangement import arrange
-from closedrooms.predictor.paper.layout_score import FaceSet, Terms, evaluate, face_set
+from closedrooms.predictor.paper.layout_score import FaceSet, Terms, face_set, score_layouts
 from closedrooms.predictor.paper.lines import Line
 from closedrooms.predictor.paper.subsets import best_subset
 
@@ -27,7 +27,7 @@ def _terms(**changes):
 
 
 def _value(phi, dependent, **changes):
-    return float(evaluate(_terms(**changes), W, phi, dependent=dependent)[0])
+    return float(score_layouts(_terms(**changes), W, phi, dependent=dependent)[0])
 
 
 def test_a_square_of_a_hundred_cells_scores_its_side_as_the_logs_do():

@@ -11,7 +11,7 @@ from defusedxml import ElementTree
 from shapely.geometry import Polygon
 
 from closedrooms.pipeline.world_files import convert_world
-from closedrooms.worlds.boxes import Box, door_leaves, opened, wall_boxes
+from closedrooms.worlds.boxes import Box, box_leaves, open_leaf, wall_boxes
 from closedrooms.worlds.formats.sdf import write_sdf
 from closedrooms.worlds.formats.stage import write_stage
 from closedrooms.worlds.geometry import door_leaf, rectangles, wall_area
@@ -40,23 +40,23 @@ def test_an_open_leaf_stands_in_the_room_that_it_opens_into(name: str) -> None:
     plan = load_world(name)
     rooms = {room.id: room.polygon for room in plan.rooms}
     for door in plan.doors:
-        (leaf,) = door_leaves(plan, door)
+        (leaf,) = box_leaves(plan, door)
         assert area_of(leaf.box).symmetric_difference(door_leaf(plan, door)).area < 1e-6
-        open_leaf = area_of(opened(leaf))
+        standing = area_of(open_leaf(leaf))
         assert door.opens_into is not None
-        assert rooms[door.opens_into].intersection(open_leaf).area > 0.9 * open_leaf.area
+        assert rooms[door.opens_into].intersection(standing).area > 0.9 * standing.area
 
 
 def test_double_and_sliding_doors_have_their_leaves(small: FloorPlan) -> None:
     double, sliding = (replace(small.doors[0], kind=kind) for kind in ("double", "sliding"))  # type: ignore[arg-type]
-    leaves = door_leaves(small, double)
+    leaves = box_leaves(small, double)
     assert [leaf.box.length for leaf in leaves] == pytest.approx([0.45, 0.45])
     assert {leaf.turn for leaf in leaves} == {1, -1}
     for leaf in leaves:
-        assert opened(leaf).y > 2.0
-    (slider,) = door_leaves(small, sliding)
+        assert open_leaf(leaf).y > 2.0
+    (slider,) = box_leaves(small, sliding)
     assert slider.hinge is None
-    assert opened(slider).x == pytest.approx(slider.box.x + 0.9)
+    assert open_leaf(slider).x == pytest.approx(slider.box.x + 0.9)
 
 
 def test_sdf_holds_the_walls_and_a_joint_a_door(tmp_path: Path) -> None:

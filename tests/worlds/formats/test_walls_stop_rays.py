@@ -11,7 +11,7 @@ import shapely
 from closedrooms.sim.building import building_solids
 from closedrooms.sim.physics_world import PhysicsWorld, upright
 from closedrooms.worlds.extrusion import extrude
-from closedrooms.worlds.geometry import WallLines
+from closedrooms.worlds.geometry import WallAxes
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan
 
@@ -47,7 +47,7 @@ def cast(physics: PhysicsWorld, start: np.ndarray, end: np.ndarray) -> float:
 
 
 def test_rays_end_at_the_faces_of_every_wall(plan: FloorPlan, physics: PhysicsWorld) -> None:
-    lines = WallLines(plan)
+    lines = WallAxes(plan)
     gaps = shapely.union_all([lines.gap(passage.segment) for passage in plan.passages]).buffer(0.01)
     solid = building_solids(plan)
     checked = 0
@@ -71,7 +71,7 @@ def test_rays_end_at_the_faces_of_every_wall(plan: FloorPlan, physics: PhysicsWo
 def test_rays_pass_every_door_and_opening_between_rooms_from_one_to_the_other(
     plan: FloorPlan, physics: PhysicsWorld
 ) -> None:
-    lines = WallLines(plan)
+    lines = WallAxes(plan)
     rooms = {room.id: room.polygon for room in plan.rooms}
     assert plan.passages or plan.name.endswith("L2")
     for passage in plan.passages:

@@ -1,0 +1,124 @@
+import numpy as np
+import pytest
+from shapely.geometry import box
+
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.grid import GridFrame, OccupancyGrid
+from closedrooms.core.room import Alternative, Room
+from closedrooms.coverage import cost_spread
+from closedrooms.coverage.cost_spread import HELD, measure_excursion, spread_cost, summarise
+from closedrooms.coverage.tour.tour_planner import plan_coverage
+
+FRAME = GridFrame(0.05, 0.0, 0.0, 200, 400)
+# In the upper wall of a corridor of 2 m that ends at y = 3.
+DOORS = [ClosedDoor(f"d{n}", (x, 3.1), ((x - 0.45, 3.1), (x + 0.45, 3.1)), 0.9) for n, x in enumerate((3.0, 9.0))]
+
+
+def _map(draw, *rooms):
+    """The corridor with rooms ``(x0, x1, depth)`` behind open doors."""
+    boxes = [(1.0, 1.0, 19.0, 3.0)]
+    for door, (x0, x1, depth) in zip(DOORS, rooms, strict=False):
+        x = door.midpoint[0]
+        boxes += [(x0, 3.2, x1, 3.2 + depth), (x - 0.45, 2.9, x + 0.45, 3.3)]
+    return draw(20.0, 12.0, boxes)
+
+
+def _room(number, x0, x1, depth, *others):
+    alternatives = tuple(Alternative(box(a, 3.2, b, 3.2 + d), chance) for a, b, d, chance in others)
+    return Room(box(x0, 3.2, x1, 3.2 + depth), (f"d{number}",), alternatives=alternatives)
+
+
+@pytest.mark.parametrize("other", [(1.0, 5.0, 8.0), (1.0, 8.0, 4.0), (2.0, 4.2, 2.5), (0.3, 6.0, 6.0)])
+def test_what_another_shape_adds_is_what_the_tour_over_the_whole_map_says(draw, plain, other):
+    usual, door = (1.0, 5.0, 4.0), DOORS[0]
+    added = [measure_excursion(box(x0, 3.2, x1, 3.2 + d), door, FRAME, plain) for x0, x1, d in (usual, other)]
+    tours = [plan_coverage(_map(draw, shape), config=plain, start=(10.0, 2.0)).length for shape in (usual, other)]
+    assert added[1] - added[0] == pytest.approx(tours[1] - tours[0], abs=0.8)
+
+
+def test_a_closet_that_no_robot_enters_adds_nothing(plain):
+    assert measure_excursion(box(2.9, 3.2, 3.1, 3.4), DOORS[0], GridFrame(0.05, 0, 0, 9, 9), plain) < 1.5
+    pointless = ClosedDoor("d9", (50.0, 50.0))
+    assert measure_excursion(box(0.0, 0.0, 0.1, 0.1), pointless, FRAME, plain) < 200.0
+
+
+def test_a_door_without_a_leaf_will_do(plain):
+    point = ClosedDoor("d0", DOORS[0].midpoint)
+    room = box(1.0, 3.2, 5.0, 7.2)
+    with_leaf = measure_excursion(room, DOORS[0], FRAME, plain)
+    assert measure_excursion(room, point, FRAME, plain) == pytest.approx(with_leaf, abs=0.5)
+
+
+@pytest.fixture
+def exact(monkeypatch):
+    """Nothing but the rooms is unsure."""
+    monkeypatch.setattr(cost_spread, "MAP_NOISE", 0.0)
+    monkeypatch.setattr(cost_spread, "ROOM_NOISE", 0.0)
+
+
+def _spread(rooms, plain, *, count=40, seed=0, probability=None, predicted=100.0):
+    return spread_cost(predicted, FRAME, DOORS, rooms, probability, plain, count=count, seed=seed)
+
+
+@pytest.mark.usefixtures("exact")
+def test_rooms_that_are_sure_cost_what_the_tour_costs(plain):
+    spread = _spread([_room(0, 1, 5, 4), _room(1, 7, 11, 4)], plain)
+    assert np.allclose(spread.lengths, 100.0)
+    assert (spread.mean, spread.low, spread.high) == pytest.approx((100.0, 100.0, 100.0))
+
+
+@pytest.mark.usefixtures("exact")
+def test_a_deeper_alternative_makes_the_cost_higher_as_often_as_it_is_probable(plain):
+    spread = _spread([_room(0, 1, 5, 4, (1, 5, 9, 0.25))], plain, count=2000)
+    deeper = measure_excursion(box(1, 3.2, 5, 12.2), DOORS[0], FRAME, plain)
+    more = deeper - measure_excursion(box(1, 3.2, 5, 7.2), DOORS[0], FRAME, plain)
+    assert more > 3.0
+    assert np.isclose(spread.lengths, 100.0 + more).mean() == pytest.approx(0.25, abs=0.04)
+    assert spread.mean == pytest.approx(100.0 + 0.25 * more, abs=0.05 * more)
+    assert spread.low == pytest.approx(100.0)
+    assert spread.high == pytest.approx(100.0 + more)
+
+
+@pytest.mark.usefixtures("exact")
+def test_a_room_that_may_not_be_there_may_cost_nothing(plain):
+    probability = OccupancyGrid(FRAME, np.full(FRAME.shape, 60, dtype=np.int8))
+    room = _room(0, 1, 5, 4)
+    spread = _spread([room], plain, count=1000, probability=probability)
+    own = measure_excursion(room.polygon, DOORS[0], FRAME, plain)
+    assert np.isclose(spread.lengths, 100.0 - own).mean() == pytest.approx(0.4, abs=0.05)
+
+
+def test_what_is_not_drawn_widens_the_interval_and_leaves_the_mean(plain, monkeypatch):
+    rooms = [_room(0, 1, 5, 4), _room(1, 7, 11, 4)]
+    spread = _spread(rooms, plain, count=21)
+    assert spread.mean == pytest.approx(100.0, abs=1e-6)
+    assert spread.low < 98.0
+    assert spread.high > 102.0
+    monkeypatch.setattr(cost_spread, "ROOM_NOISE", 2.0 * cost_spread.ROOM_NOISE)
+    assert _spread(rooms, plain, count=21).high > spread.high
+
+
+def test_the_same_seed_draws_the_same_and_without_rooms_there_is_still_a_cost(plain):
+    rooms = [_room(0, 1, 5, 4, (1, 5, 9, 0.4)), _room(1, 7, 11, 4, (7, 12, 6, 0.4))]
+    one, other, third = (_spread(rooms, plain, seed=seed).lengths.tobytes() for seed in (1, 1, 2))
+    assert one == other != third
+    assert _spread([], plain, count=1).lengths.tolist() == [100.0]
+    assert _spread([Room(box(0, 0, 1, 1), ("elsewhere",))], plain, count=1).mean == 100.0
+
+
+def test_the_next_draw_lies_in_the_interval_as_often_as_it_says_however_few_there_are():
+    rng = np.random.default_rng(5)
+    for count in (20, 60):
+        held = []
+        for _ in range(3000):
+            spread = summarise(rng.normal(200.0, 9.0, count))
+            held.append(spread.figures(rng.normal(200.0, 9.0))["true_within"])
+        assert np.mean(held) == pytest.approx(HELD, abs=0.02)
+
+
+def test_figures_tell_every_draw_and_the_truth_only_where_it_is_known():
+    spread = summarise(np.array([3.0, 1.0, 2.0]))
+    assert spread.figures() == {
+        "count": 3, "mean_m": 2.0, "interval": HELD, "low_m": 1.0, "high_m": 3.0, "lengths_m": [3.0, 1.0, 2.0],
+    }  # fmt: skip
+    assert spread.figures(3.5)["true_within"] is False

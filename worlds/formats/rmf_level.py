@@ -1,0 +1,223 @@
+"""One level of an Open-RMF building: its vertices, walls, doors and floor in metres, and where its names stand."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import shapely
+from shapely.geometry import MultiPolygon, Polygon
+
+from closedrooms.core.door import Point, Segment
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files.yaml_text import parse_yaml
+from closedrooms.core.remarks import Remark
+from closedrooms.worlds.geometry import areal
+from closedrooms.worlds.plan import DoorKind
+
+WHAT = "an RMF building (building.yaml)"
+# A door shorter than this is a mistake [m].
+SHORTEST_DOOR = 0.4
+KINDS: dict[str, DoorKind] = {
+    "hinged": "hinged", "double_hinged": "double", "sliding": "sliding", "double_sliding": "sliding",
+    "double_telescope": "sliding", "single_telescope": "sliding", "telescope": "sliding",
+}  # fmt: skip
+MAX_ELEMENTS = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class RmfDoor:
+    """A door as the file gives it.
+
+    Attributes:
+        name: As in the file, or its place there.
+        segment: From jamb to jamb [m].
+        kind: How it moves.
+    """
+
+    name: str
+    segment: Segment
+    kind: DoorKind
+
+
+@dataclass(frozen=True, slots=True)
+class RmfLevel:
+    """One level in metres, y upwards.
+
+    Attributes:
+        name: Of the level.
+        vertices: All of its vertices [m].
+        names: The name of each vertex (a waypoint), empty without one.
+        walls: Centre lines of its walls, each once [m].
+        doors: Those that can be doors.
+        listed_doors: How many the file lists.
+        floor: What it calls floor [m], empty where it names none.
+    """
+
+    name: str
+    vertices: tuple[Point, ...]
+    names: tuple[str, ...]
+    walls: tuple[Segment, ...]
+    doors: tuple[RmfDoor, ...]
+    listed_doors: int
+    floor: Polygon | MultiPolygon
+
+
+def read_level(path: Path, level: str | None, remarks: list[Remark]) -> RmfLevel:
+    """Read one level; what was dropped or guessed is added to ``remarks``.
+
+    In ``reference_image`` (the default) vertices are pixels with y downwards, scaled by the measurements; in
+    ``cartesian_meters`` they are metres with y upwards.
+
+    Args:
+        path: The building.yaml.
+        level: Name of the level; ``None`` where there is only one.
+        remarks: Of the file.
+
+    Raises:
+        InvalidInputError: Missing or broken file, no such level, another coordinate system, no scale.
+    """
+    data = parse_yaml(path, what=WHAT)
+    system = _coordinate_system(data, path)
+    name, fields = _level_fields(data, level, path)
+    metres = (1.0, 1.0) if system == "cartesian_meters" else _pixel(data, fields, path)
+    rows = _rows(fields, "vertices", path)
+    vertices = [_vertex(row, number, metres, path) for number, row in enumerate(rows)]
+    names = [str(row[3]).strip() if len(row) > 3 and row[3] else "" for row in rows]
+    walls = []
+    for row in _rows(fields, "walls", path):
+        segment = _segment(row, vertices)
+        if segment is None:
+            raise InvalidInputError(f"wall {str(row)[:60]}", expected="numbers of two vertices", where=path)
+        walls.append(segment)
+    doors = []
+    listed = _rows(fields, "doors", path)
+    for number, row in enumerate(listed):
+        door = _door(row, number, vertices, remarks)
+        if door is not None:
+            doors.append(door)
+    return RmfLevel(
+        name,
+        tuple(vertices),
+        tuple(names),
+        tuple(dict.fromkeys((min(wall), max(wall)) for wall in walls if math.dist(*wall) > 0.01)),
+        tuple(doors),
+        len(listed),
+        _floor(fields, vertices, remarks, path),
+    )
+
+
+def _level_fields(data: dict[str, Any], level: str | None, path: Path) -> tuple[str, dict[str, Any]]:
+    levels = data.get("levels")
+    if not isinstance(levels, dict) or not levels:
+        raise InvalidInputError("a building without levels", expected=WHAT, where=path)
+    names = ", ".join(map(str, levels))
+    if level is None and len(levels) > 1:
+        raise InvalidInputError(
+            f"a building with the levels {names}", expected="FILE:LEVEL with one of them", where=path
+        )
+    # A level called 1 is a number to YAML.
+    by_name = {str(key): fields for key, fields in levels.items()}
+    name = next(iter(by_name)) if level is None else level
+    if not isinstance(by_name.get(name), dict):
+        raise InvalidInputError(f"no level {name!r}", expected=f"one of {names}", where=path)
+    return name, by_name[name]
+
+
+def _rows(fields: dict[str, Any], key: str, path: Path) -> list[Any]:
+    rows = fields.get(key) or []
+    if not isinstance(rows, list) or len(rows) > MAX_ELEMENTS:
+        raise InvalidInputError(f"{key} of an RMF level", expected=f"a list of at most {MAX_ELEMENTS}", where=path)
+    return rows
+
+
+def _coordinate_system(data: dict[str, Any], path: Path) -> str:
+    """How the vertices are given; the traffic editor's default are pixels."""
+    system = data.get("coordinate_system", "reference_image")
+    if system not in ("reference_image", "cartesian_meters"):
+        raise InvalidInputError(
+            f"coordinates in {str(system)[:60]!r}", expected="reference_image or cartesian_meters", where=path
+        )
+    return str(system)
+
+
+def _pixel(data: dict[str, Any], fields: dict[str, Any], path: Path) -> tuple[float, float]:
+    """Metres per pixel to the right and, since rows of a picture go down, per pixel of y."""
+    scale = _scale(data, fields, path)
+    return (scale, -scale)
+
+
+def _scale(data: dict[str, Any], fields: dict[str, Any], path: Path) -> float:
+    """Metres per pixel: the mean of the level's measurements, else of another level's."""
+    for level in [fields, *(f for f in data["levels"].values() if isinstance(f, dict))]:
+        values = [_measured(row, _rows(level, "vertices", path)) for row in _rows(level, "measurements", path)]
+        usable = [value for value in values if value is not None]
+        if usable:
+            return sum(usable) / len(usable)
+    raise InvalidInputError("a building without measurements", expected="a measured distance for scale", where=path)
+
+
+def _measured(row: Any, vertices: list[Any]) -> float | None:
+    try:
+        a, b = vertices[row[0]], vertices[row[1]]
+        value = float(row[2]["distance"][1]) / math.dist((float(a[0]), float(a[1])), (float(b[0]), float(b[1])))
+    except (IndexError, KeyError, TypeError, ValueError, OverflowError, ZeroDivisionError):
+        return None
+    return value if math.isfinite(value) and value > 0.0 else None
+
+
+def _vertex(row: Any, number: int, metres: tuple[float, float], path: Path) -> Point:
+    try:
+        x, y = float(row[0]) * metres[0], float(row[1]) * metres[1]
+    except (IndexError, KeyError, TypeError, ValueError, OverflowError):
+        x = y = math.nan
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise InvalidInputError(f"vertex {number} {str(row)[:60]}", expected="[x, y, z, name]", where=path)
+    return (round(x, 4), round(y, 4))
+
+
+def _segment(row: Any, vertices: Sequence[Point]) -> Segment | None:
+    """Between the two vertices whose numbers a row begins with."""
+    try:
+        first, second = int(row[0]), int(row[1])
+        return (vertices[first], vertices[second]) if min(first, second) >= 0 else None
+    except (IndexError, KeyError, TypeError, ValueError, OverflowError):
+        return None
+
+
+def _parameter(row: Any, key: str) -> str:
+    """The value of a typed parameter ``{key: [type, value]}`` of a wall or door; empty without one."""
+    try:
+        return str(row[2][key][1]).strip()
+    except (IndexError, KeyError, TypeError):
+        return ""
+
+
+def _door(row: Any, number: int, vertices: Sequence[Point], remarks: list[Remark]) -> RmfDoor | None:
+    """One door; what cannot be one is named in ``remarks``."""
+    name = _parameter(row, "name") or f"doors[{number}]"
+    segment = _segment(row, vertices)
+    if segment is None or math.dist(*segment) < SHORTEST_DOOR:
+        why = "without two vertices of the level" if segment is None else f"shorter than {SHORTEST_DOOR} m"
+        remarks.append(Remark(action="dropped", what="doors", why=why, names=(name,), loss=True))
+        return None
+    kind = _parameter(row, "type") or "hinged"
+    if kind not in KINDS:
+        why = f"of the unknown type {kind[:40]!r}, read as hinged"
+        remarks.append(Remark(action="guessed", what="doors", why=why, names=(name,)))
+    return RmfDoor(name, segment, KINDS.get(kind, "hinged"))
+
+
+def _floor(
+    fields: dict[str, Any], vertices: Sequence[Point], remarks: list[Remark], path: Path
+) -> Polygon | MultiPolygon:
+    areas = []
+    for number, row in enumerate(_rows(fields, "floors", path)):
+        try:
+            ring = [vertices[int(index)] for index in row["vertices"]]
+            areas.append(shapely.make_valid(Polygon(ring)))
+        except (IndexError, KeyError, TypeError, ValueError, OverflowError):
+            why = "without an outline"
+            remarks.append(Remark(action="dropped", what="floors", why=why, names=(f"floors[{number}]",), loss=True))
+    return areal(shapely.union_all(areas))
