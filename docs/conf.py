@@ -6,7 +6,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from notebook_page import write_page
+from notebook_page import NOTEBOOK, execute, write_page
 
 project = "closedrooms"
 author = "The closedrooms authors"
@@ -36,4 +36,4 @@ html_static_path = ["static"]
 html_css_files = ["tables.css"]
 html_show_sphinx = False
 
-write_page(Path(__file__).parent / "tutorial")
+write_page(execute(NOTEBOOK), NOTEBOOK.parent)
