@@ -1,7 +1,6 @@
-"""The notebook of the tutorial: run it (``python docs/notebook_page.py``), and show it as a page of the site."""
+"""The notebook of the tutorial as a page of the site: run whenever the site is built, so that both say the same."""
 
 import base64
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ PATIENCE = 300
 
 
 def execute(path: Path) -> Any:
-    """Run every cell in a fresh kernel and return the notebook with what came out.
+    """Run every cell in a fresh kernel and return the notebook with what came out; the file stays as it is.
 
     Args:
         path: The notebook; it runs in its folder.
@@ -24,20 +23,18 @@ def execute(path: Path) -> Any:
 
     notebook = nbformat.read(path, as_version=4)
     NotebookClient(notebook, timeout=PATIENCE, resources={"metadata": {"path": str(path.parent)}}).execute()
-    for cell in notebook.cells:
-        cell.metadata.pop("execution", None)
     return notebook
 
 
-def write_page(folder: Path) -> None:
-    """Write ``notebook.md`` and its pictures from what the notebook holds; nothing is run.
+def write_page(notebook: Any, folder: Path) -> None:
+    """Write ``notebook.md`` and its pictures.
 
     Args:
-        folder: Of the notebook.
+        notebook: With what came out of its cells.
+        folder: Where to write.
     """
-    cells = json.loads((folder / NOTEBOOK.name).read_text())["cells"]
     lines = []
-    for number, cell in enumerate(cells):
+    for number, cell in enumerate(notebook["cells"]):
         text = "".join(cell["source"])
         if cell["cell_type"] == "markdown":
             lines += [text, ""]
@@ -48,21 +45,10 @@ def write_page(folder: Path) -> None:
     (folder / "notebook.md").write_text("\n".join(lines))
 
 
-def _shown(output: dict[str, Any], folder: Path, picture: str) -> list[str]:
+def _shown(output: Any, folder: Path, picture: str) -> list[str]:
     data = output.get("data", {})
     if "image/png" in data:
         (folder / picture).write_bytes(base64.b64decode(data["image/png"]))
         return [f"![what the cell draws]({picture})", ""]
     text = "".join(output.get("text") or data.get("text/plain") or "").rstrip()
     return ["```text", text, "```", ""] if text else []
-
-
-def main() -> None:
-    """Run the notebook and keep what came out."""
-    import nbformat
-
-    nbformat.write(execute(NOTEBOOK), NOTEBOOK)
-
-
-if __name__ == "__main__":
-    main()
