@@ -18,7 +18,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.yaml_text import parse_yaml
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.door_hinges import hung
-from closedrooms.worlds.formats.settlement import Source, settle
+from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import DoorKind, FloorPlan, PlanDoor, PlanRoom, Wall
 
@@ -33,6 +33,8 @@ SMALLEST, NARROWEST = 1.0, 0.35
 PROBE = 0.3
 # A door shorter than this is a mistake [m].
 SHORTEST_DOOR = 0.4
+# Measurements of one level that are this share of each other apart do not agree: people read a plan to a few percent.
+DISAGREE = 0.1
 KINDS: dict[str, DoorKind] = {
     "hinged": "hinged", "double_hinged": "double", "sliding": "sliding", "double_sliding": "sliding",
     "double_telescope": "sliding", "single_telescope": "sliding", "telescope": "sliding",
@@ -49,7 +51,7 @@ class _Door:
 
 @dataclass(frozen=True, slots=True)
 class _Level:
-    vertices: tuple[Point, ...]
+    vertices: tuple[Point | None, ...]
     names: tuple[str, ...]
     walls: tuple[Segment, ...]
     doors: tuple[_Door, ...]
@@ -75,15 +77,16 @@ def read_rmf(path: str | Path, level: str | None = None) -> FloorPlan:
     system = _coordinate_system(data, path)
     name, fields = _level_fields(data, level, path)
     remarks: list[Remark] = []
-    metres = (1.0, 1.0) if system == "cartesian_meters" else _pixel(data, fields, path)
+    metres = (1.0, 1.0) if system == "cartesian_meters" else _pixel(data, fields, path, remarks)
     read = _read_level(fields, metres, path, remarks)
     if not read.walls:
-        raise InvalidInputError(f"no walls on level {name}", expected="walls that close rooms", where=path)
+        lost = "".join(f"; {remark}" for remark in remarks if remark.what in ("vertices", "walls"))
+        raise InvalidInputError(f"no walls on level {name}{lost}", expected="walls that close rooms", where=path)
     closers = _closers(read, remarks)
     lines = [LineString(s) for s in (*read.walls, *(door.segment for door in read.doors), *closers)]
-    rooms = _rooms(lines, read, remarks)
+    rooms, faces = _rooms(lines, read, remarks)
     if not rooms:
-        raise InvalidInputError(f"a plan without rooms on level {name}", expected="walls that close rooms", where=path)
+        raise no_rooms(f"walls that close rooms on level {name}", faces, remarks, path)
     doors = _doors(read, rooms, remarks)
     segments = [*read.walls, *closers, *(door.segment for door in read.doors)]
     walls = tuple(Wall(f"w{number:03d}", segment, WALL) for number, segment in enumerate(segments))
@@ -137,19 +140,26 @@ def _coordinate_system(data: dict[str, Any], path: Path) -> str:
     return str(system)
 
 
-def _pixel(data: dict[str, Any], fields: dict[str, Any], path: Path) -> tuple[float, float]:
+def _pixel(data: dict[str, Any], fields: dict[str, Any], path: Path, remarks: list[Remark]) -> tuple[float, float]:
     """Metres per pixel to the right and, since rows of a picture go down, per pixel of y."""
-    scale = _scale(data, fields, path)
+    scale = _scale(data, fields, path, remarks)
     return (scale, -scale)
 
 
-def _scale(data: dict[str, Any], fields: dict[str, Any], path: Path) -> float:
+def _scale(data: dict[str, Any], fields: dict[str, Any], path: Path, remarks: list[Remark]) -> float:
     """Metres per pixel: the mean of the level's measurements, else of another level's."""
-    for level in [fields, *(f for f in data["levels"].values() if isinstance(f, dict))]:
+    for name, level in [("", fields), *((n, f) for n, f in data["levels"].items() if isinstance(f, dict))]:
         values = [_measured(row, _rows(level, "vertices", path)) for row in _rows(level, "measurements", path)]
         usable = [value for value in values if value is not None]
-        if usable:
-            return sum(usable) / len(usable)
+        if not usable:
+            continue
+        if level is not fields:
+            why = f"the level has no measurements, those of level {str(name)[:40]} are taken"
+            remarks.append(Remark(action="guessed", what="scale", why=why))
+        if max(usable) > (1.0 + DISAGREE) * min(usable):
+            why = f"measurements say {min(usable):.4g} to {max(usable):.4g} m a pixel, their mean is taken"
+            remarks.append(Remark(action="guessed", what="scale", why=why))
+        return sum(usable) / len(usable)
     raise InvalidInputError("a building without measurements", expected="a measured distance for scale", where=path)
 
 
@@ -164,13 +174,19 @@ def _measured(row: Any, vertices: list[Any]) -> float | None:
 
 def _read_level(fields: dict[str, Any], metres: tuple[float, float], path: Path, remarks: list[Remark]) -> _Level:
     rows = _rows(fields, "vertices", path)
-    vertices = [_vertex(row, number, metres, path) for number, row in enumerate(rows)]
-    names = [str(row[3]).strip() if len(row) > 3 and row[3] else "" for row in rows]
+    vertices = [_vertex(row, metres) for row in rows]
+    bad = tuple(f"vertices[{number}]" for number, vertex in enumerate(vertices) if vertex is None)
+    if bad:
+        why = "no [x, y, z, name]; what stands on them is left out"
+        remarks.append(Remark(action="dropped", what="vertices", why=why, names=bad, count=len(bad)))
+    names = [str(row[3]).strip() if isinstance(row, list) and len(row) > 3 and row[3] else "" for row in rows]
     walls = []
-    for row in _rows(fields, "walls", path):
+    for number, row in enumerate(_rows(fields, "walls", path)):
         segment = _segment(row, vertices)
         if segment is None:
-            raise InvalidInputError(f"wall {str(row)[:60]}", expected="numbers of two vertices", where=path)
+            why = "without two vertices of the level"
+            remarks.append(Remark(action="dropped", what="walls", why=why, names=(f"walls[{number}]",), loss=True))
+            continue
         walls.append(segment)
     doors = []
     for number, row in enumerate(_rows(fields, "doors", path)):
@@ -186,23 +202,23 @@ def _read_level(fields: dict[str, Any], metres: tuple[float, float], path: Path,
     )
 
 
-def _vertex(row: Any, number: int, metres: tuple[float, float], path: Path) -> Point:
+def _vertex(row: Any, metres: tuple[float, float]) -> Point | None:
+    """Where a vertex lies; ``None`` for one that is no place: what stands on it is left out."""
     try:
         x, y = float(row[0]) * metres[0], float(row[1]) * metres[1]
     except (IndexError, KeyError, TypeError, ValueError, OverflowError):
-        x = y = math.nan
-    if not (math.isfinite(x) and math.isfinite(y)):
-        raise InvalidInputError(f"vertex {number} {str(row)[:60]}", expected="[x, y, z, name]", where=path)
-    return (round(x, 4), round(y, 4))
+        return None
+    return (round(x, 4), round(y, 4)) if math.isfinite(x) and math.isfinite(y) else None
 
 
-def _segment(row: Any, vertices: Sequence[Point]) -> Segment | None:
+def _segment(row: Any, vertices: Sequence[Point | None]) -> Segment | None:
     """Between the two vertices whose numbers a row begins with."""
     try:
         first, second = int(row[0]), int(row[1])
-        return (vertices[first], vertices[second]) if min(first, second) >= 0 else None
+        start, end = vertices[first], vertices[second]
     except (IndexError, KeyError, TypeError, ValueError, OverflowError):
         return None
+    return None if start is None or end is None or min(first, second) < 0 else (start, end)
 
 
 def _parameter(row: Any, key: str) -> str:
@@ -213,7 +229,7 @@ def _parameter(row: Any, key: str) -> str:
         return ""
 
 
-def _door(row: Any, number: int, vertices: Sequence[Point], remarks: list[Remark]) -> _Door | None:
+def _door(row: Any, number: int, vertices: Sequence[Point | None], remarks: list[Remark]) -> _Door | None:
     """One door; what cannot be one is named in ``remarks``."""
     name = _parameter(row, "name") or f"doors[{number}]"
     segment = _segment(row, vertices)
@@ -229,13 +245,13 @@ def _door(row: Any, number: int, vertices: Sequence[Point], remarks: list[Remark
 
 
 def _floor(
-    fields: dict[str, Any], vertices: Sequence[Point], remarks: list[Remark], path: Path
+    fields: dict[str, Any], vertices: Sequence[Point | None], remarks: list[Remark], path: Path
 ) -> Polygon | MultiPolygon:
     areas = []
     for number, row in enumerate(_rows(fields, "floors", path)):
         try:
             ring = [vertices[int(index)] for index in row["vertices"]]
-            areas.append(shapely.make_valid(Polygon(ring)))
+            areas.append(shapely.make_valid(Polygon([corner for corner in ring if corner is not None])))
         except (IndexError, KeyError, TypeError, ValueError, OverflowError):
             why = "without an outline"
             remarks.append(Remark(action="dropped", what="floors", why=why, names=(f"floors[{number}]",), loss=True))
@@ -287,13 +303,16 @@ def _loose_ends(lines: Sequence[LineString], reach: float = LOOSE_END) -> list[S
     return pieces
 
 
-def _rooms(lines: Sequence[BaseGeometry], level: _Level, remarks: list[Remark]) -> tuple[PlanRoom, ...]:
-    """The faces between walls and doors, named after the waypoints in them."""
+def _rooms(
+    lines: Sequence[BaseGeometry], level: _Level, remarks: list[Remark]
+) -> tuple[tuple[PlanRoom, ...], list[float]]:
+    """The faces between walls and doors, named after the waypoints in them, and the areas of all faces."""
     # On a grid of 1 cm, so that feet of loose ends and edges of floors lie on their wall.
     noded = shapely.union_all(np.array(lines, dtype=object), grid_size=0.01)
     faces = [f for f in shapely.get_parts(shapely.polygonize([noded])) if isinstance(f, Polygon)]
     shapes = [f for g in faces for f in shapely.get_parts(g) if isinstance(f, Polygon)]
-    named = [(shapely.Point(v), name) for v, name in zip(level.vertices, level.names, strict=True) if name]
+    places = zip(level.vertices, level.names, strict=True)
+    named = [(shapely.Point(place), name) for place, name in places if name and place is not None]
     rooms: list[PlanRoom] = []
     outside = 0
     for face in sorted(shapes, key=lambda f: (round(f.bounds[0], 2), round(f.bounds[1], 2), f.area)):
@@ -307,7 +326,7 @@ def _rooms(lines: Sequence[BaseGeometry], level: _Level, remarks: list[Remark]) 
     if outside:
         why = "no floor under them"
         remarks.append(Remark(action="dropped", what="areas between walls", why=why, count=outside))
-    return tuple(rooms)
+    return tuple(rooms), [face.area for face in shapes]
 
 
 def _doors(level: _Level, rooms: Sequence[PlanRoom], remarks: list[Remark]) -> list[PlanDoor]:
