@@ -1,7 +1,7 @@
 """``closedrooms dataset``: maps of many buildings with closed doors, and what is really behind them."""
 
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
@@ -122,6 +122,7 @@ def _finish(
             expected="at least one", where=out,
         )  # fmt: skip
     counts: dict[str, tuple[int, int, int]] = {}
+    stopped: dict[str, str] = {}
     # One run.json is in memory at a time: a million of them have 21 GB. What the tables and sums need goes to disk.
     with tempfile.TemporaryFile("w+", dir=out, prefix=".sums.") as sums:
         surveys = [Task(config, world).folder for world in worlds if config.maps == "erased"]
@@ -130,7 +131,7 @@ def _finish(
         )
         for split in sorted(SPLITS):
             own = [variant for variant in made if variant.world.split == split]
-            counts[split] = (len({v.world.name for v in own}), len(own), _write_table(out, split, own, sums))
+            counts[split] = (len({v.world.name for v in own}), len(own), _write_table(out, split, own, sums, stopped))
         size += sum(bytes_ for _, _, bytes_ in counts.values())
         _write_root(config, worlds, variants, made, failed, size)
         sums.seek(0)
@@ -144,12 +145,19 @@ def _finish(
             ("split", "buildings", "samples", "MB"),
             *((split, str(b), str(s), f"{size / 1e6:.1f}") for split, (b, s, size) in splits.items()),
         ],
-        failures=dict(sorted(failed.items())),
+        failures=dict(sorted((failed | stopped).items())),
+        remarks=[remark for world in worlds for remark in world.remarks],
         figures={
             "fingerprint": fingerprint(out),
             "splits": {split: {"buildings": b, "samples": s, "bytes": size} for split, (b, s, size) in splits.items()},
         },
     )
+
+
+def early_end(exploration: Mapping[str, Any]) -> str:
+    """Return why a sample holds less than its building."""
+    why = f", {exploration['reason']}" if exploration.get("reason") else ""
+    return f"exploration ended early: {exploration['status']}{why}"
 
 
 def _read(folder: Path, out: Path, sums: TextIO) -> tuple[dict[str, Any], int]:
@@ -160,8 +168,8 @@ def _read(folder: Path, out: Path, sums: TextIO) -> tuple[dict[str, Any], int]:
     return about, sum(path.stat().st_size for path in folder.iterdir())
 
 
-def _write_table(out: Path, split: str, made: Sequence[Variant], sums: TextIO) -> int:
-    """The table of a split; the bytes of its samples."""
+def _write_table(out: Path, split: str, made: Sequence[Variant], sums: TextIO, stopped: dict[str, str]) -> int:
+    """The table of a split; the bytes of its samples. Explorations that ended early are added to ``stopped``."""
     sizes = 0
 
     def rows() -> Iterator[dict[str, Any]]:
@@ -169,6 +177,8 @@ def _write_table(out: Path, split: str, made: Sequence[Variant], sums: TextIO) -
         for variant in made:
             about, size = _read(out / variant.id, out, sums)
             sizes += size
+            if about["exploration"]["status"] != "complete":
+                stopped[variant.id] = early_end(about["exploration"])
             yield row(variant, about)
 
     if made:
@@ -199,5 +209,7 @@ def _write_root(
         }
         for variant in sorted(variants, key=lambda v: v.id)
     ]
+    remarks = [remark.as_json() for world in worlds for remark in world.remarks]
     manifest = {"command": "dataset", **description(config, worlds), "complete": True, "samples": samples}
+    manifest |= {"remarks": remarks} if remarks else {}
     write_json(out / DATASET_MANIFEST, manifest)

@@ -230,6 +230,7 @@ def _simulated(
         "simulated_s": round(survey.exploration.seconds, 3),
         "scans": survey.exploration.scans,
     }
+    about |= {} if survey.exploration.status == "complete" else {"reason": survey.exploration.reason}
     return Observed(survey.grid, survey.doors, survey.stamps, survey.estimate, survey.truth, scans, about)
 
 
