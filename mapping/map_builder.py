@@ -103,8 +103,20 @@ def build_map(
         len(mapper.keyframes),
         seconds,
         errors,
-        (*(() if follower is None else _lost_remarks(follower.lost)), *mapper.events),
+        (
+            *(() if follower is None else _lost_remarks(follower.lost)),
+            *mapper.events,
+            *(() if grid.occupied.any() else _empty_remarks(run, config)),
+        ),
     )
+
+
+def _empty_remarks(run: RecordedRun, config: MapperConfig) -> tuple[Remark, ...]:
+    """Why a map shows no wall: as a rule, ranges in another unit."""
+    ranges = np.concatenate([scan.ranges[scan.hits] for scan in run.scans])
+    seen = f"half of the echoes are farther than {np.median(ranges):.4g} m" if ranges.size else "no echo in any scan"
+    why = f"{seen}; the map takes those up to {config.max_range:g} m"
+    return (Remark(action="dropped", what="walls", why=why, loss=True),)
 
 
 def _lost_remarks(count: int) -> tuple[Remark, ...]:
