@@ -15,7 +15,7 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.scan_odometry import ScanOdometry
-from closedrooms.mapping.scan_preparation import sweeps
+from closedrooms.mapping.scan_preparation import prepare_scans
 from closedrooms.mapping.trajectory import ate
 
 
@@ -70,15 +70,15 @@ def build_map(
     mapper = Mapper(config)
     online = np.empty((len(run.scans), 3))
     seconds = 0.0
-    made_ready = sweeps(run.scans, config)
+    made_ready = prepare_scans(run.scans, config)
     follower = None if run.has_odometry else ScanOdometry(config)
     odometry = np.array(run.odometry)
     for i, scan in enumerate(run.scans):
         start = time.perf_counter()
-        sweep = next(made_ready)
+        prepared = next(made_ready)
         if follower is not None:
-            odometry[i] = follower.follow(sweep.points, scan.stamp).as_tuple()
-        estimate = mapper.process(scan, Pose2(*odometry[i]), sweep=sweep)
+            odometry[i] = follower.follow(prepared.points, scan.stamp).as_tuple()
+        estimate = mapper.process(scan, Pose2(*odometry[i]), prepared=prepared)
         seconds += time.perf_counter() - start
         online[i] = estimate.as_tuple()
         if watch is not None:

@@ -250,7 +250,7 @@ def test_a_defect_in_one_world_is_told_in_one_line(tmp_path: Path, monkeypatch: 
     def broken(*_: object) -> None:
         raise ZeroDivisionError("two\nlines")
 
-    monkeypatch.setattr("closedrooms.experiments.robustness.trial.Building", broken)
+    monkeypatch.setattr("closedrooms.experiments.robustness.trial.BuildingTrials", broken)
     why = sweep_world(("office-01", "office-01"), replace(CONFIG, out=tmp_path))
     assert why.startswith("internal error, please report it: ZeroDivisionError: two lines (test_robustness.py:")
 
