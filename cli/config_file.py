@@ -49,7 +49,7 @@ def read_settings(path: Path, command: str, config: type[Any]) -> dict[str, Any]
 
 
 def _inputs(manifest: Mapping[str, Any]) -> dict[str, Any]:
-    """What a result was made from: its paths; of a dataset its worlds and how many samples were wanted."""
+    """List what a result was made from: its paths; of a dataset its worlds and how many samples were wanted."""
     paths = manifest.get("paths")
     inputs = {name: value for name, value in paths.items() if value is not None} if isinstance(paths, dict) else {}
     if isinstance(manifest.get("worlds"), dict):

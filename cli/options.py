@@ -149,7 +149,7 @@ def option_names(options: type[Any]) -> list[str]:
 
 
 def _starts(config: type[Any], line: _Named, saved: Mapping[str, Any]) -> dict[str, Any]:
-    """What nested settings begin with: defaults, with the numbers that a name stands for."""
+    """List what nested settings begin with: defaults, with the numbers that a name stands for."""
     hints = get_type_hints(config)
     starts = {
         item.name: item.default_factory()
@@ -184,7 +184,7 @@ def _method(line: _Named, saved: Mapping[str, Any], config: type[Any]) -> Any:
 
 
 def _without_what_the_line_names(saved: Mapping[str, Any], line: _Named) -> dict[str, Any]:
-    """Settings of a file without the numbers of a level, a lidar or a method that the line names instead."""
+    """Drop a file's numbers of a level, a lidar or a method that the line names instead."""
     kept = dict(saved)
     if line.method is not None:
         kept.pop("predictor", None)

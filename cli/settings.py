@@ -74,7 +74,7 @@ def _default(item: "Field[Any]") -> Any:
 
 
 def _converted(hint: Any, value: Any, key: str, current: Any) -> Any:
-    """One value as its field takes it."""
+    """Convert one value to what its field takes."""
     if get_origin(hint) is Annotated:
         hint = get_args(hint)[0]
     options = get_args(hint) if isinstance(hint, types.UnionType) or get_origin(hint) is Union else (hint,)
@@ -124,7 +124,7 @@ def _scalar(kind: Any, value: Any, key: str) -> Any:
 
 
 def _named(hint: Any) -> str:
-    """A type in words."""
+    """Describe a type in words."""
     words = {float: "a number", int: "a whole number", bool: "true or false", str: "a text", Path: "a path"}
     if hint in words:
         return words[hint]

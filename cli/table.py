@@ -176,7 +176,7 @@ class _NotAsked:
 
 
 def _table(chosen: Command | None, options: type[Any] | None, *, completing: bool) -> Any:
-    """The union of all commands, as tyro takes it.
+    """Unite all commands, as tyro takes them.
 
     Args:
         chosen: The command that the line names.
@@ -212,7 +212,7 @@ def _description(command: Command, options: type[Any] | None) -> str:
 
 
 def _place(words: Sequence[str], command: Command | None, options: type[Any] | None) -> Place:
-    """Where on the line tyro stopped: before a command, or among its options."""
+    """Find where on the line tyro stopped: before a command, or among its options."""
     if command is not None and options is not None:
         method = options.about["method"]
         return Place(tuple(words), f"closedrooms {command.name}", options=tuple(option_names(options)), method=method)

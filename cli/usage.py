@@ -115,7 +115,7 @@ def _nearest_option(option: str, known: Sequence[str]) -> str:
 
 
 def _strange(place: Place) -> list[str]:
-    """Words that look like options of the command and are none; what follows ``--`` is an argument."""
+    """List words that look like options of the command and are none; what follows ``--`` is an argument."""
     words = place.words[: place.words.index("--")] if "--" in place.words else place.words
     known = {*place.options, *(f"no-{option}" for option in place.options), "help", "help-all"}
     return [word for word in words if word.startswith("--") and _option(word) not in known]
@@ -126,6 +126,6 @@ def _option(word: str) -> str:
 
 
 def _shown(argument: Any) -> str:
-    """An argument as the help shows it."""
+    """Write an argument as the help shows it."""
     name = str(argument.display_name())
     return name if name.startswith("-") else name.upper()

@@ -51,7 +51,7 @@ def convert_world(config: ConvertWorld, *, progress: Progress) -> Report:  # noq
 
 
 def _report(plan: "FloorPlan", written: Path, files: Sequence[Path] = ()) -> Report:
-    """What the plan holds, what was dropped, repaired or guessed when it was read, and every file of several."""
+    """Report what the plan holds, what was dropped, repaired or guessed on reading, and every file of several."""
     from closedrooms.worlds.closing import closable_rooms
 
     figures = {"rooms": len(plan.rooms), "doors": len(plan.doors), "closable rooms": len(closable_rooms(plan))}

@@ -51,7 +51,7 @@ def count_rooms(grid: OccupancyGrid, config: GraphConfig | None = None) -> int:
 
 
 def _pieces(count: int, labels: IntArray, outer: IntArray, clearance: FloatArray) -> tuple[IntArray, FloatArray]:
-    """For each piece of a level: the piece of the level outside that holds it, and its greatest clearance."""
+    """Find the part of the level outside that holds each part of a level, and its greatest clearance."""
     inside = np.flatnonzero(labels)
     pieces = labels.flat[inside]
     holder = np.zeros(count, dtype=np.int64)

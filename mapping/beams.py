@@ -183,7 +183,7 @@ def steadied(ranges: FloatArray, increment: float, *, wrap: bool) -> FloatArray:
 
 
 def _known_median(values: FloatArray) -> FloatArray:
-    """Median of what is not NaN in each row, shape (..., n) to (...); 0 where a row has nothing else."""
+    """Compute the median of what is not NaN in each row, (..., n) to (...); 0 where a row has nothing else."""
     rows = np.sort(values, axis=-1).reshape(-1, values.shape[-1])  # NaN comes last
     known = np.count_nonzero(~np.isnan(rows), axis=-1)
     each = np.arange(len(rows))
@@ -192,20 +192,20 @@ def _known_median(values: FloatArray) -> FloatArray:
 
 
 def _padded(values: FloatArray, reach: int, *, wrap: bool) -> FloatArray:
-    """The values of each scan with ``reach`` more at either end: those of the other end, or NaN; (..., n)."""
+    """Pad the values of each scan by ``reach`` at either end: those of the other end, or NaN; (..., n)."""
     ends = np.full((*values.shape[:-1], reach), np.nan)
     first, last = (values[..., -reach:], values[..., :reach]) if wrap else (ends, ends)
     return np.concatenate((first, values, last), axis=-1)
 
 
 def _around(ranges: FloatArray, *, wrap: bool) -> list[FloatArray]:
-    """Ranges of each beam's neighbours and itself, 2 * SURROUNDINGS + 1 of shape (..., n), NaN beyond the ends."""
+    """Stack ranges of each beam's neighbours and itself, 2 * SURROUNDINGS + 1 of shape (..., n), NaN beyond ends."""
     padded = _padded(ranges, SURROUNDINGS, wrap=wrap)
     return [padded[..., i : i + ranges.shape[-1]] for i in range(2 * SURROUNDINGS + 1)]
 
 
 def _median(around: Sequence[FloatArray]) -> FloatArray:
-    """Median of five, shape (..., n) each; the lower of two, NaN left out (NaN where there is nothing else)."""
+    """Compute the median of five, shape (..., n) each; the lower of two, NaN left out unless all are."""
     a, b, c, d, e = around
     # The third of five by comparisons; quicker than sorting. NaN in a column makes its result NaN.
     low = np.maximum(np.minimum(a, b), np.minimum(c, d))

@@ -37,7 +37,7 @@ def _fused(name: str, sightings: list[tuple[FloatArray, float]]) -> ClosedDoor:
 
 
 def _ordered(segment: FloatArray, like: FloatArray) -> FloatArray:
-    """The segment with its ends in the same order as those of ``like``."""
+    """Order the ends of a segment as those of ``like``."""
     same = np.abs(segment - like).sum()
     swapped = np.abs(segment[::-1] - like).sum()
     return segment if same <= swapped else segment[::-1]

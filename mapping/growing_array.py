@@ -15,7 +15,7 @@ class GrowingArray:
     """
 
     def __init__(self, *shape: int) -> None:
-        """An array without rows, which will be of ``shape`` (none: single numbers)."""
+        """Begin without rows, which will be of ``shape`` (none: single numbers)."""
         self._rows = np.zeros((FIRST_ROWS, *shape))
         self.values: FloatArray = self._rows[:0]
 

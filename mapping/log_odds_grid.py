@@ -164,7 +164,7 @@ class EvidenceGrid:
         return self._grid
 
     def _probabilities(self, hits: int, passes: int) -> CellArray:
-        """Probability in percent for each number of hits (rows) and passes (columns): a look-up is quicker."""
+        """Tabulate the probability in percent for each number of hits (rows) and passes (columns): it is quicker."""
         config = self._config
         odds = np.arange(hits)[:, None] * np.float32(config.log_odds_hit)
         odds = odds - np.arange(passes) * np.float32(config.log_odds_pass)
@@ -178,7 +178,7 @@ class EvidenceGrid:
 
 
 def _box(outline: FloatArray, points: FloatArray) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Lower left and upper right corner of all, shapes (n, 2) and (m, 2), n > 0."""
+    """Find the lower left and upper right corner of all, shapes (n, 2) and (m, 2), n > 0."""
     x, y = np.concatenate((outline, points)).T.copy()
     return (float(x.min()), float(y.min())), (float(x.max()), float(y.max()))
 

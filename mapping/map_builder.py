@@ -108,7 +108,7 @@ def build_map(
 
 
 def _lost_remarks(count: int) -> tuple[Remark, ...]:
-    """Scans that a robot without odometry could not be followed by."""
+    """Say that scans of a robot without odometry fit nowhere."""
     if not count:
         return ()
     why = "they fit nowhere, and there is no odometry; taken to go on as before"

@@ -136,7 +136,7 @@ class Mapper:
         return self._pose
 
     def _sweep_motion(self, scan: LaserScan, odometry: Pose2 | None) -> SweepMotion | None:
-        """How the robot moved while a sweep was taken, ``None`` where that does not matter or is not known."""
+        """Find how the robot moved while a sweep was taken, ``None`` where that does not matter or is not known."""
         if scan.sweep == 0.0 or not self._config.undistort or not self._stamps:
             return None
         if self._last_odometry is None or odometry is None:
@@ -195,7 +195,7 @@ class Mapper:
         self._usual_score += SCORE_MEMORY * (match.score - self._usual_score)
 
     def _moved_in_silence(self, points: FloatArray) -> bool:
-        """Whether the scan no longer fits where the odometry stands still."""
+        """Check whether the scan no longer fits where the odometry stands still."""
         if len(points) < self._config.matcher.min_points or not self._config.recovery.enabled:
             return False
         score = refine(self._local.field, points, self._pose, iterations=1).score
@@ -205,14 +205,14 @@ class Mapper:
         return True
 
     def _contradicts(self, match: Match | None, beams: Callable[[], Beams]) -> bool:
-        """Whether a match, or the prediction without one, puts surfaces where the last keyframe saw none."""
+        """Check if a match, or the prediction without one, puts surfaces where the last keyframe saw none."""
         recovery, pose = self._config.recovery, self._pose if match is None else match.pose
         if match is not None and match.score >= recovery.suspect * self._usual_score and not self._far(pose):
             return False
         return self._conflict_at(pose, beams) > recovery.max_conflict
 
     def _conflict_at(self, pose: Pose2, beams: Callable[[], Beams]) -> float:
-        """Of the last keyframes the one with the smallest conflict: people that walk by contradict only one."""
+        """Measure the smallest conflict with the last keyframes: people that walk by contradict only one."""
         least: float | None = None
         for keyframe in reversed(self.keyframes[-WITNESSES:]):
             if keyframe.submap != self.keyframes[-1].submap:
@@ -248,7 +248,7 @@ class Mapper:
         return match
 
     def _far(self, pose: Pose2, patience: float = 1.0) -> bool:
-        """Whether a pose is as far from the latest keyframe as keyframes are apart."""
+        """Check whether a pose is as far from the latest keyframe as keyframes are apart."""
         latest, config = self.keyframes[-1].pose, self._config
         return (
             latest.distance(pose) >= patience * config.keyframe_distance
@@ -295,7 +295,7 @@ class Mapper:
         self._hessian = np.zeros((3, 3))
 
     def _poses_moved(self) -> None:
-        """What hangs on the keyframes (the robot's pose, doors, map) follows them."""
+        """Move what hangs on the keyframes (the robot's pose, doors, map) with them."""
         self._pose = self.keyframes[-1].pose
         self._local.clear()
         self._drawn = 0
@@ -332,6 +332,6 @@ class Mapper:
 
 
 def _outdated(keyframe: Keyframe) -> bool:
-    """Whether a keyframe is not drawn where it is now."""
+    """Check whether a keyframe is not drawn where it is now."""
     drawn, pose = keyframe.drawn, keyframe.pose
     return drawn is None or drawn.distance(pose) > MOVED[0] or abs(wrap_angle(drawn.theta - pose.theta)) > MOVED[1]

@@ -56,7 +56,7 @@ class UncertainMotion:
         return replace(self, unmeasured=(before[0] + distance, before[1] + turn))
 
     def corrected(self, distance: float, angle: float, config: MatcherConfig) -> "UncertainMotion":
-        """Start again after a match that moved the prediction by ``distance`` [m] and ``angle`` [rad]."""
+        """Remember how far, ``distance`` [m] and ``angle`` [rad], a match was from the prediction: it was less sure."""
         surprise = tuple(
             max(off if off > SURPRISE * sigma else 0.0, FADING * last if last > negligible else 0.0)
             for off, sigma, last, negligible in zip(
@@ -85,7 +85,7 @@ class UncertainMotion:
         return math.hypot(distance, self.surprise[0], unmeasured[0]), math.hypot(angle, self.surprise[1], unmeasured[1])
 
     def _odometry_sigmas(self, config: MatcherConfig) -> tuple[float, float]:
-        """What the odometry usually deserves; the variance grows with the distance."""
+        """Compute what the odometry usually deserves; the variance grows with the distance."""
         distance, turn = max(self.distance, self.recent_distance), max(self.turn, self.recent_turn)
         position = math.sqrt(config.odometry_floor**2 + config.odometry_distance**2 * distance)
         angle = math.sqrt(

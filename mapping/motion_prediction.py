@@ -92,7 +92,7 @@ class MotionPrediction:
         return self._judged(motion, seconds, stamp, gap=gap)
 
     def _judged(self, motion: Pose2, seconds: float, stamp: float, *, gap: bool) -> PredictedStep:
-        """The step of an odometry that may jump, or catch up after it stood still."""
+        """Judge the step of an odometry that may jump, or catch up after it stood still."""
         distance, turn = math.hypot(motion.x, motion.y), abs(motion.theta)
         resumed, self._silent = self._silent, False
         unreported, self._unreported = self._unreported, Pose2()

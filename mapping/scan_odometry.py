@@ -79,12 +79,12 @@ class ScanOdometry:
         return pose
 
     def _predicted(self, duration: float) -> Pose2:
-        """Going on as in the last step; not longer than that step took."""
+        """Go on as in the last step; not longer than that step took."""
         share = min(duration / self._duration, 1.0) if self._duration > 0.0 else 1.0
         return self._pose @ Pose2(*(share * value for value in self._step.as_tuple()))
 
     def _matched(self, points: FloatArray, guess: Pose2, duration: float) -> Pose2:
-        """The best pose around a guess that went on as before for ``duration`` [s]."""
+        """Find the best pose around a guess that went on as before for ``duration`` [s]."""
         if len(points) < self._matcher.min_points:
             self.lost += 1
             return guess

@@ -39,13 +39,13 @@ def sweeps(scans: Iterable[LaserScan], config: MapperConfig) -> Iterator[Sweep]:
 
 
 def _sensor(scan: LaserScan) -> tuple[object, ...]:
-    """What scans must have in common to be made ready together."""
+    """List what scans must have in common to be made ready together."""
     beams = (scan.ranges.size, scan.angle_min, scan.angle_increment)
     return (*beams, scan.range_min, scan.range_max, scan.robot_T_sensor)
 
 
 def _thin_alike(scans: Sequence[LaserScan], config: MapperConfig) -> list[FloatArray]:
-    """The hits of scans of one sensor, thinned, up to the range that is matched; of shape (n, 2) each [m]."""
+    """Thin the hits of scans of one sensor, up to the range that is matched; shape (n, 2) each [m]."""
     first = scans[0]
     ranges = np.stack([scan.ranges for scan in scans])
     reach = matched_range(first, max_range=config.max_range, margin=config.matcher.range_margin)

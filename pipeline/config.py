@@ -175,7 +175,7 @@ def check_completions(count: int) -> None:
 
 
 def named_sim(noise: str = "medium", lidar: str = "default", body: Body = "kinematic") -> SimConfig:
-    """Set the simulation's numbers that a level of noise and a lidar stand for.
+    """Make settings of the simulation with the numbers that a level of noise and a lidar stand for.
 
     Raises:
         InvalidInputError: No such level or lidar.

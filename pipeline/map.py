@@ -88,7 +88,7 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> Report:
 
 
 def _rows(built: BuiltMap) -> list[tuple[str, str]]:
-    """The table for people."""
+    """List the rows of the table for people."""
     names = {
         "odometry": "raw odometry",
         "scans_alone": "scans alone",

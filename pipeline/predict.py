@@ -105,7 +105,7 @@ def predict_map(
 
 
 def _rows(prediction: Prediction, least: float, seconds: float) -> list[tuple[str, str, str]]:
-    """The table for people."""
+    """List the rows of the table for people."""
 
     def describe(room: Room) -> str:
         sure = 0.0 if room.confidence is None else room.confidence
@@ -121,7 +121,7 @@ def _rows(prediction: Prediction, least: float, seconds: float) -> list[tuple[st
 
 
 def _figures(room: Room) -> dict[str, Any]:
-    """One room for programs."""
+    """List what programs want to know of one room."""
     area = round(room.polygon.area, 4)
     head = {"doors": list(room.doors), "kind": room.kind, "area_m2": area, "bounded": room.bounded}
     return head | {"confidence": room.confidence, "alternatives": len(room.alternatives)}

@@ -64,7 +64,7 @@ def _doors_map(config: DoorsConfig, progress: Progress, watch: Stopwatch) -> Rep
 
 
 def _rows(proposals: dict[str, DoorProposal], seconds: float) -> list[tuple[str, ...]]:
-    """The table for people, the best proposal first."""
+    """List the rows of the table for people, the best proposal first."""
     rows: list[tuple[str, ...]] = [("door", "score", "width", "set back", "middle")]
     for name, door in proposals.items():
         x, y = door.midpoint
@@ -73,7 +73,7 @@ def _rows(proposals: dict[str, DoorProposal], seconds: float) -> list[tuple[str,
 
 
 def _on_map(read: RosMap, door: DoorProposal) -> DoorProposal:
-    """A proposal of the grid's frame in the map frame."""
+    """Transform a proposal of the grid's frame to the map frame."""
     if not read.turned:
         return door
     (x0, y0), (x1, y1) = read.map_T_grid.transform(np.array(door.segment)).tolist()
@@ -87,6 +87,6 @@ def _feature(name: str, door: DoorProposal) -> Feature:
 
 
 def _properties(name: str, door: DoorProposal) -> dict[str, Any]:
-    """What the file says of a proposal beside its segment."""
+    """List what the file says of a proposal beside its segment."""
     properties = {"id": name, "state": "closed", "width": round(door.width, 4), "score": round(door.score, 4)}
     return {**properties, "recess": round(door.recess, 4)}

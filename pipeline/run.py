@@ -156,7 +156,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
 
 @contextlib.contextmanager
 def _watched(config: RunConfig, progress: Progress) -> Iterator[str | None]:
-    """A viewer to stream to, on demand."""
+    """Open a viewer to stream to, on demand."""
     if not (config.live or config.web):
         yield None
         return
@@ -273,12 +273,12 @@ def _spread(
 
 
 def _coverage(config: RunConfig) -> CoverageConfig:
-    """Settings of the tours, for the robot that is simulated."""
+    """Set the tours for the robot that is simulated."""
     return replace(config.coverage, graph=replace(config.coverage.graph, robot_radius=config.sim.robot.radius))
 
 
 def _figures(plan: FloorPlan, closed: Sequence[str], map_T_world: Pose2, found: Finding) -> dict[str, Any]:
-    """What ``run.json`` says of a finding."""
+    """List what ``run.json`` says of a finding."""
     survey, log, prediction = found.survey, found.survey.exploration, found.prediction
     metrics = run_metrics(plan, closed, map_T_world, survey, prediction, found.truth, found.tours)
     if found.spread is not None:
@@ -303,14 +303,14 @@ def _figures(plan: FloorPlan, closed: Sequence[str], map_T_world: Pose2, found: 
 
 
 def _stopped(found: Finding) -> dict[str, str]:
-    """Which stage ended before it was done, and why."""
+    """Say which stage ended before it was done, and why."""
     logs = {"exploration": found.survey.exploration} | ({} if found.driven is None else {"drive": found.driven.log})
     stopped = {stage: f"{log.status}, {log.reason}" for stage, log in logs.items() if log.status != "complete"}
     return stopped | ({"cover": "; ".join(found.missing.values())} if found.missing else {})
 
 
 def _write(folder: Path, found: Finding, metrics: Mapping[str, Any]) -> None:
-    """Every data file of the run directory, then the pictures."""
+    """Write every data file of the run directory, then the pictures."""
     from closedrooms.visualization.summary import draw_summary
 
     survey, prediction, truth, driven = found.survey, found.prediction, found.truth, found.driven

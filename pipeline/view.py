@@ -130,7 +130,7 @@ def _end(viewer: "subprocess.Popen[str]") -> None:
 
 
 def _free_port(wanted: int) -> int:
-    """The port itself where it is free, any free one for 0.
+    """Choose the port itself where it is free, any free one for 0.
 
     Raises:
         ViewerError: It is taken.

@@ -37,7 +37,7 @@ def list_worlds(*, verbose: bool = False) -> list[str]:
 
 
 def _details(plan: FloorPlan) -> list[str]:
-    """What a plan holds beside its figures."""
+    """Describe what a plan holds beside its figures."""
     from collections import Counter
 
     from closedrooms.worlds.closing import closable_rooms

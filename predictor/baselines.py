@@ -84,7 +84,7 @@ def _each(
 
 
 def _seen(start: Start, room: int) -> Shape:
-    """The star of rays from just behind the door, each ended by a known cell or the bounding box of the map."""
+    """Trace the star of rays from just behind the door, each ended by a known cell or the map's bounding box."""
     grid = start.grid
     resolution = grid.frame.resolution
     inward, along = start.entrances[room].facing.inward, start.entrances[room].facing.along
@@ -104,7 +104,7 @@ def _seen(start: Start, room: int) -> Shape:
 
 
 def _reach(grid: OccupancyGrid, open_: BoolArray, eye: FloatArray, rays: FloatArray, steps: FloatArray) -> FloatArray:
-    """The step [m] at which each ray, shape (n, 2), first meets a cell that is not open; the last one if it never does.
+    """Find the step [m] at which each ray, shape (n, 2), first meets a cell that is not open, else the last.
 
     A stretch at a time: most rays end on their first metres.
     """
@@ -125,7 +125,7 @@ def _reach(grid: OccupancyGrid, open_: BoolArray, eye: FloatArray, rays: FloatAr
 
 
 def _behind_wall(start: Start, room: int) -> FloatArray:
-    """The first unknown place behind a door [m], shape (2,): walls and leaf are passed, at most a metre."""
+    """Find the first unknown place behind a door [m], shape (2,): past walls and leaf, at most a metre."""
     grid = start.grid
     door, inward = start.entrances[room].facing.middle, start.entrances[room].facing.inward
     steps = np.arange(grid.frame.resolution, 1.0, grid.frame.resolution / 2)
@@ -138,7 +138,7 @@ def _behind_wall(start: Start, room: int) -> FloatArray:
 
 
 def _faces_in_sight(start: Start, room: int) -> Shape:
-    """Unknown faces whose centre is in sight of the door through unknown faces, those on the border left out."""
+    """Find unknown faces whose centre is in sight of the door through unknown faces, without border faces."""
     arrangement, entrance = start.arrangement, start.entrances[room]
     inner: BoolArray = start.unknown & ~arrangement.border
     inner[entrance.face] = True
@@ -157,7 +157,7 @@ def _faces_in_sight(start: Start, room: int) -> Shape:
 
 
 def _in_sight(inner: shapely.STRtree, eye: FloatArray, face: Polygon) -> bool:
-    """Tell whether the straight path from the door to the centre of a face crosses inner faces only."""
+    """Check whether the straight path from the door to the centre of a face crosses inner faces only."""
     path = shapely.LineString((eye, face.centroid.coords[0]))
     crossed = inner.geometries[inner.query(path, predicate="intersects")]
     inside = float(shapely.length(shapely.intersection(path, crossed)).sum())

@@ -233,7 +233,7 @@ class BestConfig(MethodConfig):
 
 
 def _check_numbers(config: object, positive: tuple[str, ...]) -> None:
-    """Every plain number is finite and not negative, those in ``positive`` above zero."""
+    """Check that every plain number is finite and not negative, those in ``positive`` above zero."""
     for item in fields(config):  # type: ignore[arg-type]
         value = getattr(config, item.name)
         if isinstance(value, bool) or not isinstance(value, int | float):

@@ -198,7 +198,7 @@ def _entries() -> tuple[Any, ...]:
 
 
 def _load(name: str) -> Method:
-    """The method that another package brings; ``KeyError`` where none does."""
+    """Load the method that another package brings; ``KeyError`` where none does."""
     entry = next((entry for entry in _entries() if entry.name == name), None)
     if entry is None:
         raise KeyError(name)

@@ -86,7 +86,7 @@ def _at(segment: Segment, along: float) -> Point:
 
 
 def _gaps(plan: FloorPlan, wall: Segment) -> list[tuple[float, float]]:
-    """Stretches of a wall that doors and openings take away."""
+    """List the stretches of a wall that doors and openings take away."""
     (x0, y0), (x1, y1) = wall
     length = math.dist(*wall)
     gaps = []
@@ -127,7 +127,7 @@ def box_leaves(plan: FloorPlan, door: PlanDoor) -> list[BoxLeaf]:
 
 
 def _side(plan: FloorPlan, door: PlanDoor) -> int:
-    """+1 when the room that a door opens into lies to the left of its segment, else -1."""
+    """Compute +1 when the room that a door opens into lies to the left of its segment, else -1."""
     (x0, y0), (x1, y1) = door.segment
     middle = np.array(door.midpoint)
     normal = np.array([-(y1 - y0), x1 - x0]) / door.width

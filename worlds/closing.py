@@ -67,7 +67,7 @@ def draw_closed(
 
 
 def _draw(plan: FloorPlan, closable: dict[str, tuple[str, ...]], rng: np.random.Generator) -> list[str]:
-    """Closable rooms in a random order, without those that would cut off others together with the earlier ones."""
+    """Draw closable rooms in a random order, without those that would cut off others with the earlier ones."""
     start = start_room(plan)
     everything = _reached(plan, start, ())
     names = list(closable)
@@ -148,6 +148,6 @@ def _doors_by_room(plan: FloorPlan) -> dict[str, tuple[str, ...]]:
 
 
 def _reached(plan: FloorPlan, start: str, closed: Collection[str]) -> set[str]:
-    """Rooms connected to ``start`` by openings and by doors that are not closed."""
+    """Find the rooms connected to ``start`` by openings and by doors that are not closed."""
     sides = [passage.rooms for passage in plan.passages if passage.id not in closed]
     return connected_parts([start], sides)[0]

@@ -40,7 +40,7 @@ def extrude(area: Polygon | MultiPolygon, *, height: float = WALL_HEIGHT) -> tup
 
 
 def _triangulate(polygon: Polygon) -> tuple[FloatArray, IntArray]:
-    """Corners, shape (n, 2), and triangles between them, shape (m, 3), counter-clockwise."""
+    """Triangulate: corners, shape (n, 2), and triangles between them, shape (m, 3), counter-clockwise."""
     from mapbox_earcut import triangulate_float64
 
     rings = [np.asarray(ring.coords, dtype=np.float64)[:-1, :2] for ring in (polygon.exterior, *polygon.interiors)]
@@ -54,7 +54,7 @@ def _triangulate(polygon: Polygon) -> tuple[FloatArray, IntArray]:
 
 
 def _sides(faces: IntArray, n: int) -> IntArray:
-    """Two triangles on each edge of the floor that one triangle alone has; the ceiling's corners are ``n`` on."""
+    """Put two triangles on each edge of the floor that one triangle alone has; ceiling corners are ``n`` on."""
     edges = np.concatenate((faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]))
     _, first, uses = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
     start, end = edges[first[uses == 1]].T

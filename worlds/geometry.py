@@ -53,7 +53,7 @@ def solid_walls(walls: Sequence[Wall]) -> Polygon | MultiPolygon:
 
 
 def _without_twins(area: BaseGeometry) -> Polygon | MultiPolygon:
-    """The area with its corners on a grid of 1 um: corners that nearly coincide would tear the extruded mesh."""
+    """Put an area's corners on a grid of 1 um: corners that nearly coincide would tear the extruded mesh."""
     return areal(shapely.set_precision(shapely.set_precision(area, GRID), 0.0))
 
 
@@ -68,7 +68,7 @@ def rectangles(segments: FloatArray, halves: FloatArray) -> FloatArray:
 
 
 def _corners(segments: FloatArray, halves: FloatArray) -> list[BaseGeometry]:
-    """The pieces that fill the outer side of corners where two walls end at one point."""
+    """Make the solids that fill the outer side of corners where two walls end at one point."""
     ends: defaultdict[tuple[int, int], list[tuple[float, float, FloatArray]]] = defaultdict(list)
     for (a, b), half in zip(segments, halves, strict=True):
         for node, other in ((a, b), (b, a)):
@@ -85,7 +85,7 @@ def _corners(segments: FloatArray, halves: FloatArray) -> list[BaseGeometry]:
 
 
 def _mitre(node: FloatArray, a1: float, h1: float, a2: float, h2: float) -> BaseGeometry:
-    """The piece between the left face of a wall leaving at ``a1`` and the right face of one leaving at ``a2``."""
+    """Join the left face of a wall leaving at ``a1`` with the right face of one leaving at ``a2``."""
     u1, u2 = np.array([math.cos(a1), math.sin(a1)]), np.array([math.cos(a2), math.sin(a2)])
     n1, n2 = h1 * np.array([-u1[1], u1[0]]), h2 * np.array([u2[1], -u2[0]])
     s = (n2 - n1) @ np.array([u2[1], -u2[0]]) / (u1[0] * u2[1] - u1[1] * u2[0])
@@ -168,7 +168,7 @@ def room_interiors(plan: FloorPlan, room_ids: Sequence[str]) -> dict[str, Polygo
 
 
 def _interior(room: PlanRoom, walls: Sequence[Wall]) -> Polygon:
-    """The largest piece that the walls leave of a room."""
+    """Find the largest area that the walls leave of a room."""
     left = areal(shapely.difference(room.polygon, solid_walls(walls)))
     parts = left.geoms if isinstance(left, MultiPolygon) else [left]
     return max(parts, key=lambda part: part.area, default=Polygon())

@@ -203,7 +203,7 @@ def _is_json(path: Path, head: str) -> bool:
 
 
 def _has_keys(*keys: str) -> Callable[[Path, str], bool]:
-    """Whether a text has these top-level YAML keys; large YAML files are looked through to their end."""
+    """Check whether a text has these top-level YAML keys; large YAML files are looked through to their end."""
     patterns = [re.compile(rf"^[\"']?{re.escape(key)}[\"']?\s*:", re.MULTILINE) for key in keys]
 
     def recognises(path: Path, head: str) -> bool:

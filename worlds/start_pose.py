@@ -56,7 +56,7 @@ def start_pose(plan: FloorPlan) -> Pose2:
 
 
 def _main_room(plan: FloorPlan) -> tuple[PlanRoom, Polygon]:
-    """The room that the robot starts in, and the part of its floor that it fits into."""
+    """Find the room that the robot starts in, and the part of its floor that it fits into."""
     passages = Counter(room for p in plan.passages if None not in p.rooms for room in p.rooms)
     for part in _parts_by_area(plan):
         rooms = [room for room in plan.rooms if room.id in part]
@@ -71,13 +71,13 @@ def _main_room(plan: FloorPlan) -> tuple[PlanRoom, Polygon]:
 
 
 def _rank(room: PlanRoom, passages: Counter[str | None]) -> tuple[int, bool, float]:
-    """What makes a room the better start: passages, then its label, then its size."""
+    """Rank rooms as the start: passages, then the label, then the size."""
     circulation = any(word in room.label.lower() for word in CIRCULATION)
     return (passages[room.id], circulation, room.polygon.area)
 
 
 def _place_in(plan: FloorPlan, room: PlanRoom) -> Polygon | None:
-    """The largest part of a room's free floor that the robot can stand and drive in, narrow passages cut."""
+    """Find the largest part of a room's free floor that the robot can stand and drive in, narrow passages cut."""
     interior = room_interior(plan, room.id)
     blocked = [thing.polygon for thing in plan.furniture if thing.polygon.intersects(interior)]
     free = shapely.difference(interior, shapely.union_all(blocked)) if blocked else interior
@@ -92,7 +92,7 @@ def _place_in(plan: FloorPlan, room: PlanRoom) -> Polygon | None:
 
 
 def _long_side(area: Polygon) -> float:
-    """Direction of the longer side of the smallest box around ``area``, in (-pi/2, pi/2] [rad]."""
+    """Find the direction of the longer side of the smallest box around ``area``, in (-pi/2, pi/2] [rad]."""
     corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(area))
     sides = np.diff(corners[:3], axis=0)
     dx, dy = sides[int(np.argmax(np.hypot(sides[:, 0], sides[:, 1])))]
@@ -102,7 +102,7 @@ def _long_side(area: Polygon) -> float:
 
 
 def _parts_by_area(plan: FloorPlan) -> list[set[str]]:
-    """The connected parts of the building, every door open, the largest first."""
+    """List the connected parts of the building, every door open, the largest first."""
     area = {room.id: room.polygon.area for room in plan.rooms}
     parts = connected_parts([room.id for room in plan.rooms], [passage.rooms for passage in plan.passages])
     return sorted(parts, key=lambda part: (sum(area[room] for room in sorted(part)), min(part)), reverse=True)

@@ -37,7 +37,7 @@ def rasterise(plan: FloorPlan, frame: GridFrame, map_T_world: Pose2) -> Occupanc
 
 
 def _fill(areas: Iterable[BaseGeometry], frame: GridFrame, map_T_world: Pose2) -> BoolArray:
-    """Cells whose centre lies in one of ``areas`` (Polygons or MultiPolygons, building frame)."""
+    """Mark cells whose centre lies in one of ``areas`` (building frame); areas that touch leave no gap."""
     polygons = [p for area in areas for p in shapely.get_parts(area) if not p.is_empty]
     rings = [ring for p in polygons for ring in _oriented_rings(p)]
     if not rings:

@@ -157,7 +157,7 @@ def _overlap_fault(
     number: int,
     faults: Collection[int],
 ) -> tuple[str, str] | None:
-    """A passage on the place of an earlier one that is kept."""
+    """Find a passage on the place of an earlier one that is kept."""
     line = shapely.LineString(passage.segment)
     for before, other in enumerate(passages[:number]):
         if before not in faults and line.distance(shapely.LineString(other.segment)) < ON_WALL:
@@ -179,7 +179,7 @@ def _sides_fault(name: str, passage: PlanDoor | Opening, rooms: dict[str, Polygo
 def _place_fault(
     name: str, passage: PlanDoor | Opening, rooms: dict[str, Polygon], thickest: float, lines: WallAxes
 ) -> tuple[str, str] | None:
-    """A passage away from its rooms, or with one of them on the wrong side."""
+    """Find a passage away from its rooms, or with one of them on the wrong side."""
     (x0, y0), (x1, y1) = passage.segment
     middle = shapely.Point((x0 + x1) / 2, (y0 + y1) / 2)
     for room in passage.rooms:
@@ -201,7 +201,7 @@ def _place_fault(
 
 
 def _on_walls(plan: FloorPlan, segments: Sequence[Segment]) -> list[bool]:
-    """Whether each segment lies on the walls' centre lines along its whole length."""
+    """Check whether each segment lies on the walls' centre lines along its whole length."""
     centre_lines = np.array([wall.segment for wall in plan.walls], dtype=np.float64).reshape(-1, 2, 2)
     lines = np.asarray(shapely.linestrings(centre_lines))
     tree = STRtree(lines)

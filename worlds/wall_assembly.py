@@ -104,7 +104,7 @@ def join_segments(segments: Iterable[Segment]) -> list[Segment]:
 
 
 def _straight_run(points: Sequence[Point]) -> Segment | None:
-    """The two of ``points`` that lie furthest apart along their direction; ``None`` where others lie off their line.
+    """Find the two of ``points`` furthest apart along their direction; ``None`` where others lie off their line.
 
     The point furthest from the middle and the one furthest from it: of points on one line these are the ends, however
     the line is turned.
@@ -163,7 +163,7 @@ def free_spans(
 
 
 def _coordinates(edge: RoomEdge, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """How far along an edge and how far from its line points, shape (..., 2), lie [m]."""
+    """Compute how far along an edge and how far from its line points, shape (..., 2), lie [m]."""
     start = np.array(edge.segment[0])
     direction = (np.array(edge.segment[1]) - start) / edge.length
     offset = points - start
@@ -222,7 +222,7 @@ def without_gaps(
 
 
 def _border(gap: Polygon, room: Polygon, touching: float) -> float:
-    """How long a gap and a room touch [m]."""
+    """Measure how long a gap and a room touch [m]."""
     beside = room.buffer(touching, quad_segs=1) if touching else room.boundary
     return float(beside.intersection(gap.boundary).length)
 
@@ -232,7 +232,7 @@ def _is_narrow(part: Polygon, width: float, least: float = 1e-3) -> bool:
 
 
 def _branches(gap: Polygon, width: float) -> list[Polygon]:
-    """A gap cut where it branches, along the faces of the rooms around it, so that each piece lies between two."""
+    """Cut a gap where it branches, along the faces of the rooms around it, so that each part lies between two."""
     cuts = []
     for number, ring in enumerate((gap.exterior, *gap.interiors)):
         points = shapely.get_coordinates(ring)[:-1]

@@ -97,7 +97,7 @@ def _without_clutter(grid: OccupancyGrid) -> OccupancyGrid:
 
 
 def _cropped(grid: OccupancyGrid, margin: int) -> tuple[BoolArray, BoolArray, GridFrame]:
-    """Free and occupied cells in a window around the free ones, with a border of ``margin`` cells."""
+    """Crop free and occupied cells to a window around the free ones, with a border of ``margin`` cells."""
     free = grid.free
     rows, cols = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
     if rows.size == 0:
@@ -150,7 +150,7 @@ def _without_specks(free: BoolArray, cells: float) -> BoolArray:
 
 
 def _opened(free: BoolArray, radius: float) -> BoolArray:
-    """Morphological opening with a disc of ``radius`` cells."""
+    """Open a mask morphologically with a disc of ``radius`` cells."""
     import cv2
 
     reach = math.floor(radius + 1e-9)
@@ -199,7 +199,7 @@ def _without_corner_contacts(free: BoolArray) -> BoolArray:
 
 
 def _parts(mask: BoolArray, reachable: BoolArray, resolution: float, *, least: float) -> tuple[IntArray, FloatArray]:
-    """Connected parts (8 neighbours, as thinning keeps them) by falling area.
+    """Number connected parts (8 neighbours, as thinning keeps them) by falling area.
 
     Those below ``least`` [m2] and those without a reachable cell are left out.
     """
@@ -216,7 +216,7 @@ def _parts(mask: BoolArray, reachable: BoolArray, resolution: float, *, least: f
 
 
 def _clearance(mask: BoolArray) -> FloatArray:
-    """Distance to the next cell outside, in cells, between centres."""
+    """Compute the distance to the next cell outside, in cells, between centres."""
     import cv2
 
     distance: FloatArray = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE).astype(

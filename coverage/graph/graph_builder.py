@@ -81,7 +81,7 @@ def _start_vertex(draft: GraphDraft, start: Point | None) -> int:
 
 
 def _nearest_part(space: FreeSpace, start: Point) -> tuple[int, float]:
-    """The part that holds ``start``, or the nearest one, and how far away it is [m]."""
+    """Find the part that holds ``start``, or the nearest one, and how far away it is [m]."""
     cell = space.frame.to_cells(np.array(start))
     if space.frame.contains(cell) and space.mask[cell[0], cell[1]]:
         return int(space.parts[cell[0], cell[1]]), 0.0
@@ -93,7 +93,7 @@ def _nearest_part(space: FreeSpace, start: Point) -> tuple[int, float]:
 
 
 def _chosen_parts(space: FreeSpace, config: CoverageConfig, start: Point | None) -> tuple[FreeSpace, list[str]]:
-    """The part with the robot, or all; and a note when there are several."""
+    """Choose the part with the robot, or all; with a note when there are several."""
     notes = []
     if space.outside > 0.0:
         notes.append(f"{space.outside:.1f} m2 that rays saw through windows, with hardly a wall around, are left out")

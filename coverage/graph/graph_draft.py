@@ -97,7 +97,7 @@ class GraphDraft:
         return first
 
     def _reachable_path(self, chain: IntArray) -> IntArray:
-        """Cells from end to end of a chain: straight where the robot can go straight, else around what stands there."""
+        """List cells from end to end of a chain: straight where the robot can go straight, else around obstacles."""
         reachable = self.space.reachable
         start, goal = (self.nearest_reachable(chain[end]) for end in (0, -1))
         if is_clear(reachable, start + 0.5, goal + 0.5):
@@ -169,7 +169,7 @@ def add_doors(draft: GraphDraft, doors: Sequence[ClosedDoor], voronoi: VoronoiGr
 
 
 def _beside_leaf(space: FreeSpace, door: ClosedDoor, config: GraphConfig) -> BoolArray:
-    """What the edge of ``door`` may cross: where the robot can be, the door's leaf and wall, what is free before it."""
+    """Mark what the edge of ``door`` may cross: the robot's space, the door's leaf and wall, what is free before."""
     frame = space.frame
     before = config.wall_thickness + config.robot_radius + frame.resolution
     reach = before + (door.width or config.doorway)
@@ -197,7 +197,7 @@ def _beside_leaf(space: FreeSpace, door: ClosedDoor, config: GraphConfig) -> Boo
 
 
 def _visible_edge(draft: GraphDraft, point: FloatArray, passable: BoolArray, doorway: float) -> int | None:
-    """Vertex at the nearest visible place on an edge: an end of the edge, or a new vertex on it."""
+    """Find a vertex at the nearest visible place on an edge: an end of the edge, or a new vertex on it."""
     if not draft.edges:
         return next((v for v, other in enumerate(draft.points) if is_clear(passable, point, other)), None)
     edges = [edge for edge in draft.edges if "door" not in {draft.kinds[edge[0]], draft.kinds[edge[1]]}]
@@ -225,7 +225,7 @@ def _visible_cell(
     cells: IntArray,
     where: list[tuple[IntArray, int]],
 ) -> int | None:
-    """Vertex at the nearest visible cell of the skeleton, joined to the graph along it."""
+    """Make a vertex at the nearest visible cell of the skeleton, joined to the graph along it."""
     distances = ((cells + 0.5 - point) ** 2).sum(axis=1)
     for number in np.argsort(distances, kind="stable")[: 10 * LOOKS : 5].tolist():
         row, col = cells[number].tolist()

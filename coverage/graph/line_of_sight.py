@@ -75,7 +75,7 @@ def split_where_blocked(chain: IntArray, passable: BoolArray, *, around: float =
 
 
 def _between(chain: IntArray, passable: BoolArray) -> int:
-    """Number of cells that are not passable between a chain and the straight segment from its first to its last."""
+    """Count cells that are not passable between a chain and the straight segment from its first to its last."""
     import cv2
 
     low = chain.min(axis=0)
@@ -88,7 +88,7 @@ def _between(chain: IntArray, passable: BoolArray) -> int:
 
 
 def _distances(points: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
-    """Squared distances of points from the segment from ``a`` to ``b``."""
+    """Compute squared distances of points from the segment from ``a`` to ``b``."""
     step = b - a
     squared = float(step @ step)
     t = np.clip((points - a) @ step / squared, 0.0, 1.0) if squared > 0.0 else np.zeros(len(points))

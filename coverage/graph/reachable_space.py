@@ -113,7 +113,7 @@ def find_outside(free: BoolArray, occupied: BoolArray, resolution: float) -> Boo
 
 
 def _coarsened(free: BoolArray, occupied: BoolArray, stride: int) -> CellArray:
-    """Blocks of cells: 1 where one is occupied, else 0 where half are free, else 2 (unknown); unknown all around."""
+    """Coarsen to blocks: 1 where a cell is occupied, else 0 where half are free, else 2 (unknown), also all around."""
     rows, cols = (-(-size // stride) for size in free.shape)
     padding = ((0, rows * stride - free.shape[0]), (0, cols * stride - free.shape[1]))
 
@@ -126,7 +126,7 @@ def _coarsened(free: BoolArray, occupied: BoolArray, stride: int) -> CellArray:
 
 
 def _count_hits(coarse: CellArray) -> IntArray:
-    """From each cell the number of the eight directions in which the first cell that is not free is occupied."""
+    """Count, from each cell, of eight directions those in which the first cell that is not free is occupied."""
     padded = np.pad(coarse, 1, constant_values=2)
     hits = np.zeros(padded.shape, dtype=np.int64)
     for turned in range(4):

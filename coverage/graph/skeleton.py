@@ -97,7 +97,7 @@ def trace_skeleton(skeleton: BoolArray) -> VoronoiGraph:
 
 
 def _link(skeleton: BoolArray) -> tuple[IntArray, list[list[int]]]:
-    """Cells of the skeleton and, for each, the numbers of its neighbours.
+    """List the cells of the skeleton and, for each, the numbers of its neighbours.
 
     A diagonal step is left out where two side steps through one skeleton cell do the same: else every corner of the
     skeleton would look like a junction.
@@ -142,7 +142,7 @@ def _junction_groups(degree: list[int], links: list[list[int]]) -> tuple[list[in
 
 
 def _centre(pixels: IntArray, members: list[int]) -> int:
-    """The member next to the middle of the group."""
+    """Find the member next to the middle of the group."""
     if len(members) == 1:
         return members[0]
     cells = pixels[members]
@@ -156,7 +156,7 @@ def _walk(
     members: list[list[int]],
     centres: list[int],
 ) -> tuple[list[tuple[int, int]], list[list[int]]]:
-    """Chains from group to group, then rings that touch none (each gets a vertex: ``centres`` grows)."""
+    """Walk chains from group to group, then rings that touch none (each gets a vertex: ``centres`` grows)."""
     edges: list[tuple[int, int]] = []
     chains: list[list[int]] = []
     paths = [_paths_to_centre(links, group, members[g], centres[g]) for g in range(len(members))]
@@ -180,7 +180,7 @@ def _walk(
 
 
 def _paths_to_centre(links: list[list[int]], group: list[int], members: list[int], centre: int) -> dict[int, list[int]]:
-    """From each cell of a group the cells to the group's centre, both included."""
+    """Find the cells from each cell of a group to the group's centre, both included."""
     paths = {centre: [centre]}
     reached = [centre]
     for pixel in reached:
@@ -192,7 +192,7 @@ def _paths_to_centre(links: list[list[int]], group: list[int], members: list[int
 
 
 def _follow(start: int, first: int, links: list[list[int]], group: list[int], seen: list[bool]) -> list[int]:
-    """The chain that leaves ``start`` through ``first``, up to the first cell of a group."""
+    """Follow the chain that leaves ``start`` through ``first``, up to the first cell of a group."""
     chain = [start, first]
     while group[chain[-1]] < 0:
         here, before = chain[-1], chain[-2]

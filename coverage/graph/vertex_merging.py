@@ -131,7 +131,7 @@ def _drop_spurs(graph: _Multigraph, doorway: float, corner_ratio: float) -> bool
 
 
 def _move_ends(graph: _Multigraph, doorway: float, corner_ratio: float) -> bool:
-    """Each leaf, once, to where there is room on its branch."""
+    """Move each leaf, once, to where there is room on its branch."""
     leaves = [leaf for leaf, own in graph.at.items() if len(own) == 1 and leaf not in graph.moved]
     for leaf in leaves:
         graph.moved.add(leaf)
@@ -159,7 +159,7 @@ def _drop_loops(graph: _Multigraph, doorway: float) -> bool:
 
 
 def _merge_clusters(graph: _Multigraph, doorway: float) -> bool:
-    """Each vertex, by falling clearance, takes in the neighbours that are less than a doorway away."""
+    """Merge into each vertex, by falling clearance, the neighbours that are less than a doorway away."""
     merged = False
     taken: set[int] = set()
     for vertex in sorted(graph.at, key=lambda v: (-graph.clearance[v], *graph.cells[v].tolist())):

@@ -74,7 +74,7 @@ def _split_at_gaps(path: FloatArray) -> Iterator[FloatArray]:
 
 
 def _with_headings(points: FloatArray) -> FloatArray:
-    """Positions with the direction to the next one; the last keeps that of the one before."""
+    """Add to positions the direction to the next one; the last keeps that of the one before."""
     if len(points) == 1:
         return np.array([[*points[0], 0.0]])
     steps = np.diff(points, axis=0)

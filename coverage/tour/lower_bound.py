@@ -42,7 +42,7 @@ def find_lower_bound(distances: FloatArray, *, upper: float, steps: int) -> floa
 
 
 def _one_tree(weights: FloatArray) -> tuple[float, IntArray]:
-    """Weight and degrees of a minimum 1-tree: a spanning tree of all but vertex 0 and its two shortest edges."""
+    """Compute weight and degrees of a minimum 1-tree: a spanning tree without vertex 0, and its two shortest edges."""
     n = len(weights)
     degrees = np.zeros(n, dtype=np.int64)
     first, second = (np.argpartition(weights[0, 1:], 1)[:2] + 1).tolist()

@@ -134,7 +134,7 @@ def _part_walk(graph: TopologicalGraph, members: list[int], config: TourConfig, 
 
 
 def _block_walk(graph: TopologicalGraph, block: list[int], joints: set[int], config: TourConfig) -> _Walk:
-    """A short closed walk within one block, and a bound of all.
+    """Find a short closed walk within one block, and a bound of all.
 
     It visits all vertices but detours; those that hold blocks together (``joints``) in any case. Few vertices are
     solved exactly. More: Christofides by OR-Tools, then moves, over the metric of the block, and the bound of Held and

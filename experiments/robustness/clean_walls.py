@@ -46,7 +46,7 @@ def with_clean_walls(disturbed: OccupancyGrid, clean: OccupancyGrid) -> Occupanc
 
 
 def _walls(clean: OccupancyGrid, frame: GridFrame) -> BoolArray:
-    """Cells of ``frame`` with an occupied cell of ``clean`` at their centre or in them: no wall falls between cells."""
+    """Mark cells of ``frame`` with an occupied cell of ``clean`` at their centre or in them: walls stay whole."""
     walls = sampled(clean, frame).occupied
     cells = frame.to_cells(clean.frame.to_points(np.argwhere(clean.occupied)))
     cells = cells[frame.contains(cells)]

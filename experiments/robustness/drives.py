@@ -122,7 +122,7 @@ def odometry_noise(times_medium: float) -> NoiseConfig:
 
 
 def _disturbed(scans: tuple[LaserScan, ...], noise: NoiseConfig, seed: int) -> list[LaserScan]:
-    """Scans with the lidar's noise, as the simulation puts it on."""
+    """Disturb scans by the lidar's noise, as the simulation puts it on."""
     far, silent = stream(seed, "lidar", "range"), stream(seed, "lidar", "dropouts")
     disturbed = []
     for scan in scans:
@@ -136,7 +136,7 @@ def _disturbed(scans: tuple[LaserScan, ...], noise: NoiseConfig, seed: int) -> l
 
 
 def _drifted(truth: FloatArray, noise: NoiseConfig, seed: int) -> FloatArray:
-    """Odometry of a drive, shape (n, 3), from its true poses."""
+    """Compute the odometry of a drive, shape (n, 3), from its true poses."""
     odometry = Odometry(noise, seed)
     poses = [odometry.pose.as_tuple()]
     for before, after in itertools.pairwise(truth):

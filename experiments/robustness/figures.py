@@ -72,7 +72,7 @@ def _factor(name: str) -> Factor:
 
 
 def _curve(axes: Any, results: Sequence[LevelResult], name: str, title: str, colour: tuple[int, int, int]) -> None:
-    """Means, and around them the interval of the difference to the first level."""
+    """Draw means, and around them the interval of the difference to the first level."""
     points = [(result, result.means.get(name)) for result in results]
     points = [(result, mean) for result, mean in points if mean is not None]
     if not points:

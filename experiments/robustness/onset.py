@@ -151,7 +151,7 @@ Keyed = dict[tuple[str, int], Row]
 
 
 def _shares(own: Keyed, first: Keyed, resamples: int, label: str) -> dict[str, Difference]:
-    """What each stage loses more than at the first level: what its repair brings back, and what stays lost in the end.
+    """Compute what each stage loses more than at the first level: what its repair brings back, and what stays lost.
 
     A repair may change a little at the first level too; less that, the losses add up to the loss of the IoU.
     """
@@ -170,7 +170,7 @@ def _shares(own: Keyed, first: Keyed, resamples: int, label: str) -> dict[str, D
 
 
 def _lost(row: Row, before: str, after: str | None) -> float | None:
-    """What a repair brings back; of the last stage, what is missing after all repairs, up to a constant."""
+    """Compute what a repair brings back; of the last stage, what is missing after all, up to a constant."""
     if row[before] is None or (after is not None and row[after] is None):
         return None
     return float((row[after] if after is not None else 0.0) - row[before])
@@ -186,7 +186,7 @@ def _difference(own: Keyed, first: Keyed, name: str, resamples: int, label: str)
 
 
 def _interval(values: dict[tuple[str, int], float], resamples: int, label: str) -> Difference | None:
-    """Mean and 95 % percentile interval; buildings are drawn, and in each of them its sets of closed doors."""
+    """Compute mean and 95 % percentile interval; buildings are drawn, and in each its sets of closed doors."""
     if not values:
         return None
     worlds = sorted({world for world, _ in values})

@@ -91,7 +91,7 @@ def _sweep(worlds: dict[str, str], config: RobustnessConfig, progress: Progress)
 
 
 def _rows(onsets: Sequence[Onset]) -> list[tuple[str, ...]]:
-    """The table for people: where every factor starts to hurt."""
+    """List the table for people: where every factor starts to hurt."""
     rows: list[tuple[str, ...]] = [
         ("factor", "suffers from", "IoU there", "first to give way", "its share", "coverage from")
     ]
@@ -106,7 +106,7 @@ def _rows(onsets: Sequence[Onset]) -> list[tuple[str, ...]]:
 
 
 def _worlds(given: Sequence[str]) -> dict[str, str]:
-    """Names of the worlds by what was given."""
+    """Name the worlds by what was given."""
     wanted = [name for text in given for name in (bundled_names() if text == ALL else [text])]
     given = list(dict.fromkeys(wanted))
     names = distinct_names([load_world(text) for text in given], given)
@@ -199,7 +199,7 @@ def _folder(config: RobustnessConfig, world: str, name: str) -> Path:
 
 
 def _finished(config: RobustnessConfig, world: str, wanted: Sequence[Case]) -> list[Row]:
-    """What is there of one world, levels in order."""
+    """List what is there of one world, levels in order."""
     rows: list[Row] = []
     for case in wanted:
         kept = read_json(_folder(config, world, case.name) / RESULT, what="a finished level")["rows"]
@@ -209,7 +209,7 @@ def _finished(config: RobustnessConfig, world: str, wanted: Sequence[Case]) -> l
 
 
 def _kept(folder: Path, key: str, setting: Setting) -> bool:
-    """Whether a level is finished; what another configuration or other code left is not, and goes."""
+    """Check whether a level is finished; what another configuration or other code left is not, and goes."""
     path = folder / RESULT
     try:
         kept = read_json(path, what="a finished level")
@@ -222,7 +222,7 @@ def _kept(folder: Path, key: str, setting: Setting) -> bool:
 
 
 def _fingerprint(world: str, config: RobustnessConfig) -> str:
-    """Changes with the world, the configuration, the versions of libraries and the code."""
+    """Hash the world, the configuration, the versions of libraries and the code."""
     from closedrooms.worlds.formats.native import plan_text
 
     content = resolved(config, leave_out=(*NOT_CONTENT, *_LEVELS))

@@ -137,7 +137,7 @@ class BuildingTrials:
         return row
 
     def _repaired(self, setting: Setting, closing: Closing, repetition: int) -> Row:
-        """Mean IoU when stage after stage gets what an undisturbed one would have given it.
+        """Measure the mean IoU when stage after stage gets what an undisturbed one would have given it.
 
         First the scans are put at their true poses; then the doors, too, are where they are; then the walls, too, are
         those of the undisturbed map. What is still lost then is lost in the prediction, for want of known space.
@@ -195,7 +195,7 @@ class BuildingTrials:
         return self._drives[place]
 
     def _survey(self, setting: Setting) -> OpenSurvey:
-        """The map's survey; doors are disturbed later."""
+        """Map the building under a setting, once; its doors are disturbed later."""
         key = replace(setting, missed=0.0, shift=0.0, turn=0.0, phantoms=0.0)
         if key not in self._surveys:
             noise = replace(odometry_noise(key.odometry), range_sd=key.lidar, dropouts=key.dropouts)
@@ -248,7 +248,7 @@ class BuildingTrials:
 
     @staticmethod
     def _walls(grid: OccupancyGrid, closing: Closing) -> float:
-        """Mean distance of the map's occupied cells to what really stands there [m], each at most 0.5 m."""
+        """Average the distance of the map's occupied cells to what really stands there [m], each at most 0.5 m."""
         frame = closing.truth.grid.frame
         cells = frame.to_cells(grid.frame.to_points(np.argwhere(grid.occupied)))
         cells = cells[frame.contains(cells)]
@@ -258,7 +258,7 @@ class BuildingTrials:
 
     @staticmethod
     def _free(grid: OccupancyGrid, closing: Closing) -> float:
-        """IoU of the map's free cells with the true ones that a robot can reach."""
+        """Compute the IoU of the map's free cells with the true ones that a robot can reach."""
         return iou(sampled(grid, closing.truth.grid.frame).free, closing.open_cells)
 
 

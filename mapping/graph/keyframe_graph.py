@@ -73,7 +73,7 @@ class KeyframeGraph:
         return np.diag([distance**-2, distance**-2, angle**-2])
 
     def _information(self, hessian: FloatArray, pose: Pose2) -> FloatArray:
-        """Curvature in the map frame as information in the keyframe's own frame."""
+        """Turn a curvature in the map frame to information in the keyframe's own frame."""
         c, s = math.cos(pose.theta), math.sin(pose.theta)
         rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return np.asarray(self._config.loops.point_information * (rotation.T @ hessian @ rotation))
@@ -131,7 +131,7 @@ class KeyframeGraph:
         return True
 
     def _start_of(self, loop: Loop) -> FloatArray:
-        """Poses to optimise from: a submap that the loop joins is put where the loop sees it, as a whole."""
+        """Choose poses to optimise from: a submap that the loop joins goes where the loop sees it, as a whole."""
         older, latest = self.keyframes[loop.source], self.keyframes[loop.target]
         poses = self._poses()
         if older.submap != latest.submap:

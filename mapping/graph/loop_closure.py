@@ -99,7 +99,7 @@ def find_loop(
 
 
 def _contradicts(keyframes: Sequence[Keyframe], foreign: BoolArray, pose: Pose2, config: MapperConfig) -> bool:
-    """Whether the recent keyframes, moved as a whole so that the latest is at ``pose``, contradict the older submap."""
+    """Check if the recent keyframes, moved as a whole so the latest is at ``pose``, contradict the older submap."""
     latest = keyframes[-1]
     correction = pose @ latest.pose.inverse()
     older = [keyframes[i] for i in np.flatnonzero(foreign).tolist()]
@@ -115,7 +115,7 @@ def _contradicts(keyframes: Sequence[Keyframe], foreign: BoolArray, pose: Pose2,
 
 
 def _recent(keyframes: Sequence[Keyframe], distance: float) -> Iterator[Keyframe]:
-    """Keyframes of the last ``distance`` [m] of one submap, the latest first."""
+    """List the keyframes of the last ``distance`` [m] of one submap, the latest first."""
     latest = keyframes[-1]
     for keyframe in reversed(keyframes):
         if latest.travelled - keyframe.travelled > distance or keyframe.submap != latest.submap:

@@ -198,7 +198,7 @@ def _errors(x: FloatArray, source: IntArray, target: IntArray, measured: FloatAr
 def _jacobians(
     x: FloatArray, source: IntArray, target: IntArray, measured: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of the errors by the poses at the source and at the target of each edge, shape (m, 3, 3) each."""
+    """Derive the errors by the poses at the source and at the target of each edge, shape (m, 3, 3) each."""
     a, b = x[source], x[target]
     total = a[:, 2] + measured[:, 2]
     c, s = np.cos(total), np.sin(total)

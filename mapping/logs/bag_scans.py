@@ -24,7 +24,7 @@ def ranges_of(message: Any) -> tuple[FloatArray, int]:
 
 
 def _first_echo(echoes: FloatArray, shortest: float) -> float:
-    """The nearest that the sensor can measure; a beam without any says nothing (dust on the cover is nearer)."""
+    """Choose the nearest echo that the sensor can measure; a beam without any says nothing (dust is nearer)."""
     measured = echoes[np.isfinite(echoes) & (echoes >= shortest)]
     if measured.size:
         return float(measured.min())

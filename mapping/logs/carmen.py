@@ -66,7 +66,7 @@ def _lines(path: Path, gzipped: bool, log: CarmenLog) -> Iterator[str]:
 
 
 def _kind(log: CarmenLog) -> str | None:
-    """Which laser is mapped: the one with most scans, of those with poses first."""
+    """Choose the laser that is mapped: the one with most scans, of those with poses first."""
     kinds = [kind for kind in log.scans if kind in WITH_POSES]
     # Rear lasers of old logs (RLASER) say neither where they sit nor where they look.
     kinds = kinds or sorted(kind for kind in log.scans if kind != "RLASER")
@@ -74,7 +74,7 @@ def _kind(log: CarmenLog) -> str | None:
 
 
 def _with_sector(scans: list[ScanLine], settings: dict[str, float]) -> tuple[list[ScanLine], list[Remark]]:
-    """Scans that do not say their sector, with the one of the log's parameters or of a SICK LMS."""
+    """Give scans that do not say their sector the one of the log's parameters or of a SICK LMS."""
     resolved, guessed = [], 0
     for scan in scans:
         if scan.angle_min is not None:
@@ -102,7 +102,7 @@ def _reading_remarks(log: CarmenLog) -> list[Remark]:
 
 
 def _run(motion: CarmenOdometry, settings: dict[str, float], remarks: list[Remark]) -> RecordedRun:
-    """The scans with their odometry, ready to be mapped."""
+    """Make a run of the scans with their odometry."""
     scans = motion.scans
     remarks = [*remarks, *motion.remarks]
     if not scans:
@@ -122,7 +122,7 @@ def _sweep(scan: ScanLine, stamp: float, limit: float, mount: Pose2) -> LaserSca
 
 
 def _range_max(scans: list[ScanLine], settings: dict[str, float]) -> float:
-    """Range from which the sensor means "nothing" [m]."""
+    """Find the range from which the sensor means "nothing" [m]."""
     ranges = np.concatenate([s.ranges for s in scans])
     ranges = ranges[np.isfinite(ranges)]
     top = float(ranges.max(initial=0.0))
@@ -134,7 +134,7 @@ def _range_max(scans: list[ScanLine], settings: dict[str, float]) -> float:
 
 
 def _measured(ranges: FloatArray, range_max: float) -> FloatArray:
-    """Ranges with NaN for what was not measured.
+    """Replace ranges that were not measured by NaN.
 
     These sensors report errors (dazzle, glass, black walls) and emptiness with the same largest value: it clears
     nothing.

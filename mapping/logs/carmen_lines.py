@@ -100,7 +100,7 @@ class CarmenLog:
         self.scans.setdefault(kind, []).append(scan)
 
     def _flaser(self, words: list[str]) -> ScanLine:
-        """``FLASER n r1..rn x y theta odom_x odom_y odom_theta clock host logger_clock``."""
+        """Read ``FLASER n r1..rn x y theta odom_x odom_y odom_theta clock host logger_clock``."""
         n = _count(words[1])
         ranges = _numbers(words[2 : 2 + n], n)
         tail = words[2 + n :]
@@ -108,7 +108,7 @@ class CarmenLog:
         return ScanLine(ranges, None, 0.0, None, _pose(tail[0:3]), _pose(tail[3:6]), stamp, len(self.moves))
 
     def _laser(self, words: list[str], *, robot: bool) -> ScanLine:
-        """``KIND type start fov step max accuracy mode n r1..rn m e1..em [laser robot ...] clock host clock``."""
+        """Read ``KIND type start fov step max accuracy mode n r1..rn m e1..em [laser robot ...] clock host clock``."""
         start, view, step, longest = (float(word) for word in words[2:6])
         n = _count(words[8])
         ranges = _numbers(words[9 : 9 + n], n)
@@ -204,12 +204,12 @@ def _agrees(step: float, view: float, beams: int) -> bool:
 
 
 def _centred(start: float, step: float, beams: int) -> bool:
-    """Whether beams from ``start`` on end as far on the other side."""
+    """Check whether beams from ``start`` on end as far on the other side."""
     return any(abs(start + step * gaps / 2.0) < START_OFF for gaps in (beams - 1, beams))
 
 
 def _even_step(view: float, beams: int, *, hint: float = 0.0) -> float:
-    """Angle between beams [rad]: 181 and 361 include both ends of the view, 180 and 360 leave the last one out.
+    """Compute the angle between beams [rad]: 181 and 361 include both ends of the view, 180 and 360 only one.
 
     Args:
         view: Field of view [rad].

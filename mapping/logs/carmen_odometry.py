@@ -88,12 +88,12 @@ def motion_of(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[s
 
 
 def _stuck(robots: Sequence[Pose2], moves: list[OdometryLine]) -> bool:
-    """Whether the scans' poses never change while the ODOM lines do: their writer had none."""
+    """Check whether the scans' poses never change while the ODOM lines do: their writer had none."""
     return _travelled(_array(robots)) == 0.0 and _travelled(_array([move.pose for move in moves])) > LEAST_DISTANCE
 
 
 def _paired(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[str, float]) -> CarmenOdometry:
-    """Scans without poses, with the ODOM lines around them."""
+    """Pair scans without poses with the ODOM lines around them."""
     mount, remarks = _stated_mount(settings)
     if not moves:
         why = "no ODOM lines and no poses in the scans; found by matching scans alone"
@@ -116,7 +116,7 @@ def _paired(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[str
 
 
 def _stated_mount(settings: dict[str, float]) -> tuple[Pose2, tuple[Remark, ...]]:
-    """Where the front laser sits by the parameters of CARMEN, whose default is the middle of the robot."""
+    """Read where the front laser sits from CARMEN's parameters, whose default is the middle of the robot."""
     names = ("robot_frontlaser_offset", "robot_frontlaser_side_offset", "robot_frontlaser_angular_offset")
     values = [settings.get(name, 0.0) for name in names]
     if not all(map(math.isfinite, values)):
@@ -128,7 +128,7 @@ def _stated_mount(settings: dict[str, float]) -> tuple[Pose2, tuple[Remark, ...]
 
 
 def _echoes(scans: list[ScanLine], robots: Sequence[Pose2], moves: list[OdometryLine]) -> set[int]:
-    """ODOM lines right after a scan that only repeat its corrected pose.
+    """Find ODOM lines right after a scan that only repeat its corrected pose.
 
     Told by the pose: a line that equals the scan's, where the line before it does not. An echo of a standing robot's
     pose takes no motion out. Some loggers write the odometry of a scan after it: that goes on as the lines before.
@@ -146,7 +146,7 @@ def _echoes(scans: list[ScanLine], robots: Sequence[Pose2], moves: list[Odometry
 
 
 def _go_on(lines: list[int], moves: list[OdometryLine]) -> bool:
-    """Whether ODOM lines lie where the two lines before them lead, by their clocks."""
+    """Check whether ODOM lines lie where the two lines before them lead, by their clocks."""
     good = driven = 0
     for i in lines:
         if i < 2:
@@ -166,7 +166,7 @@ def _go_on(lines: list[int], moves: list[OdometryLine]) -> bool:
 
 
 def _raw_odometry(moves: list[OdometryLine], echoes: set[int]) -> list[Pose2]:
-    """Odometry accumulated over the ODOM lines without the jumps to corrected poses."""
+    """Accumulate the odometry over the ODOM lines without the jumps to corrected poses."""
     pose, raw = Pose2(), []
     for i, move in enumerate(moves):
         if i > 0 and i not in echoes:

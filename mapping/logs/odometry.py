@@ -70,7 +70,7 @@ def jump_remarks(count: int) -> list[Remark]:
 
 
 def _steps(poses: FloatArray) -> FloatArray:
-    """Motion from each pose to the next in the robot's frame, shape (n - 1, 3)."""
+    """Compute the motion from each pose to the next in the robot's frame, shape (n - 1, 3)."""
     c, s = np.cos(poses[:-1, 2]), np.sin(poses[:-1, 2])
     dx, dy = np.diff(poses[:, 0]), np.diff(poses[:, 1])
     turns = (np.diff(poses[:, 2]) + np.pi) % (2 * np.pi) - np.pi
@@ -149,7 +149,7 @@ MOST_OUTSIDE = 0.1
 
 
 def _interpolated(track: FloatArray, stamp: float) -> tuple[tuple[float, float, float] | None, bool]:
-    """Odometry at ``stamp``, ``None`` when none is near in time; and whether it lies in a gap."""
+    """Interpolate the odometry at ``stamp``, ``None`` when none is near in time; says whether it lies in a gap."""
     after = int(np.searchsorted(track[:, 0], stamp))
     near = [i for i in (after - 1, after) if 0 <= i < len(track)]
     if not near:

@@ -77,14 +77,14 @@ def _read(path: Path, options: BagOptions) -> RecordedRun:
 
 
 def _refuse_options(options: BagOptions, path: Path) -> None:
-    """Options that only a bag reads must not go unheard."""
+    """Refuse options that only a bag reads."""
     given = [f.name.replace("_", "-") for f in fields(options) if getattr(options, f.name) not in {None, False}]
     if given:
         raise InvalidInputError(f"--{', --'.join(given)} for a log that is no bag", expected="a rosbag", where=path)
 
 
 def _bag_file(path: Path) -> Path:
-    """The bag itself, where a folder without ``metadata.yaml`` holds just one or its ``metadata.yaml`` was named."""
+    """Find the bag where a folder without ``metadata.yaml`` holds just one or its ``metadata.yaml`` was named."""
     if path.name == "metadata.yaml" and is_file(path):
         return path.parent
     if is_folder(path) and not is_file(path / "metadata.yaml"):
@@ -95,14 +95,14 @@ def _bag_file(path: Path) -> Path:
 
 
 def _head(path: Path) -> bytes:
-    """What tells the kind of file."""
+    """Read what tells the kind of file."""
     if is_folder(path):
         return SQLITE if is_file(path / "metadata.yaml") else b""
     return read_head(path, what="a recorded run", size=24)
 
 
 def _bridged(run: RecordedRun) -> RecordedRun:
-    """The run without jumps of its odometry."""
+    """Bridge the jumps of a run's odometry."""
     odometry, jumps = bridge_jumps(np.array([scan.stamp for scan in run.scans]), run.odometry)
     if not jumps:
         return run
@@ -110,7 +110,7 @@ def _bridged(run: RecordedRun) -> RecordedRun:
 
 
 def _without_frozen_odometry(run: RecordedRun) -> RecordedRun:
-    """The run without an odometry that never moves: a robot that does would be taken to stand."""
+    """Take away an odometry that never moves: a robot that does would be taken to stand."""
     if not run.has_odometry or len(run.scans) < 2:
         return run
     if float(np.abs(run.odometry - run.odometry[0]).max()) > SAME_POSE:

@@ -36,7 +36,7 @@ class RecordedRun:
 
 
 def _poses(poses: FloatArray, what: str) -> FloatArray:
-    """Poses as they are kept, shape (n, 3), none of them where no robot is."""
+    """Check poses as they are kept, shape (n, 3), none of them where no robot is."""
     poses = frozen(poses)
     # NaN compares as false.
     if not bool((np.abs(poses) <= FARTHEST).all()):

@@ -77,7 +77,7 @@ def opened_bag(path: Path) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _named(path: Path) -> Iterator[Path]:
-    """The bag under a name that ends as rosbags expects it: it tells the kinds by their names."""
+    """Link to the bag by a name that ends as rosbags expects it: it tells the kinds by their names."""
     suffix = path.suffix
     if is_file(path):
         start = read_head(path, what="a rosbag", size=8)
@@ -124,7 +124,7 @@ def _run(
     *,
     has_odometry: bool,
 ) -> RecordedRun:
-    """The scans that have odometry, put together."""
+    """Put the scans that have odometry together."""
     scans, rows, broken, echoes = [], [], 0, 0
     for row, i in enumerate(np.flatnonzero(known).tolist()):
         message = messages.scans[i][0]
@@ -164,7 +164,7 @@ def _reading_remarks(messages: BagMessages) -> list[Remark]:
 def _motion(
     messages: BagMessages, lidar: str, options: BagOptions
 ) -> tuple[FloatArray | None, str | None, list[Remark]]:
-    """Odometry as ``header stamp, recording time, x, y, yaw``, the frame it moves, and what was guessed."""
+    """Read odometry as ``header stamp, recording time, x, y, yaw``; says which frame moves and what was guessed."""
     odometry = np.array(messages.odometry, dtype=np.float64).reshape(-1, 5)
     odometry = odometry[np.isfinite(odometry).all(axis=1)]
     if len(odometry):
@@ -190,7 +190,7 @@ def _motion(
 def _mounts(
     tree: TransformTree, base: str | None, frames: list[str], options: BagOptions, *, measured: bool
 ) -> tuple[dict[str, Mount], list[Remark]]:
-    """Where each frame of the scans sits on the robot.
+    """Find where each frame of the scans sits on the robot.
 
     Without odometry it does not matter for the map; the lidar is taken to be the robot where nobody says more.
     """

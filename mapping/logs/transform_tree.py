@@ -243,7 +243,7 @@ def transform_matrix(
 
 
 def _planar(matrix: FloatArray) -> tuple[float, float, float]:
-    """Position and heading of the x axis, seen from above."""
+    """Project a transform: position and heading of the x axis, seen from above."""
     return float(matrix[0, 3]), float(matrix[1, 3]), math.atan2(matrix[1, 0], matrix[0, 0])
 
 
@@ -262,5 +262,5 @@ def _is_odometry(name: str) -> bool:
 
 
 def _drifts(parent: str, child: str) -> bool:
-    """Whether a transform is the odometry by its names, even while the robot stands."""
+    """Check whether a transform is the odometry by its names, even while the robot stands."""
     return _is_odometry(parent) or _is_odometry(child)

@@ -26,7 +26,7 @@ class BlockMaxima:
         self._maxima: dict[int, Mask] = {}
 
     def _highest(self, cells: int) -> Mask:
-        """Largest value in the block of ``cells`` x ``cells`` that starts at each cell."""
+        """Find the largest value in the block of ``cells`` x ``cells`` that starts at each cell."""
         if cells not in self._maxima:
             kernel = np.ones((cells, cells), dtype=np.uint8)
             # With the anchor at (0, 0) a block starts at the cell itself.

@@ -133,7 +133,7 @@ class WindowSearch:
         return BestPose(best_pose, best_score)
 
     def _split(self, angles: IntArray, corners: IntArray, best: float) -> tuple[IntArray, IntArray]:
-        """Large blocks cut into small ones, less those whose bound is not above ``best``.
+        """Split large blocks into small ones, less those whose bound is not above ``best``.
 
         Args:
             angles: Turn of each block, shape (b,).
@@ -156,7 +156,7 @@ class WindowSearch:
 def _surroundings(
     field: LikelihoodField, points: FloatArray, guess: Pose2, turns: FloatArray, margin: int
 ) -> tuple[Float32Array, IntArray, IntArray]:
-    """The field, or where the window leaves it the window padded with zeros, and the points' cells for each turn.
+    """Cut out the field, padded with zeros where the window leaves it, and the points' cells for each turn.
 
     Returns:
         The values, and rows and columns, shape (turns, n) each.
@@ -177,13 +177,13 @@ def _surroundings(
 
 
 def _cells(field: LikelihoodField, points: FloatArray, guess: Pose2, turns: FloatArray) -> tuple[IntArray, IntArray]:
-    """Rows and columns of the unbounded lattice that the points fall in for each turn, shape (turns, n) each."""
+    """Compute rows and columns of the unbounded lattice that the points fall in, shape (turns, n) each."""
     cells = np.floor(_exact_cells(field, points, guess, turns)).astype(np.int64)
     return cells[:, 1::2], cells[:, ::2]
 
 
 def _exact_cells(field: LikelihoodField, points: FloatArray, guess: Pose2, turns: FloatArray) -> FloatArray:
-    """Where the points lie on the unbounded lattice for each turn, in cells: ``x, y, x, y, ...``, shape (turns, 2n)."""
+    """Compute where the points lie on the unbounded lattice in cells: ``x, y, x, y, ...``, shape (turns, 2n)."""
     # As complex numbers, a turn is one product.
     at = np.exp(1j * (guess.theta + turns))[:, None] * np.ascontiguousarray(points).view(np.complex128)[:, 0]
     at += complex(guess.x, guess.y)
@@ -193,7 +193,7 @@ def _exact_cells(field: LikelihoodField, points: FloatArray, guess: Pose2, turns
 
 
 def _opened_scores(values: Float32Array, flat: IntArray, shifts: IntArray) -> FloatArray:
-    """Mean value at the points, flat indices of shape (b, n), for the shifts of each block, (b, s, 2): (b, s)."""
+    """Average the field at the points, flat (b, n), for the shifts of each block, (b, s, 2): (b, s)."""
     offsets = shifts[..., 0] * values.shape[1] + shifts[..., 1]
     found = values.reshape(-1).take(flat[:, None, :] + offsets[:, :, None])
     return np.asarray(found.mean(axis=2), dtype=np.float64)
@@ -202,7 +202,7 @@ def _opened_scores(values: Float32Array, flat: IntArray, shifts: IntArray) -> Fl
 def _penalties(
     turns: FloatArray, shifts: IntArray, cells: int, resolution: float, sigmas: tuple[float, float] | None
 ) -> FloatArray:
-    """Cost of being far from the guess for all angles and shifts, shape (angles, shifts)."""
+    """Compute the cost of being far from the guess for all angles and shifts, shape (angles, shifts)."""
     if sigmas is None:
         return np.zeros((len(turns), len(shifts)))
     still, straight = np.zeros(len(shifts)), np.zeros((len(turns), 2), dtype=np.int64)
@@ -214,7 +214,7 @@ def _penalties(
 def _penalty(
     turns: FloatArray, shifts: IntArray, cells: int, resolution: float, sigmas: tuple[float, float] | None
 ) -> FloatArray:
-    """Cost of pairs of a turn and a shift, shape (n,); of a block of ``cells`` its nearest cell's, as in a bound."""
+    """Compute the cost of pairs of a turn and a shift, shape (n,); of a block its nearest cell's, as in a bound."""
     if sigmas is None:
         return np.zeros(len(turns))
     near = np.maximum(np.maximum(shifts, -(shifts + cells - 1)), 0) * resolution

@@ -61,5 +61,5 @@ def angle_step(field: LikelihoodField, points: FloatArray) -> float:
 
 
 def _farthest(points: FloatArray) -> float:
-    """Distance of the farthest point from the origin [m], 0 without points."""
+    """Measure the distance of the farthest point from the origin [m], 0 without points."""
     return math.sqrt(float(np.einsum("ij,ij->i", points, points).max(initial=0.0)))

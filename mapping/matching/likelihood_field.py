@@ -39,7 +39,7 @@ class LikelihoodField:
         self.values.fill(0.0)
 
     def _cover(self) -> None:
-        """What depends on the size of the window."""
+        """Set what depends on the size of the window."""
         axis = np.arange(-self._reach, self._reach + 1)
         self._around = ((axis * self.lattice.cols)[:, None] + axis).ravel()
 
@@ -89,7 +89,7 @@ class LikelihoodField:
 
 @functools.lru_cache(maxsize=4)
 def _stamps(sigma: float, reach: int) -> Float32Array:
-    """What a hit adds to the cells around its own, by the part of its cell it fell in.
+    """Compute what a hit adds to the cells around its own, by the part of its cell it fell in.
 
     Args:
         sigma: In cells.

@@ -129,7 +129,7 @@ def record_step(recorder: "Recorder", log: RunLog, step: Step) -> None:
 
 
 def _said(revision: Revision) -> str:
-    """One line of the log."""
+    """Write a revision as one line of the log."""
     looked = f"looked behind {', '.join(revision.doors)}" if revision.doors else "prediction revised"
     changed = f", other shape behind {', '.join(revision.changed)}" if revision.changed else ""
     return f"{looked}{changed}{': new tour' if revision.replanned else ''}"

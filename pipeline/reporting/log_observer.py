@@ -25,7 +25,7 @@ class LogWatch:
         self._known_loops = 0
 
     def __call__(self, number: int, map_T_robot: Pose2, mapper: Mapper) -> None:
-        """One scan was taken in."""
+        """Record one scan that was taken in."""
         scan = self._run.scans[number]
         self._recorder.scan(scan, self._start_T_odom @ Pose2(*self._run.odometry[number]), map_T_robot)
         if self._recorder.wants_map(scan.stamp):

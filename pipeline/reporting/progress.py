@@ -66,7 +66,7 @@ class Pace:
 
 
 def _duration(seconds: float) -> str:
-    """A time in words, to two units at most."""
+    """Write a time in words, to two units at most."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     if hours:

@@ -72,7 +72,7 @@ def _room_rows(manifest: Mapping[str, Any]) -> Rows:
 
 
 def _count(metrics: Mapping[str, Any]) -> str:
-    """How many rooms the mean is of; where a room has several doors, how many doors too."""
+    """Say how many rooms the mean is of; where a room has several doors, how many doors too."""
     rooms, doors = metrics["rooms_closed"], len(metrics["room_iou"])
     text = f"{rooms} room" + ("" if rooms == 1 else "s")
     return text if rooms == doors else f"{text} by {doors} doors"

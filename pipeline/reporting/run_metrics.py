@@ -55,7 +55,7 @@ def run_metrics(
 
 
 def _tour_metrics(tours: Mapping[str, CoverageTour], n_rooms: int, n_doors: int) -> dict[str, Any]:
-    """Lengths of the tours, and how far the estimates are off (paper, section 5.3); ``None``: not to be told."""
+    """List lengths of tours, and how far the estimates are off (paper, section 5.3); ``None``: not to be told."""
     metrics: dict[str, Any] = {
         name: {
             "length_m": round(tour.length, 4),

@@ -94,19 +94,19 @@ def _crossing(a: Line, b: Line) -> FloatArray:
 
 
 def _string(line: Line, centre: FloatArray, reach: float) -> LineString:
-    """The line where it passes ``centre``, ``reach`` both ways: beyond the box, so that no end lies on its edge."""
+    """Draw the line where it passes ``centre``, ``reach`` to either side: beyond the box, so no end is on its edge."""
     foot = centre - line.distance(centre) * line.normal
     return LineString((foot - reach * line.along, foot + reach * line.along))
 
 
 def _ordered(faces: Geometries) -> tuple[Polygon, ...]:
-    """Faces in an order that depends on where they are only."""
+    """Order faces by where they are only."""
     x, y = np.round(shapely.get_coordinates(shapely.centroid(faces)), 6).T
     return tuple(faces[np.lexsort((y, x))])
 
 
 def _connect(lines: tuple[Line, ...], faces: tuple[Polygon, ...], box: Polygon) -> Arrangement:
-    """Adjacency from equal edges: noding gives both faces of an edge the same two points."""
+    """Find neighbours by equal edges: noding gives both faces of an edge the same two points."""
     edges, edge_faces = _edges(faces)
     edge_lengths = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
     kept = edge_lengths > MIN_EDGE
@@ -126,7 +126,7 @@ def _connect(lines: tuple[Line, ...], faces: tuple[Polygon, ...], box: Polygon) 
 
 
 def _edges(faces: tuple[Polygon, ...]) -> tuple[FloatArray, IntArray]:
-    """Ends of every edge, the smaller first, in their order, shape (m, 2, 2), and its faces or -1, shape (m, 2)."""
+    """List ends of every edge, the smaller first, in order, shape (m, 2, 2), and its faces or -1, shape (m, 2)."""
     outlines = shapely.get_exterior_ring(np.array(faces, dtype=object))
     points, face = shapely.get_coordinates(outlines, return_index=True)
     same = face[1:] == face[:-1]

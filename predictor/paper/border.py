@@ -74,7 +74,7 @@ def _square(growth: Growth, room: int) -> BorderRoom:
 
 
 def _on_boundary(growth: Growth, point: FloatArray) -> bool:
-    """Whether a corner lies on a boundary line."""
+    """Check whether a corner lies on a boundary line."""
     lines = [line for line in growth.arrangement.lines if line.kind == "border"]
     return any(abs(float(line.distance(point))) < 1e-6 for line in lines)
 

@@ -116,7 +116,7 @@ def _turn(growth: Growth, room: int, config: PaperConfig) -> tuple[float, ...]:
 
 
 def _grow(growth: Growth, room: int, config: PaperConfig) -> bool:
-    """One turn of one room; whether its layout changed."""
+    """Grow one room once; returns whether its layout changed."""
     candidates, layout = growth.candidates(room), growth.layout(room)
     faces = np.concatenate((layout, candidates))
     fixed = np.arange(faces.size) < layout.size
@@ -139,7 +139,7 @@ def _grow(growth: Growth, room: int, config: PaperConfig) -> bool:
 
 
 def _score(growth: Growth, room: int, config: PaperConfig) -> None:
-    """Value of a room's layout as it is."""
+    """Score a room's layout as it is."""
     layout = growth.layout(room)
     pool = growth.face_set(room, layout, np.zeros(layout.size, dtype=np.bool_))
     growth.dependent[room] = bool(growth.touches(room))

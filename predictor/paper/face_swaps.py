@@ -30,7 +30,7 @@ def swap_faces(growth: Growth, config: PaperConfig) -> None:
 
 
 def _position(growth: Growth, pair: tuple[int, int]) -> tuple[float, ...]:
-    """Smallest total area first, then by position."""
+    """Rank by smallest total area, then by position."""
     areas = growth.arrangement.areas
     total = sum(float(areas[growth.layout(room)].sum()) for room in pair)
     first, second = sorted(growth.position(room) for room in pair)
@@ -65,7 +65,7 @@ def _swap(growth: Growth, a: int, b: int, config: PaperConfig) -> None:
 
 
 def _exchangeable(growth: Growth, a: int, b: int) -> IntArray:
-    """``E``: faces of one room with an edge in common with the other, initial faces left out."""
+    """List ``E``: faces of one room with an edge in common with the other, without initial faces."""
     neighbours = growth.arrangement.neighbours
     initial = {growth.entrances[room].face for room in (a, b)}
     found = [
@@ -78,7 +78,7 @@ def _exchangeable(growth: Growth, a: int, b: int) -> IntArray:
 
 
 def _joint(areas: FloatArray, to_a: BoolArray, pool: FaceSet, config: PaperConfig) -> FloatArray:
-    """``Phi_joint`` of each assignment, shape (k,)."""
+    """Compute ``Phi_joint`` of each assignment, shape (k,)."""
     area_a, area_b = to_a @ areas, ~to_a @ areas
     similar = np.sqrt(np.minimum(area_a, area_b) / np.maximum(area_a, area_b))
     penalty = sum(free_faces_penalty(pool.terms(side, hulls=False), config.phi) for side in (to_a, ~to_a))
@@ -86,7 +86,7 @@ def _joint(areas: FloatArray, to_a: BoolArray, pool: FaceSet, config: PaperConfi
 
 
 def _connected(inner: FloatArray, chosen: BoolArray) -> bool:
-    """Whether the faces chosen hang together by edges."""
+    """Check whether the faces chosen hang together by edges."""
     members = np.flatnonzero(chosen)
     if members.size == 0:
         return False

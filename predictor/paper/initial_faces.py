@@ -85,7 +85,7 @@ def find_entrance(
 
 
 def _closest(arrangement: Arrangement, edges: IntArray, distances: FloatArray) -> int:
-    """The closest edge; of several the longer, of those the one first in position."""
+    """Choose the closest edge; of several the longer, of those the one first in position."""
     keys = [
         (
             round(float(distances[e]), 6),
@@ -98,7 +98,7 @@ def _closest(arrangement: Arrangement, edges: IntArray, distances: FloatArray) -
 
 
 def _behind(arrangement: Arrangement, unknown: BoolArray, edge: int, point: FloatArray) -> int:
-    """The unknown one of an edge's faces; of two unknown ones that on whose side the door does not lie."""
+    """Choose the unknown one of an edge's faces; of two that on whose side the door does not lie."""
     a, b = (int(f) for f in arrangement.edge_faces[edge])
     if unknown[a] != unknown[b]:
         return a if unknown[a] else b
@@ -147,7 +147,7 @@ def splits_between(arrangement: Arrangement, entrances: Sequence[Entrance]) -> l
 
 
 def _across(axis: FloatArray, place: float) -> Line:
-    """The line perpendicular to ``axis`` at ``place`` along it."""
+    """Draw the line perpendicular to ``axis`` at ``place`` along it."""
     angle = float(np.arctan2(axis[0], -axis[1]))  # its normal (-sin, cos) is +-axis
     line = Line(angle % np.pi, 0.0, "split")
     sign = 1.0 if float(line.normal @ axis) > 0 else -1.0

@@ -99,7 +99,7 @@ def _chain(ends: FloatArray, reach: float) -> IntArray:
 
 
 def _covered(ends: FloatArray) -> float:
-    """Length of a line that segments cover, once where they overlap [m]; ends are (along, across), shape (k, 2, 2)."""
+    """Measure how much of a line segments cover, overlaps once [m]; ends are (along, across), shape (k, 2, 2)."""
     low, high = ends[..., 0].min(axis=1), ends[..., 0].max(axis=1)
     order = np.argsort(low)
     low, reached = low[order], np.maximum.accumulate(high[order])
@@ -108,7 +108,7 @@ def _covered(ends: FloatArray) -> float:
 
 
 def _merge(ends: FloatArray, walls: IntArray, reach: float) -> list[tuple[float, IntArray]]:
-    """Offset and members of each line: the two closest lines join until all are ``reach`` apart."""
+    """Merge lines: the two closest join until all are ``reach`` apart; returns the offset and members of each."""
     across = ends[..., 1].mean(axis=1)
     length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
     order = np.argsort(walls, kind="stable")
@@ -132,7 +132,7 @@ def _merge(ends: FloatArray, walls: IntArray, reach: float) -> list[tuple[float,
 
 
 def _join_closest(wall: FloatArray, gaps: FloatArray) -> list[tuple[int, int]]:
-    """Which neighbours to join: the closest two; of equally close ones those with most wall, all where that is equal.
+    """Choose neighbours to join: the closest two; of equally close ones those with most wall, all if equal.
 
     Offsets lie on the lattice of the cells, so that equal gaps are common: taking the first would depend on the side
     one comes from.
@@ -152,7 +152,7 @@ def _join_closest(wall: FloatArray, gaps: FloatArray) -> list[tuple[int, int]]:
 
 
 def _median(values: FloatArray, weights: FloatArray) -> float:
-    """The weighted median; between two values of equal weight their mean, so that it mirrors with its input."""
+    """Compute the weighted median; between two values of equal weight their mean, so that it mirrors."""
     order = np.argsort(values, kind="stable")
     values, weights = values[order], weights[order]
     total = np.cumsum(weights)

@@ -71,7 +71,7 @@ def best_subset(
 def _best_row(
     pool: FaceSet, fixed: BoolArray, chosen: BoolArray, weights: Weights, phi: Phi, *, dependent: bool, door: FloatArray
 ) -> tuple[BoolArray, float]:
-    """The best of the layouts in ``chosen``, shape (k, n); hulls only while the bound allows a better one."""
+    """Choose the best of the layouts in ``chosen``, shape (k, n); hulls only while the bound allows a better one."""
     bounds = score_layouts(pool.terms(chosen, hulls=False), weights, phi, dependent=dependent)
     best: tuple[float, ...] = ()
     top, winner = -np.inf, fixed
@@ -95,7 +95,7 @@ def _best_row(
 
 
 def _spread(pool: FaceSet, chosen: BoolArray, door: FloatArray) -> float:
-    """Mean distance [m] of the corners of the faces chosen from the door."""
+    """Average the distances [m] of the corners of the faces chosen from the door."""
     points = np.concatenate([pool.corners[i] for i in np.flatnonzero(chosen)])
     return float(np.hypot(*(points - door).T).mean())
 
@@ -103,7 +103,7 @@ def _spread(pool: FaceSet, chosen: BoolArray, door: FloatArray) -> float:
 def _promising(
     pool: FaceSet, fixed: BoolArray, weights: Weights, phi: Phi, *, dependent: bool, max_nodes: int
 ) -> tuple[BoolArray, bool]:
-    """Layouts among which the best one is, by best-first branch and bound, shape (k, n), and whether it was cut.
+    """Find layouts that hold the best, by best-first branch and bound, shape (k, n); says whether it was cut.
 
     A node has decided some candidates. Its bound takes all undecided area, the hull ratio 1, and only those free
     edges that no later decision can close: they are monotone, so no layout below the node is worth more.
@@ -134,7 +134,7 @@ def _promising(
 
 
 def _bound(pool: FaceSet, taken: BoolArray, open_: IntArray, weights: Weights, phi: Phi, *, dependent: bool) -> float:
-    """No layout that contains ``taken``, none of the rest but some of ``open_``, is worth more than this."""
+    """Bound the value of every layout that contains ``taken`` and of the rest only some of ``open_``."""
     possible = taken.copy()
     possible[open_] = True
     shut = (~possible & pool.returnable).astype(np.float64)

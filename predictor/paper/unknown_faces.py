@@ -56,7 +56,7 @@ def observed_shares(arrangement: Arrangement, grid: OccupancyGrid) -> tuple[Floa
 
 
 def _rings(arrangement: Arrangement, grid: OccupancyGrid) -> FloatArray:
-    """Corners (col, row) of every face with cell centres on whole numbers, the first again at the end, then nan.
+    """List the corners (col, row) of faces, cell centres on whole numbers, the first again at the end, then nan.
 
     Returns:
         Shape (n, most corners + 1, 2).

@@ -62,7 +62,7 @@ class JoinedRooms:
             self._add_door(point, room, middle, hallway, has_door=has_door)
 
     def _deep_door(self, hallway: Hallway) -> DeepDoor | None:
-        """The door through the walls of two rooms that face each other; ``None`` where a robot fits between them."""
+        """Fit a door through the walls of two rooms that face each other; ``None`` where a robot fits between."""
         start, end = self._floors[hallway.start], self._floors[hallway.end]
         between = hallway.line.difference(shapely.union_all([start, end]))
         gaps = [part for part in shapely.get_parts(between) if max(part.distance(start), part.distance(end)) < 1e-6]
@@ -134,7 +134,7 @@ def _square_to(start: Polygon, gap: LineString, end: Polygon) -> tuple[FloatArra
 
 
 def _between(strip: Polygon, polygons: list[Polygon], start: int, end: int) -> Polygon | None:
-    """What a hallway adds between its rooms; ``None`` where they touch."""
+    """Cut out what a hallway adds between its rooms; ``None`` where they touch."""
     left = areal(shapely.difference(strip, shapely.union_all(polygons)))
     between = [
         part
@@ -145,13 +145,13 @@ def _between(strip: Polygon, polygons: list[Polygon], start: int, end: int) -> P
 
 
 def _meeting(hall: Polygon, room: Polygon) -> shapely.Point:
-    """The middle of the border that a hallway shares with a room."""
+    """Find the middle of the border that a hallway shares with a room."""
     shared = hall.boundary.intersection(room.buffer(0.01))
     return shared.centroid if not shared.is_empty else hall.centroid
 
 
 def _straight_end(hall: Polygon, room: Polygon) -> tuple[Polygon, Polygon]:
-    """A hallway that meets a round or bent wall cut straight; what is cut off goes to the room: a door is straight."""
+    """Cut a hallway straight where it meets a round or bent wall; the rest goes to the room: a door is straight."""
     shared = shapely.line_merge(hall.boundary.intersection(room.boundary))
     points = shapely.get_coordinates(shared)
     if shared.geom_type != "LineString" or len(points) < 3:

@@ -111,7 +111,7 @@ def _boxes(data: dict[str, Any], path: Path, remarks: list[Remark]) -> list[tupl
 
 
 def _rooms(outline: Polygon, boxes: list[tuple[str, Polygon]]) -> tuple[list[str], list[Polygon]]:
-    """Labels and outlines of the rooms, and of the corridors between them."""
+    """Find labels and outlines of the rooms, and of the corridors between them."""
     labels: list[str] = []
     polygons: list[Polygon] = []
     left: Polygon | MultiPolygon = outline
@@ -142,7 +142,7 @@ def _parts(area: BaseGeometry, smallest: float) -> list[Polygon]:
 
 
 def _doors(edges: list[RoomEdge], rooms: tuple[PlanRoom, ...]) -> list[PlanDoor]:
-    """A door between each two rooms that touch, on their longest common edge that has room for one."""
+    """Put a door between each two rooms that touch, on their longest common edge that has room for one."""
     longest: dict[tuple[int, int], RoomEdge] = {}
     for edge in edges:
         first, second = edge.rooms

@@ -61,12 +61,12 @@ def read_kth(path: str | Path) -> FloorPlan:
 
 
 def _field(element: Any, name: str) -> str:
-    """An attribute or, without it, the text of a child."""
+    """Read an attribute or, without it, the text of a child."""
     return ((attribute(element, name) if element is not None else None) or text(child(element, name))).strip()
 
 
 def _scale(root: Any, path: Path) -> float:
-    """Metres per pixel."""
+    """Read the scale: metres per pixel."""
     scale = next(iter(descendants(root, "scale")), None)
     pixels, real = _field(scale, "PixelDistance"), _field(scale, "RealDistance")
     try:
@@ -85,7 +85,7 @@ def _label(space: Any) -> str:
 
 
 def _lines(space: Any, metres: float) -> list[tuple[Any, Segment]]:
-    """The line segments of a contour that have four coordinates, in metres, y up."""
+    """Read the line segments of a contour that have four coordinates, in metres, y up."""
     found = []
     for line in descendants(child(space, "contour"), "linesegment"):
         try:
@@ -125,7 +125,7 @@ def _outline(space: Any, name: str, metres: float, remarks: list[Remark]) -> Pol
 def _portals(
     spaces: list[Any], rooms: tuple[PlanRoom, ...], metres: float, remarks: list[Remark]
 ) -> tuple[list[Portal], list[float]]:
-    """Doors between rooms, each once although it stands on both contours as a rule, and all widths as drawn [m]."""
+    """Find doors between rooms, each once although it stands on both contours, and all widths as drawn [m]."""
     index: dict[str, list[int]] = {}
     for number, space in enumerate(spaces):
         index.setdefault(_field(space, "name").lower(), []).append(number)
@@ -160,7 +160,7 @@ def _portals(
 def _target(
     name: str, room: int, middle: Point, index: dict[str, list[int]], rooms: tuple[PlanRoom, ...]
 ) -> int | None:
-    """The room that a portal leads to: by its name, the nearest of several; never the room itself."""
+    """Find the room that a portal leads to: by its name, the nearest of several; never the room itself."""
     point = shapely.Point(middle)
     named = [number for number in index.get(name.lower(), []) if number != room]
     near = sorted((rooms[number].polygon.distance(point), number) for number in named)

@@ -53,7 +53,7 @@ def read_luperto(path: str | Path) -> FloorPlan:
 
 
 def _scale(root: Any, path: Path) -> float:
-    """Metres per pixel."""
+    """Read the scale: metres per pixel."""
     scale = child(root, "scale")
     pixels = text(child(child(scale, "represented_distance"), "value"))
     real = text(child(child(scale, "real_distance"), "value"))
@@ -91,7 +91,7 @@ def _point(element: Any, metres: float) -> Point | None:
 
 
 def _outline(space: Any, name: str, metres: float, remarks: list[Remark]) -> Polygon | None:
-    """The outline of a space [m], repaired; ``None`` when there is nothing to make one of."""
+    """Read the outline of a space [m], repaired; ``None`` when there is nothing to make one of."""
     read = [_point(point, metres) for point in children(child(space, "bounding_polygon"), "point")]
     points = [point for point in read if point is not None]
     if len(points) < len(read):
@@ -123,7 +123,7 @@ def _from_segments(space: Any, metres: float) -> Polygon | None:
 
 
 def _portals(spaces: list[Any], gone: set[str | None], metres: float, remarks: list[Remark]) -> list[Portal]:
-    """The passages, each once although both of its rooms list it.
+    """Read the passages, each once although both of its rooms list it.
 
     Args:
         spaces: That became rooms.
@@ -150,7 +150,7 @@ def _portals(spaces: list[Any], gone: set[str | None], metres: float, remarks: l
 
 
 def _useless(name: str, place: Point | None, others: int, to_dropped_room: bool) -> Remark:
-    """Why a portal is left out; one that leads out of the building is nothing that a robot misses."""
+    """Say why a portal is left out; one that leads out of the building is nothing that a robot misses."""
     if others > 1:
         why = "they name more than one other room"
     elif others == 1 or (place is None and to_dropped_room):
@@ -164,7 +164,7 @@ def _useless(name: str, place: Point | None, others: int, to_dropped_room: bool)
 
 
 def _segment_places(space: Any, metres: float) -> dict[str, Point]:
-    """The middle of each line segment of a space, by its id."""
+    """Find the middle of each line segment of a space, by its id."""
     places = {}
     for segment in children(child(space, "space_representation"), "linesegment"):
         points = [_point(point, metres) for point in children(segment, "point")]

@@ -73,7 +73,7 @@ def write_urdf(path: Path, plan: FloorPlan) -> None:
 
 
 def _add_leaf(robot: Element, name: str, leaf: BoxLeaf) -> None:
-    """A link whose origin is the hinge, or the middle of a sliding leaf, and the joint that holds it."""
+    """Add a link whose origin is the hinge, or the middle of a sliding leaf, and the joint that holds it."""
     box, sliding = leaf.box, leaf.hinge is None
     x, y = leaf.hinge if leaf.hinge is not None else (box.x, box.y)
     length, height = box.length - 2 * CLEARANCE, DOOR_HEIGHT - CLEARANCE

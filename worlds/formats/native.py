@@ -77,7 +77,7 @@ def plan_text(plan: FloorPlan) -> str:
 
 
 def _material(material: Material) -> dict[str, str]:
-    """The field of what is not solid: plain plans stay as they are."""
+    """Write the field of what is not solid: plain plans stay as they are."""
     return {} if material == "solid" else {"material": material}
 
 
@@ -139,7 +139,7 @@ def plan_from(data: Any, path: Path) -> FloorPlan:
 
 
 def _plan_name(value: Any, path: Path) -> str:
-    """The name of a plan; files and folders are named after it."""
+    """Check the name of a plan; files and folders are named after it."""
     if not is_name(value, longest=MAX_NAME) or is_path(value):
         raise InvalidInputError(
             f"a plan named {repr_of(value)}",

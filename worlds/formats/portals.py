@@ -139,7 +139,7 @@ def _passages(
     fits: tuple[tuple[float, float], ...],
     remarks: list[Remark],
 ) -> tuple[list[PlanDoor], list[Opening]]:
-    """Doors and openings on the walls nearest to their portals."""
+    """Put doors and openings on the walls nearest to their portals."""
     doors: list[PlanDoor] = []
     openings: list[Opening] = []
     taken: list[Segment] = []
@@ -162,7 +162,7 @@ def _kind(width: float) -> DoorKind:
 
 
 def _widest(portal: Portal, rooms: tuple[PlanRoom, ...]) -> float:
-    """How wide the passage is made where its wall is long enough [m]."""
+    """Choose how wide the passage is made where its wall is long enough [m]."""
     if portal.width is not None:
         return portal.width
     if portal.has_door:
@@ -179,7 +179,7 @@ def _place(
     fits: tuple[tuple[float, float], ...],
     remarks: list[Remark],
 ) -> Segment | None:
-    """The passage's segment: as near to the portal as the wall between its two rooms allows."""
+    """Place the passage as near to the portal as the wall between its two rooms allows."""
     found = (_nearest(portal, widest, edges, taken, margin, narrowest) for margin, narrowest in fits)
     best = next((place for place in found if place is not None), None)
     if best is None:
@@ -198,7 +198,7 @@ def _place(
 def _nearest(
     portal: Portal, widest: float, edges: list[RoomEdge], taken: list[Segment], margin: float, narrowest: float
 ) -> tuple[float, Segment] | None:
-    """The free piece of wall nearest to a portal, and how far away it is [m]; ``None`` where nothing fits."""
+    """Find the free stretch of wall nearest to a portal, and how far away it is [m]; ``None`` if none fits."""
     point = shapely.Point(portal.point)
     best: tuple[float, Segment] | None = None
     for edge in edges:

@@ -88,7 +88,7 @@ def read_pyrobosim(path: str | Path) -> FloorPlan:
 def _hallways(
     rows: list[dict[str, Any]], names: list[str], footprints: list[Polygon], path: Path, remarks: list[Remark]
 ) -> list[Hallway]:
-    """The hallways that can be read; each of the others costs itself only."""
+    """Read the hallways that can be read; each of the others costs itself only."""
     found = []
     for number, row in enumerate(rows):
         name = str(row.get("name", f"hallway {number}"))
@@ -125,7 +125,7 @@ def _number(value: Any, what: str, path: Path, *, above: float = 0.0) -> float:
 
 
 def _placed_footprints(rows: list[dict[str, Any]], names: list[str], path: Path) -> list[Polygon]:
-    """The free floors of the rooms in the world frame: footprints moved by their poses."""
+    """Place the free floors of the rooms in the world frame: footprints moved by their poses."""
     poses = {name: row.get("pose") for row, name in zip(rows, names, strict=True)}
 
     def world_T_room(name: str, above: tuple[str, ...]) -> Pose2:  # noqa: N802
@@ -185,7 +185,7 @@ def read_pose(value: Any, what: str, path: Path) -> Pose2:
 
 
 def _yaw(w: float, x: float, y: float, z: float, *, what: str, path: Path) -> float:
-    """The turn about the upright axis of a quaternion of any length [rad]."""
+    """Compute the turn about the upright axis of a quaternion of any length [rad]."""
     length = math.hypot(w, x, y, z)
     if length < 1e-6:
         raise InvalidInputError(f"{what} with a quaternion of length 0", expected="w, x, y, z", where=path)
@@ -194,7 +194,7 @@ def _yaw(w: float, x: float, y: float, z: float, *, what: str, path: Path) -> fl
 
 
 def _wall_width(rows: list[dict[str, Any]]) -> float:
-    """The thinnest wall of the rooms: walls between rooms are shared here [m]."""
+    """Find the thinnest wall of the rooms: walls between rooms are shared here [m]."""
     widths = [row["wall_width"] for row in rows if isinstance(row.get("wall_width"), int | float)]
     return float(min((width for width in widths if 0.05 <= width <= 1.0), default=WALL))
 
@@ -210,7 +210,7 @@ def _points(value: Any, what: str, path: Path) -> list[Point]:
 
 
 def _footprint(row: dict[str, Any], name: str, path: Path) -> Polygon:
-    """The free floor of a room: a polygon, box or circle."""
+    """Read the free floor of a room: a polygon, box or circle."""
     shape = row.get("footprint")
     kind = shape.get("type") if isinstance(shape, dict) else None
     polygon = Polygon()
@@ -243,7 +243,7 @@ def _room_of(hall: dict[str, Any], key: str, name: str, names: list[str], path: 
 
 
 def _centre_line(hall: dict[str, Any], name: str, start: Polygon, end: Polygon, path: Path) -> LineString:
-    """The middle of a hallway: from centroid to centroid, at an angle from the first, or through given points."""
+    """Draw a hallway's middle: from centroid to centroid, at an angle from the first, or through given points."""
     method = hall.get("conn_method", "auto")
     if method == "points":
         return extend_into_rooms(_points(hall.get("conn_points"), f"{name} conn_points", path), start, end)

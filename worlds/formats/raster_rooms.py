@@ -59,7 +59,7 @@ def find_rooms_and_doors(
 
 
 def _rooms(grid: OccupancyGrid, segments: Sequence[Segment]) -> tuple[list[PlanRoom], Labels]:
-    """Connected free areas with all doors shut, and the number of the room (from 1) of each cell."""
+    """Find connected free areas with all doors shut, and the number of the room (from 1) of each cell."""
     import cv2
 
     free = (grid.free & ~_shut(grid, segments)).astype(np.uint8)
@@ -76,7 +76,7 @@ def _rooms(grid: OccupancyGrid, segments: Sequence[Segment]) -> tuple[list[PlanR
 
 
 def _outlines(labels: Labels, count: int, frame: GridFrame) -> list[Polygon]:
-    """The area of the cells of each label from 1 on, along the cells' edges."""
+    """Outline the cells of each label from 1 on, along the cells' edges."""
     boxes = find_boxes(labels)
     x0, y0, x1, y1 = box_corners(boxes, frame)
     shapes = np.asarray(shapely.box(x0, y0, x1, y1))
@@ -90,7 +90,7 @@ def _outlines(labels: Labels, count: int, frame: GridFrame) -> list[Polygon]:
 
 
 def _shut(grid: OccupancyGrid, segments: Sequence[Segment]) -> BoolArray:
-    """Free cells under shut doors."""
+    """Mark free cells under shut doors."""
     import cv2
 
     drawn = np.zeros(grid.frame.shape, dtype=np.uint8)
@@ -103,7 +103,7 @@ def _shut(grid: OccupancyGrid, segments: Sequence[Segment]) -> BoolArray:
 
 
 def _segment(door: ClosedDoor, grid: OccupancyGrid) -> Segment:
-    """From jamb to jamb: as given, else across the narrowest gap at the door's point."""
+    """Find the jambs: as given, else across the narrowest gap at the door's point."""
     if door.segment is not None:
         return door.segment
     x, y = door.midpoint
@@ -124,7 +124,7 @@ def _segment(door: ClosedDoor, grid: OccupancyGrid) -> Segment:
 
 
 def _values(grid: OccupancyGrid, mask: BoolArray, points: FloatArray) -> BoolArray:
-    """``mask`` at map points, shape (n, 2); outside the grid it is false."""
+    """Look up ``mask`` at map points, shape (n, 2); outside the grid it is false."""
     cells = grid.frame.to_cells(points)
     inside = grid.frame.contains(cells)
     values = np.zeros(len(points), dtype=np.bool_)
@@ -133,13 +133,13 @@ def _values(grid: OccupancyGrid, mask: BoolArray, points: FloatArray) -> BoolArr
 
 
 def _blocked_share(grid: OccupancyGrid, point: Point, u: FloatArray, width: float) -> float:
-    """How much of the wall just beyond both jambs is occupied when the door lies along ``u``."""
+    """Measure how much of the wall just beyond both jambs is occupied when the door lies along ``u``."""
     steps = np.concatenate((np.linspace(width / 2 + 0.05, width / 2 + 0.4, 8), -np.linspace(width / 2, width, 8)))
     return float(_values(grid, grid.occupied, np.array(point) + steps[:, None] * u).mean())
 
 
 def _reach(grid: OccupancyGrid, point: Point, u: FloatArray) -> float:
-    """How far free space reaches from a point along ``u`` [m]; a usual half door where a leaf is drawn there."""
+    """Measure how far free space reaches from a point along ``u`` [m]; a usual half door where a leaf is drawn."""
     steps = np.arange(0.0, HALF_WIDEST, grid.frame.resolution / 2)
     blocked = _values(grid, grid.occupied, np.array(point) + steps[:, None] * u)
     if blocked[0]:
@@ -148,7 +148,7 @@ def _reach(grid: OccupancyGrid, point: Point, u: FloatArray) -> float:
 
 
 def _fault(segment: Segment, frame: GridFrame) -> str | None:
-    """What makes a segment no door whatever the map shows."""
+    """Say what makes a segment no door whatever the map shows."""
     width = math.dist(*segment)
     if not NARROWEST <= width <= WIDEST:
         return f"{width:.3g} m wide; expected {NARROWEST:g} to {WIDEST:g} m"
@@ -162,7 +162,7 @@ def _door(
     frame: GridFrame,
     rooms: Sequence[PlanRoom],
 ) -> tuple[PlanDoor, Piece] | str:
-    """The door between the free areas on both its sides and the piece of wall that it stands in, or what is wrong."""
+    """Fit a door between the free areas on both sides in its stretch of wall, or say what is wrong."""
     a, b = np.array(segment[0]), np.array(segment[1])
     length = float(np.hypot(*(b - a)))
     u = (b - a) / length

@@ -71,7 +71,7 @@ def read_rmf(path: str | Path, level: str | None = None) -> FloorPlan:
 
 
 def _closers(level: RmfLevel, remarks: list[Remark]) -> list[Segment]:
-    """Walls that the file leaves out: from loose ends to the next wall, and along the floor's edge."""
+    """Add walls that the file leaves out: from loose ends to the next wall, and along the floor's edge."""
     lines = [LineString(s) for s in (*level.walls, *(door.segment for door in level.doors))]
     loose = _loose_ends(lines)
     edges: list[Segment] = []
@@ -94,7 +94,7 @@ def _closers(level: RmfLevel, remarks: list[Remark]) -> list[Segment]:
 
 
 def _loose_ends(lines: Sequence[LineString], reach: float = LOOSE_END) -> list[Segment]:
-    """Short pieces from ends that touch nothing to the nearest line in reach."""
+    """Draw short walls from ends that touch nothing to the nearest line in reach."""
     tree = STRtree(lines)
     pieces = []
     for number, line in enumerate(lines):
@@ -116,7 +116,7 @@ def _loose_ends(lines: Sequence[LineString], reach: float = LOOSE_END) -> list[S
 
 
 def _rooms(lines: Sequence[BaseGeometry], level: RmfLevel, remarks: list[Remark]) -> tuple[PlanRoom, ...]:
-    """The faces between walls and doors, named after the waypoints in them."""
+    """Find the faces between walls and doors, named after the waypoints in them."""
     # On a grid of 1 cm, so that feet of loose ends and edges of floors lie on their wall.
     noded = shapely.union_all(np.array(lines, dtype=object), grid_size=0.01)
     faces = [f for f in shapely.get_parts(shapely.polygonize([noded])) if isinstance(f, Polygon)]

@@ -133,7 +133,7 @@ def _rows(fields: dict[str, Any], key: str, path: Path) -> list[Any]:
 
 
 def _coordinate_system(data: dict[str, Any], path: Path) -> str:
-    """How the vertices are given; the traffic editor's default are pixels."""
+    """Read how the vertices are given; the traffic editor's default are pixels."""
     system = data.get("coordinate_system", "reference_image")
     if system not in ("reference_image", "cartesian_meters"):
         raise InvalidInputError(
@@ -143,13 +143,13 @@ def _coordinate_system(data: dict[str, Any], path: Path) -> str:
 
 
 def _pixel(data: dict[str, Any], fields: dict[str, Any], path: Path) -> tuple[float, float]:
-    """Metres per pixel to the right and, since rows of a picture go down, per pixel of y."""
+    """Read metres per pixel to the right and, since rows of a picture go down, per pixel of y."""
     scale = _scale(data, fields, path)
     return (scale, -scale)
 
 
 def _scale(data: dict[str, Any], fields: dict[str, Any], path: Path) -> float:
-    """Metres per pixel: the mean of the level's measurements, else of another level's."""
+    """Read metres per pixel: the mean of the level's measurements, else of another level's."""
     for level in [fields, *(f for f in data["levels"].values() if isinstance(f, dict))]:
         values = [_measured(row, _rows(level, "vertices", path)) for row in _rows(level, "measurements", path)]
         usable = [value for value in values if value is not None]
@@ -178,7 +178,7 @@ def _vertex(row: Any, number: int, metres: tuple[float, float], path: Path) -> P
 
 
 def _segment(row: Any, vertices: Sequence[Point]) -> Segment | None:
-    """Between the two vertices whose numbers a row begins with."""
+    """Look up the two vertices whose numbers a row begins with."""
     try:
         first, second = int(row[0]), int(row[1])
         return (vertices[first], vertices[second]) if min(first, second) >= 0 else None
@@ -187,7 +187,7 @@ def _segment(row: Any, vertices: Sequence[Point]) -> Segment | None:
 
 
 def _parameter(row: Any, key: str) -> str:
-    """The value of a typed parameter ``{key: [type, value]}`` of a wall or door; empty without one."""
+    """Read a typed parameter ``{key: [type, value]}`` of a wall or door; empty without one."""
     try:
         return str(row[2][key][1]).strip()
     except (IndexError, KeyError, TypeError):
@@ -195,7 +195,7 @@ def _parameter(row: Any, key: str) -> str:
 
 
 def _door(row: Any, number: int, vertices: Sequence[Point], remarks: list[Remark]) -> RmfDoor | None:
-    """One door; what cannot be one is named in ``remarks``."""
+    """Read one door; what cannot be one is named in ``remarks``."""
     name = _parameter(row, "name") or f"doors[{number}]"
     segment = _segment(row, vertices)
     if segment is None or math.dist(*segment) < SHORTEST_DOOR:

@@ -80,7 +80,7 @@ def hull_areas(corners: Sequence[Sequence[Point]]) -> list[float]:
 
 
 def _on_grid(outline: Polygon) -> Polygon:
-    """An outline with its corners on a grid: corners that nearly meet a neighbour's would hide gaps."""
+    """Put an outline's corners on a grid: corners that nearly meet a neighbour's would hide gaps."""
     snapped = shapely.set_precision(shapely.set_precision(outline, GRID), 0.0)
     return snapped if isinstance(snapped, Polygon) and snapped.is_valid and not snapped.is_empty else outline
 

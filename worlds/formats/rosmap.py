@@ -84,7 +84,7 @@ def _checked(grid: OccupancyGrid, path: Path) -> OccupancyGrid:
 
 
 def _bordered(grid: OccupancyGrid) -> OccupancyGrid:
-    """The map with a ring of unknown cells around it: free space at its edge ends there."""
+    """Put a ring of unknown cells around the map: free space at its edge ends there."""
     frame = grid.frame
     around = GridFrame(
         frame.resolution,
@@ -97,7 +97,7 @@ def _bordered(grid: OccupancyGrid) -> OccupancyGrid:
 
 
 def _map(path: Path) -> RosMap:
-    """A map by its YAML, or a picture: with the YAML of its name beside it, else alone."""
+    """Read a map by its YAML, or a picture: with the YAML of its name beside it, else alone."""
     if path.suffix.lower() in {".yaml", ".yml"}:
         return read_ros_map(path)
     for suffix in (".yaml", ".yml"):
@@ -115,7 +115,7 @@ def _doors_beside(path: Path) -> Path | None:
 
 
 def _differences(plan: FloorPlan, grid: OccupancyGrid) -> list[Remark]:
-    """Cells of the map that the plan's true map shows otherwise, but in doorways."""
+    """Count cells of the map that the plan's true map shows otherwise, but in doorways."""
     true = rasterise(plan, grid.frame, Pose2())
     found = []
     lines = WallAxes(plan)

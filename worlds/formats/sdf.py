@@ -102,7 +102,7 @@ def _polyline(link: Element, name: str, points: list[tuple[float, float]]) -> No
 
 
 def _leaf(model: Element, name: str, leaf: BoxLeaf) -> None:
-    """A link whose origin is the hinge, or the middle of a sliding leaf, and the joint that holds it."""
+    """Add a link whose origin is the hinge, or the middle of a sliding leaf, and the joint that holds it."""
     box = leaf.box
     x, y = leaf.hinge if leaf.hinge is not None else (box.x, box.y)
     link = SubElement(model, "link", name=f"door_{name}")

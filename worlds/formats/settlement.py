@@ -83,7 +83,7 @@ def merged(remarks: Iterable[Remark]) -> list[Remark]:
 
 
 def _without_bad_passages(plan: FloorPlan) -> tuple[FloorPlan, list[Remark]]:
-    """The plan without the doors and openings that are not as they should be, each named with its reason."""
+    """Leave out doors and openings that are not as they should be, each named with its reason."""
     faults = passage_faults(plan)
     if not faults:
         return plan, []
@@ -99,7 +99,7 @@ def _without_bad_passages(plan: FloorPlan) -> tuple[FloorPlan, list[Remark]]:
 
 
 def _missing(plan: FloorPlan, source: Source, remarks: Sequence[Remark]) -> list[Remark]:
-    """Rooms and doors of the file that are neither in the plan nor named as dropped."""
+    """Count rooms and doors of the file that are neither in the plan nor named as dropped."""
     found = []
     for kinds, given, made in (
         (("rooms",), source.rooms, len(plan.rooms)),
@@ -113,7 +113,7 @@ def _missing(plan: FloorPlan, source: Source, remarks: Sequence[Remark]) -> list
 
 
 def _lost_walls(plan: FloorPlan, source: Source) -> list[Remark]:
-    """Walls of the file that the plan lacks, and walls of the plan that its solids lack."""
+    """Find walls of the file that the plan lacks, and walls of the plan that its solids lack."""
     lost = []
     passages = [shapely.LineString(passage.segment) for passage in plan.passages]
     lines = [shapely.LineString(wall.segment) for wall in plan.walls]
@@ -132,7 +132,7 @@ def _lost_walls(plan: FloorPlan, source: Source) -> list[Remark]:
 
 
 def _odd_scale(plan: FloorPlan, widths: Sequence[float]) -> list[Remark]:
-    """A warning where doors or rooms are of a size that no building has, with the scale that would fit."""
+    """Warn where doors or rooms are of a size that no building has, with the scale that would fit."""
     usable = [width for width in widths if math.isfinite(width)]
     if usable:
         median = float(np.median(usable))

@@ -82,7 +82,7 @@ def _text(plan: FloorPlan, picture: str, bounds: tuple[float, float, float, floa
 
 
 def _thing(thing: Furniture) -> str:
-    """A piece of furniture: Stage fits a block's box into the size of its model, around the model's pose."""
+    """Write furniture: Stage fits a block's box into the size of its model, around the model's pose."""
     x0, y0, x1, y1 = thing.polygon.bounds
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
     corners = thing.polygon.exterior.coords[:-1]

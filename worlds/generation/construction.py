@@ -76,7 +76,7 @@ def _place_all(passages: list[SketchPassage], edges: list[RoomEdge]) -> list[tup
 
 
 def _place(passage: SketchPassage, edges: list[RoomEdge], taken: list[Segment]) -> Segment | None:
-    """The passage on the longest free stretch between its rooms."""
+    """Place the passage on the longest free stretch between its rooms."""
     best: tuple[float, Segment] | None = None
     for edge in edges:
         if edge.rooms != passage.rooms:
@@ -93,7 +93,7 @@ def _place(passage: SketchPassage, edges: list[RoomEdge], taken: list[Segment]) 
 
 
 def _unreached(sketch: Sketch, passages: list[SketchPassage]) -> set[int]:
-    """Rooms that no passage connects to the corridor."""
+    """List rooms that no passage connects to the corridor."""
     reached, grown = {CORRIDOR}, True
     while grown:
         more = {room for p in passages if reached & {*p.rooms} for room in p.rooms} - reached

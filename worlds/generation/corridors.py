@@ -72,7 +72,7 @@ class Measures:
 
 
 def _step(value: float) -> float:
-    """Rounded to a building grid of 0.1 m."""
+    """Round to a building grid of 0.1 m."""
     return round(value * 10) / 10
 
 
@@ -150,7 +150,7 @@ SHAPES: dict[str, Callable[[np.random.Generator, Measures], Skeleton]] = {
 
 
 def _sides(rng: np.random.Generator, m: Measures, legs: int) -> list[tuple[float, float]]:
-    """Depths to the left and right of each leg; one leg may have rooms on one side only."""
+    """Draw depths to the left and right of each leg; one leg may have rooms on one side only."""
     sides = [(m.depths[0], m.depths[1])] * legs
     if rng.random() < 0.35:
         leg, side = int(rng.integers(legs)), int(rng.integers(2))
@@ -164,7 +164,7 @@ def _shift(point: Point, angle: float, along: float, left: float) -> Point:
 
 
 def _along(points: list[Point], m: Measures, sides: list[tuple[float, float]]) -> Skeleton:
-    """A corridor along a polyline, with runs on both sides of each leg."""
+    """Draw a corridor along a polyline, with runs on both sides of each leg."""
     w = m.width
     angles = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in itertools.pairwise(points)]
     turns = [0.0, *(math.remainder(b - a, 2 * math.pi) for a, b in itertools.pairwise(angles)), 0.0]
@@ -189,7 +189,7 @@ def _along(points: list[Point], m: Measures, sides: list[tuple[float, float]]) -
 
 
 def _branched(rng: np.random.Generator, m: Measures, angle: float) -> Skeleton:
-    """A straight corridor with a branch to its left at ``angle``."""
+    """Draw a straight corridor with a branch to its left at ``angle``."""
     w = m.width
     at = _step(m.legs[0] * rng.uniform(0.35, 0.65))
     end = (at + m.legs[1] * math.cos(angle), m.legs[1] * math.sin(angle))

@@ -74,14 +74,14 @@ def _furnish_room(rng: np.random.Generator, label: str, interior: Polygon, doors
 
 
 def _passable(interior: Polygon, things: list[Polygon], doors: list[LineString]) -> bool:
-    """Whether what a robot can reach stays in one piece that touches every door."""
+    """Check whether what a robot can reach stays connected and touches every door."""
     free = interior.buffer(0.05).difference(shapely.union_all(things)).buffer(-ROBOT_CLEAR)
     parts = [part for part in shapely.get_parts(free) if part.area > 0.2]
     return len(parts) == 1 and all(parts[0].distance(door) < 0.8 for door in doors)
 
 
 def _frame(interior: Polygon) -> tuple[float, Point]:
-    """Direction of the longer side of a room [rad], and its middle."""
+    """Find the direction of the longer side of a room [rad], and its middle."""
     box = shapely.get_coordinates(shapely.minimum_rotated_rectangle(interior))
     sides = np.diff(box[:3], axis=0)
     dx, dy = sides[int(np.argmax(np.hypot(sides[:, 0], sides[:, 1])))]
@@ -96,7 +96,7 @@ def _box(x: float, y: float, angle: float, item: _Item) -> Polygon:
 
 
 def _rows(label: str, interior: Polygon) -> list[Polygon]:
-    """Tables in rows across the room, with aisles between them."""
+    """Put tables in rows across the room, with aisles between them."""
     item = IN_ROWS.get(label)
     if item is None:
         return []
@@ -121,7 +121,7 @@ def _middle_table(label: str, interior: Polygon) -> list[Polygon]:
 
 
 def _wall_items(rng: np.random.Generator, label: str, interior: Polygon) -> list[Polygon]:
-    """Things with their back to a wall, at random places."""
+    """Put things with their back to a wall, at random places."""
     items, density = next(value for word, value in ALONG_WALLS.items() if word in label)
     if not items:
         return []

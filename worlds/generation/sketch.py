@@ -87,7 +87,7 @@ def _draw_run(rng: np.random.Generator, kind: str, run: Run, sketch: Sketch, cou
 
 
 def _depth(rng: np.random.Generator, run: Run, bay: Bay, width: float, section: float, previous: float) -> float:
-    """Depth of a bay [m]: that of its section, a wide one also its own; small steps in the outline are left out."""
+    """Choose the depth of a bay [m]: of its section, a wide one also its own; small steps are left out."""
     if run.deepest <= run.depth:
         return run.depth
     own = bay.shallow if bay.shallow < 1.0 else bay.deep
@@ -184,7 +184,7 @@ def _door_width(rng: np.random.Generator) -> float:
 
 
 def _door_place(rng: np.random.Generator, bay: Bay) -> float:
-    """Where along its wall a door stands, 0 to 1: near a corner as a rule."""
+    """Draw where along its wall a door stands, 0 to 1: near a corner as a rule."""
     draw = float(rng.random())
     if bay.widths[1] > 6.5 and draw < 0.25:
         return 0.5
