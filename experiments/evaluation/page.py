@@ -1,7 +1,8 @@
 """One HTML page that needs no network: pictures are inside it, tables sort by a script of a few lines.
 
 Words stand to the left, numbers in line at their points; a table that is wider than the window moves by itself under
-its first column. A section names the CSV files that its figures are in, beside the page.
+its first column, in a narrow window it stands row by row. A section names the CSV files that its figures are in, beside
+the page.
 """
 
 import base64
@@ -25,7 +26,7 @@ div.table { overflow-x: auto; margin: 1em 0; max-width: 100%; }
 table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; }
 caption { text-align: left; font-weight: 600; padding: 3px 0; white-space: nowrap; }
 th, td { padding: 3px 9px; text-align: left; border-bottom: 1px solid #ddd; vertical-align: top; }
-th { vertical-align: bottom; cursor: pointer; white-space: nowrap; }
+th { vertical-align: bottom; cursor: pointer; }
 th::after { content: "\\2009\\2195"; color: #bbb; } th.up::after { content: "\\2009\\2191"; color: #222; }
 th.down::after { content: "\\2009\\2193"; color: #222; }
 td { max-width: 30em; overflow-wrap: break-word; } td.number { white-space: pre; }
@@ -33,7 +34,13 @@ th.number, td.number { text-align: right; }
 th:first-child, td:first-child { position: sticky; left: 0; background: #fff; }
 @media (max-width: 700px) {
   body { margin: 1em auto; padding: 0 0.6em; } th, td { padding: 3px 6px; } td { max-width: 15em; }
-  th:first-child, td:first-child { max-width: 9em; overflow-wrap: anywhere; white-space: normal; }
+  table.wide, table.wide tbody, table.wide thead, table.wide td { display: block; }
+  table.wide tr { display: flex; flex-wrap: wrap; } table.wide th { border: 0; }
+  table.wide td { flex: 1 1 7em; max-width: none; border: 0; padding: 1px 6px; text-align: left; }
+  table.wide td::before { content: attr(data-head) " "; color: #888; font-size: 11px; }
+  table.wide td:first-child, table.wide td:not(.number) { flex-basis: 100%; } table.wide td:empty { display: none; }
+  table.wide td:first-child { font-weight: 600; } table.wide td:first-child::before { content: ""; }
+  table.wide tbody tr { border-bottom: 1px solid #ddd; padding: 4px 0; }
 }
 """
 # A click on a head sorts by that column, a second one the other way round; what is empty stays last.
@@ -52,6 +59,8 @@ document.querySelectorAll("th").forEach(head => head.addEventListener("click", (
   }).forEach(line => body.append(line));
 }));
 """
+# A table of more columns stands in a narrow window row by row, each figure with its title.
+MOST_COLUMNS = 5
 # A point and a digit that nothing is seen of, of the same widths: they keep shorter numbers in line.
 NO_POINT, NO_DIGIT = "\u2008", "\u2007"
 
@@ -126,25 +135,29 @@ def _section(section: Section) -> Iterator[str]:
 
 
 def _table(table: Table) -> Iterator[str]:
-    head, *body = table.rows
+    head, *body = _without_empty_columns(table.rows)
     if not body:
         return
     columns = [[row[at] for row in body] for at in range(len(head))]
     numbers = [_is_number(column) for column in columns]
     shown = [_in_line(column) if number else column for column, number in zip(columns, numbers, strict=True)]
     kinds = [' class="number"' if number else "" for number in numbers]
-    yield '<div class="table"><table>'
+    wide = ' class="wide"' if len(head) > MOST_COLUMNS else ""
+    yield f'<div class="table"><table{wide}>'
     if table.caption:
         yield f"<caption>{_text(table.caption)}</caption>"
     cells = "".join(f"<th{kind}>{_text(value)}</th>" for kind, value in zip(kinds, head, strict=True))
     yield f"<thead><tr>{cells}</tr></thead><tbody>"
     for row, texts in zip(body, zip(*shown, strict=True), strict=True):
-        cells = "".join(
-            f"<td{kind}{_value(value) if kind else ''}>{_text('' if text is None else text)}</td>"
-            for kind, value, text in zip(kinds, row, texts, strict=True)
-        )
+        cells = "".join(map(_cell, head, kinds, row, texts))
         yield f"<tr>{cells}</tr>"
     yield "</tbody></table></div>"
+
+
+def _without_empty_columns(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
+    head, *body = rows
+    kept = [at for at in range(len(head)) if at == 0 or any(row[at] is not None for row in body)]
+    return [[row[at] for at in kept] for row in rows] if body else [list(head)]
 
 
 def _is_number(column: Sequence[Any]) -> bool:
@@ -153,9 +166,10 @@ def _is_number(column: Sequence[Any]) -> bool:
     return bool(values) and all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
 
 
-def _value(value: Any) -> str:
-    """What a cell is sorted by."""
-    return f' data-value="{"" if value is None else value}"'
+def _cell(title: Any, kind: str, value: Any, text: Any) -> str:
+    """A cell with its title, and where it is a number with what it is sorted by."""
+    sorted_by = f' data-value="{"" if value is None else value}"' if kind else ""
+    return f'<td{kind} data-head="{_text(title)}"{sorted_by}>{_text("" if text is None else text)}</td>'
 
 
 def _in_line(column: Sequence[Any]) -> list[str]:

@@ -46,6 +46,22 @@ def test_whole_numbers_among_fractions_keep_their_place(tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
+def test_a_column_without_a_value_is_left_out(tmp_path: Path) -> None:
+    write_page(
+        tmp_path / "a.html", "a", [Section("b", tables=[Table([["x", "p", "y"], [1, None, 2], [3, None, None]])])]
+    )
+    assert [text for _, text in cells((tmp_path / "a.html").read_text(), "th")] == ["x", "y"]
+
+
+def test_a_table_of_many_columns_stands_row_by_row_in_a_narrow_window(tmp_path: Path) -> None:
+    for count in (5, 6):
+        table = Table([[f"c{at}" for at in range(count)], list(range(count))])
+        write_page(tmp_path / f"{count}.html", "a", [Section("b", tables=[table])])
+    assert 'class="wide"' not in (tmp_path / "5.html").read_text()
+    assert 'class="wide"' in (tmp_path / "6.html").read_text()
+    assert 'data-head="c3"' in (tmp_path / "6.html").read_text()
+
+
 def test_a_section_names_the_files_of_its_figures_and_an_empty_table_is_left_out(tmp_path: Path, page: Path) -> None:
     assert '<a href="summary.csv">summary.csv</a>' in page.read_text()
     write_page(tmp_path / "empty.html", "a", [Section("b", tables=[Table([["x"]]), Table([[]])])])
