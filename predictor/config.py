@@ -53,6 +53,9 @@ class LinesConfig:
     min_line_wall: float = 1.5
     """A line needs wall along this much of it [m], seen from one side or both; less is a jamb or clutter."""
 
+    minor_reach: float = 5.0
+    """A line of a direction other than the two main ones reaches so far beyond its walls, then to the next line [m]."""
+
     border_margin: float = 1.0
     """Distance of the boundary lines from the outermost segments [m]."""
 

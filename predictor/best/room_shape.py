@@ -1,6 +1,7 @@
 """From the chosen rectangles to rooms: what known space leaves of each, up to the leaves of its doors (``best``)."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -24,6 +25,8 @@ SIMPLIFY = in_cells(0.1)
 # Walls of known space as thick as the room's own are taken off and strips narrower than this are no room [cells]; in an
 # alcove narrower than the walls around it, both are thin.
 NARROW, ALCOVE_WALL, ALCOVE_NARROW = in_cells(0.35), in_cells(0.05), in_cells(0.15)
+# A room lies right behind a door where it holds the place so far behind its leaf [m].
+AT_LEAF = 0.5
 # Of several pieces of a room, one so far from the door counts half [cells].
 HALF_WORTH = in_cells(1.0)
 # A room that leaves what is known by this lies beyond it; rooms with a wall and this between them are neighbours where
@@ -57,7 +60,25 @@ def trace_rooms(
         kind = _name_kind(choice.corners, others, scene.grid, in_cells(scene.walls.usual))
         rooms.append(Room(shape, names, kind, round(choice.score, 9), choice.cut))
     apart, without = part_rooms(rooms, {door.door.id: door.door.midpoint for door in facing})
-    return apart, failures | without
+    for opening in openings:
+        if opening is not None and opening.door.door.id in without:
+            apart = _lead_into(apart, opening, scene.grid.frame.resolution)
+    found = {door for room in apart for door in room.doors}
+    return apart, {door: reason for door, reason in (failures | without).items() if door not in found}
+
+
+def _lead_into(rooms: list[Room], opening: Doorway, resolution: float) -> list[Room]:
+    """Lead a door whose floor a better room has taken into that room, where it lies right behind the leaf."""
+    door = opening.door
+    behind = shapely.Point(door.middle + (opening.leaf + AT_LEAF) * door.inward)
+    found = []
+    for room in rooms:
+        shape = room.polygon
+        if not isinstance(shape, Polygon) or not shape.contains(behind):
+            found.append(room)
+            continue
+        found.append(replace(room, polygon=opening.joined(shape, resolution), doors=(*room.doors, door.door.id)))
+    return found
 
 
 def trace_room(scene: Scene, choice: Choice, corners: FloatArray, openings: Sequence[Doorway | None]) -> Polygon | None:

@@ -24,7 +24,7 @@ SNAP = 1e-7
 class Arrangement:
     """Faces of the lines inside the box of the boundary lines.
 
-    Every face is convex: it lies between full lines.
+    Every face is convex: it lies between full lines, and lines that end at full ones.
 
     Attributes:
         lines: All lines, the boundary included.
@@ -62,7 +62,8 @@ def arrange(lines: Sequence[Line], boundary: Sequence[Line]) -> Arrangement:
     box = box_of(boundary)
     reach = 2.0 * float(np.hypot(*np.ptp(shapely.get_coordinates(box), axis=0))) + 1.0
     centre = np.array(box.centroid.coords[0])
-    strings = [_string(line, centre, reach) for line in (*lines, *boundary)]
+    full = [line for line in (*lines, *boundary) if line.span is None]
+    strings = [draw_line(line, full, centre, reach) for line in (*lines, *boundary)]
     noded = shapely.unary_union(shapely.multilinestrings(strings))
     pieces = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
     middles = shapely.get_coordinates(shapely.centroid(pieces))
@@ -93,10 +94,23 @@ def _crossing(a: Line, b: Line) -> FloatArray:
     return np.asarray(np.linalg.solve(np.stack((a.normal, b.normal)), np.array([a.offset, b.offset])))
 
 
-def _string(line: Line, centre: FloatArray, reach: float) -> LineString:
-    """Draw the line where it passes ``centre``, ``reach`` to either side: beyond the box, so no end is on its edge."""
+def draw_line(line: Line, full: Sequence[Line], centre: FloatArray, reach: float) -> LineString:
+    """Draw a line where it passes ``centre``, ``reach`` both ways: beyond the box, so that no end lies on its edge.
+
+    A line with a span ends at the last of the ``full`` lines that it crosses before that, and at the first after it.
+    """
     foot = centre - line.distance(centre) * line.normal
-    return LineString((foot - reach * line.along, foot + reach * line.along))
+    low, high = -reach, reach
+    if line.span is not None:
+        begin, end = (place - float(foot @ line.along) for place in line.span)
+        slopes = np.array([other.normal @ line.along for other in full])
+        apart = np.array([other.distance(foot) for other in full])
+        crossed = np.abs(slopes) > 1e-9
+        places = -apart[crossed] / slopes[crossed]
+        # A hair further, so that noding finds the crossing.
+        low = max(low, float(places[places <= begin].max(initial=low)) - MIN_EDGE / 2)
+        high = min(high, float(places[places >= end].min(initial=high)) + MIN_EDGE / 2)
+    return LineString((foot + low * line.along, foot + high * line.along))
 
 
 def _ordered(faces: Geometries) -> tuple[Polygon, ...]:

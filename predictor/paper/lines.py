@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 import shapely
 
-from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.predictor.config import LinesConfig
 from closedrooms.predictor.paper.directions import Directions, angle_between
 
@@ -16,17 +16,19 @@ LineKind = Literal["wall", "border", "split"]
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A full line: all points p with ``p . normal == offset``, normal ``(-sin(angle), cos(angle))``.
+    """A line: points p with ``p . normal == offset``, normal ``(-sin(angle), cos(angle))``.
 
     Attributes:
         angle: Direction in [0, pi) [rad].
         offset: Signed distance from the map's origin [m].
         kind: ``wall`` (representative of observed walls), ``border`` (boundary), ``split`` (between two doors).
+        span: From where to where along it it must reach [m]; it goes on to the next full line. ``None`` for a full one.
     """
 
     angle: float
     offset: float
     kind: LineKind = "wall"
+    span: tuple[float, float] | None = None
 
     @property
     def along(self) -> FloatArray:
@@ -59,6 +61,7 @@ def find_lines(segments: FloatArray, directions: Directions, config: LinesConfig
     """
     lines: list[Line] = []
     labels = np.full(len(segments), -1, dtype=np.int64)
+    minor = _find_minor(directions.angles, config.angle_bandwidth)
     for cluster, angle in enumerate(directions.angles):
         members = np.flatnonzero(directions.labels == cluster)
         axes = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
@@ -68,8 +71,18 @@ def find_lines(segments: FloatArray, directions: Directions, config: LinesConfig
             if _covered(ends[inside]) < config.min_line_wall:
                 continue
             labels[members[inside]] = len(lines)
-            lines.append(Line(float(angle), offset))
+            along = ends[inside][..., 0]
+            span = (float(along.min()) - config.minor_reach, float(along.max()) + config.minor_reach)
+            lines.append(Line(float(angle), offset, span=span if minor[cluster] else None))
     return tuple(lines), labels
+
+
+def _find_minor(angles: FloatArray, bandwidth: float) -> BoolArray:
+    """Find the directions that are neither the strongest nor across it, shape (k,)."""
+    if not len(angles):
+        return np.zeros(0, dtype=np.bool_)
+    apart = np.abs(angle_between(angles, angles[0]))
+    return np.asarray(np.minimum(apart, np.abs(apart - np.pi / 2)) > bandwidth)
 
 
 def _chain(ends: FloatArray, reach: float) -> IntArray:

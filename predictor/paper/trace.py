@@ -3,6 +3,7 @@
 import numpy as np
 import shapely
 
+from closedrooms.predictor.paper.arrangement import draw_line
 from closedrooms.predictor.paper.expansion import Growth
 from closedrooms.predictor.paper.finished_rooms import unite
 from closedrooms.predictor.paper.initial_layouts import Start
@@ -31,9 +32,9 @@ def trace_of(start: Start, levels: list[Level]) -> PredictionTrace:
     reach = float(np.hypot(box.bounds[2] - box.bounds[0], box.bounds[3] - box.bounds[1]))
     centre = np.array(box.centroid.coords[0])
     clipped = []
+    full = [line for line in arrangement.lines if line.span is None]
     for line in arrangement.lines:
-        foot = centre - line.distance(centre) * line.normal
-        string = shapely.LineString((foot - reach * line.along, foot + reach * line.along))
+        string = draw_line(line, full, centre, reach)
         clipped.append(shapely.get_coordinates(string.intersection(box.buffer(1e-6)))[[0, -1]].ravel())
     return PredictionTrace(
         segments=start.structure.segments,

@@ -121,9 +121,13 @@ def test_rooms_of_any_closed_set_are_disjoint(mapped, method, closed) -> None:
     assert _shared(predict(scene.grid, scene.doors, method).rooms) < ROUNDING
 
 
-def test_of_two_facing_doors_one_keeps_the_floor_and_a_door_without_any_says_so() -> None:
-    grid, doors = _pocket(3.0, [(6.0, False), (6.0, True)])
+@pytest.mark.parametrize("depth", [1.5, 2.0, 3.0])
+def test_a_door_whose_floor_another_room_has_taken_leads_into_that_room(depth: float) -> None:
+    grid, doors = _pocket(depth, [(6.0, False), (6.0, True)])
     found = predict(grid, doors, "best")
     assert _shared(found.rooms) < ROUNDING
-    assert set(found.failures.values()) <= {NO_ROOM}
-    assert found.rooms
+    assert {door for room in found.rooms for door in room.doors} == {"d0", "d1"}
+    assert not found.failures
+    for door in doors:
+        row, col = found.grid.frame.to_cells(np.array(door.midpoint)).tolist()
+        assert found.grid.free[row, col]

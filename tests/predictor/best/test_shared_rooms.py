@@ -191,7 +191,7 @@ def _options(scores: list[float]) -> Hypotheses:
 def test_larger_sets_of_doors_go_first_and_no_door_goes_twice() -> None:
     shared = {doors: [_options([1.0])] for doors in ((0, 1), (1, 2), (0, 1, 2), (3, 4), (4, 5))}
     proposals = Proposals([_options([2.0, 1.0])] * 6, shared)
-    rated = {(0, 1): 0.9, (1, 2): 0.8, (0, 1, 2): 0.6, (3, 4): 0.55, (4, 5): 0.7}
+    rated = {(0, 1): 0.95, (1, 2): 0.9, (0, 1, 2): 0.85, (3, 4): 0.82, (4, 5): 0.88}
     assert set(group_doors(rated, proposals)) == {(0, 1, 2), (4, 5)}
     assert set(group_doors(rated | {(0, 1, 2): 0.5}, proposals)) == {(0, 1), (4, 5)}
 

@@ -157,3 +157,23 @@ def test_doors_on_one_edge_are_parted_in_the_middle():
     assert len(set(faces)) == 3
     for a, b in itertools.pairwise(faces):
         assert b in again.neighbours[a]
+
+
+def test_a_line_with_a_span_ends_at_full_lines() -> None:
+    # A grid of 2 m; a slanted line whose walls lie in the cell around the origin.
+    places = (-3.0, -1.0, 1.0, 3.0)
+    full = [Line(math.pi / 2, -x) for x in places] + [Line(0.0, y) for y in places]
+    whole = arrange(full, BOX)
+    slanted = Line(math.pi / 4, 0.3, span=(-0.5, 0.5))
+    cut = arrange([*full, slanted], BOX)
+    # y = x + 0.3 sqrt(2) enters at x = -1 and leaves at y = 1: that cell alone falls in two.
+    assert len(cut.faces) == len(whole.faces) + 1
+    own = shapely.box(-1.0, -1.0, 1.0, 1.0).buffer(1e-3)
+    corner = (1.0 - (-1.0 + 0.3 * math.sqrt(2))) ** 2 / 2
+    areas = sorted(face.area for face in cut.faces if own.contains(face))
+    assert areas == pytest.approx([corner, 4.0 - corner], abs=1e-3)
+    # One that reaches further cuts as many cells as it crosses, one without a span all of them.
+    longer = arrange([*full, Line(math.pi / 4, 0.3, span=(-2.0, 2.0))], BOX)
+    everywhere = arrange([*full, Line(math.pi / 4, 0.3)], BOX)
+    assert len(cut.faces) < len(longer.faces) < len(everywhere.faces)
+    assert all(face.area == pytest.approx(face.convex_hull.area, abs=1e-9) for face in longer.faces)

@@ -96,6 +96,19 @@ def test_oblique_walls_count_only_with_a_fair_share_of_the_strongest_direction(s
     assert (np.abs(angle_between(found.angles, 0.6)).min() < 0.01) == counts
 
 
+@pytest.mark.parametrize("main", [0.0, 0.4])
+def test_lines_of_a_slanted_wing_reach_a_room_beyond_its_walls(main):
+    across = main + math.pi / 2
+    segments = np.vstack(
+        [_segment(main, 0.0, -20.0, 20.0), _segment(across, 0.0, -15.0, 15.0), _segment(main + 0.6, 3.0, 8.0, 18.0)]
+    )
+    lines, _ = find_lines(segments, _directions(segments), LinesConfig(minor_reach=5.0))
+    spans = {round(float(angle_between(line.angle, main)), 2): line.span for line in lines}
+    assert spans.pop(0.6) == pytest.approx((3.0, 23.0), abs=0.2)
+    assert len(spans) == 2
+    assert not any(spans.values())
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_each_mode_is_the_mean_of_what_lies_around_it(seed):
     rng = np.random.default_rng(seed)
