@@ -19,6 +19,7 @@ import random
 import re
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -189,6 +190,8 @@ def fate(root: Path, mutant: Mutant, pytest: str) -> tuple[str, str]:
 
 
 def _end_hangs() -> None:
+    # A job in the background of a script ignores Ctrl-C, and so would the tests of it.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     resource.setrlimit(resource.RLIMIT_CPU, (HANGS, HANGS))
 
 
