@@ -12,10 +12,18 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from closedrooms.cli.usage import UsageError
-from closedrooms.core.errors import ClosedroomsError, OutputError
+from closedrooms.core.errors import ClosedroomsError, OutputError, reason
 from closedrooms.core.files.unfinished import remove_unfinished
 from closedrooms.core.runtime.packages import missing_package, require
-from closedrooms.core.runtime.stopping import SIGNALS, Stop, Terminated, end_in_time, leave_at_once, stopping
+from closedrooms.core.runtime.stopping import (
+    SIGNALS,
+    Stop,
+    Terminated,
+    end_in_time,
+    leave_at_once,
+    leave_if_stuck,
+    stopping,
+)
 
 DONE, BAD_INPUT, WRONG_USAGE, PARTLY_FAILED, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 # Failures that are named on the terminal; the rest stands in files.
@@ -33,10 +41,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _own_process()
     try:
         with stopping() as stop:
-            return _status(list(sys.argv[1:] if arguments is None else arguments), stop)
+            status = _status(list(sys.argv[1:] if arguments is None else arguments), stop)
     except Terminated:
         # While the work was just done, or had not begun.
-        return stop.status
+        status = stop.status
+    except Exception as error:
+        # A defect of ours. Who calls this function sees where; a user does with -v.
+        if arguments is not None or {"-v", "--verbose"} & set(sys.argv):
+            raise
+        _complain(f"{reason(error)}; -v shows where")
+        status = BAD_INPUT
+    if arguments is None:
+        leave_if_stuck(status)
+    return status
 
 
 def _own_process() -> None:
@@ -81,6 +98,10 @@ def _status(words: list[str], stop: Stop) -> int:
     except ClosedroomsError as error:
         if not stop:
             _complain(str(error))
+            return BAD_INPUT
+    except MemoryError:
+        if not stop:
+            _complain("more memory than there is; expected smaller input, or settings that ask for less")
             return BAD_INPUT
     except KeyboardInterrupt:
         stop.number = stop.number or INTERRUPTED - 128

@@ -14,6 +14,7 @@ from closedrooms.cli.settings import field_values
 from closedrooms.cli.usage import UsageError
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.nearest import unknown
+from closedrooms.core.runtime.options import check_numbers
 
 HELP, HELP_ALL = {"-h", "--help"}, "--help-all"
 # Of these a command takes one; the line's takes the place of another one in the file.
@@ -129,9 +130,18 @@ def _same(value: Any) -> Any:
 
 
 def configured(options: Any) -> Any:
-    """Build the configuration from the options of a command."""
+    """Build the configuration from the options of a command.
+
+    Raises:
+        InvalidInputError: A setting that no honest user sets (:func:`closedrooms.core.runtime.options.check_numbers`).
+    """
     config = load(options.about["command"].config)
-    return config(**{item.name: getattr(options, item.name) for item in fields(config) if item.init})
+    made = config(**{item.name: getattr(options, item.name) for item in fields(config) if item.init})
+    try:
+        check_numbers(made)
+    except InvalidInputError as error:
+        raise InvalidInputError(str(error), where=options.about["file"] or "") from error
+    return made
 
 
 def option_names(options: type[Any]) -> list[str]:

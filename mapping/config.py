@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.numbers import COARSEST, FINEST
+from closedrooms.core.runtime.options import check_magnitudes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +73,11 @@ class MatcherConfig:
     odometry_floor: float = 0.004
     """Standard deviation of the odometry that is left when the robot hardly moves [m] and, halved, [rad]."""
 
+    def __post_init__(self) -> None:
+        check_magnitudes(
+            self, owner="matcher", positive=("point_spacing", "max_points", "iterations"), field_sigma=(0.01, 0.5)
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class LoopConfig:
@@ -139,6 +145,9 @@ class LoopConfig:
     point_information: float = 2.0
     """Information of a match per unit of the field's curvature; gives about 1.5 cm in a room."""
 
+    def __post_init__(self) -> None:
+        check_magnitudes(self, owner="loops", positive=("max_points", "kernel"))
+
 
 @dataclass(frozen=True, kw_only=True)
 class RecoveryConfig:
@@ -193,6 +202,9 @@ class RecoveryConfig:
     max_turn_rate: float = 8.0
     """Turn rate beyond which a step of the odometry is none [rad/s]."""
 
+    def __post_init__(self) -> None:
+        check_magnitudes(self, owner="recovery", positive=())
+
 
 @dataclass(frozen=True, kw_only=True)
 class MapperConfig:
@@ -235,6 +247,5 @@ class MapperConfig:
     """Failing odometry."""
 
     def __post_init__(self) -> None:
-        for name in ("resolution", "keyframe_distance", "keyframe_angle", "max_range"):
-            if not getattr(self, name) > 0.0:
-                raise InvalidInputError(f"mapper {name} {getattr(self, name)}", expected="a number above 0")
+        positive = ("keyframe_distance", "keyframe_angle", "max_range", "log_odds_limit")
+        check_magnitudes(self, owner="mapper", positive=positive, resolution=(FINEST, COARSEST))

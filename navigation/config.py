@@ -3,6 +3,7 @@
 from dataclasses import dataclass, fields
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.numbers import bounded
 from closedrooms.core.robot import RobotConfig
 
 # Distances that were set for a small robot are at least so much longer than the clearance that a wide one needs [m].
@@ -97,8 +98,6 @@ class NavigationConfig:
     def __post_init__(self) -> None:
         for name in (
             "preferred_clearance",
-            "planning_resolution",
-            "frontier_resolution",
             "lookahead",
             "time_limit",
             "cpu_limit",
@@ -106,6 +105,9 @@ class NavigationConfig:
         ):
             if not getattr(self, name) > 0:
                 raise InvalidInputError(f"navigation {name} {getattr(self, name)}", expected="a number above 0")
+        for name in ("planning_resolution", "frontier_resolution"):
+            # Finer cells of a building are more than the memory holds, coarser ones wider than its doors.
+            bounded(getattr(self, name), 0.02, 1.0, name=f"navigation {name}", unit="m")
         if not self.braking_reserve >= 1.0:
             raise InvalidInputError(f"navigation braking_reserve {self.braking_reserve}", expected="a number from 1 on")
 

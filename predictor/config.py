@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 from typing import Literal
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.numbers import COARSEST, FINEST, bounded
 
 Phi = Literal["as-run", "as-printed"]
 RoomOrder = Literal["smallest-first", "largest-first", "by-position"]
@@ -60,8 +61,12 @@ class LinesConfig:
     """Distance of the boundary lines from the outermost segments [m]."""
 
     def __post_init__(self) -> None:
-        positive = ("resolution", "hough_votes", "hough_angle", "angle_bandwidth", "border_margin")
+        positive = ("hough_votes", "border_margin", "collinear_distance")
         _check_numbers(self, positive)
+        bounded(self.resolution, FINEST, COARSEST, name="resolution", unit="m")
+        # Finer steps than a cell seen from 50 m ask for gigabytes of votes.
+        bounded(self.hough_angle, 1e-3, math.pi / 2, name="hough_angle", unit="rad")
+        bounded(self.angle_bandwidth, 1e-3, math.pi / 4, name="angle_bandwidth", unit="rad")
         if self.canny_aperture not in {3, 5, 7}:
             raise InvalidInputError(f"canny_aperture {self.canny_aperture}", expected="3, 5 or 7")
 

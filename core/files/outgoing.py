@@ -14,13 +14,21 @@ import stat
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextvars import ContextVar
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files.incoming import read_json
 from closedrooms.core.files.schema import KEY, SCHEMA, check_schema
-from closedrooms.core.files.unfinished import clear_files, clear_folders, part_of_file, part_of_folder, unfinished
+from closedrooms.core.files.unfinished import (
+    clear_files,
+    clear_folders,
+    final_place,
+    part_of_file,
+    part_of_folder,
+    unfinished,
+)
 from closedrooms.core.names import short_name
 
 MANIFEST = "run.json"
@@ -28,8 +36,24 @@ PROGRAM = "closedrooms"
 SUMS = "sha256"
 """Key of the manifest: SHA-256 of every file by its path in the folder; of the manifest itself without its entry."""
 MAX_MANIFEST = 50_000_000
-_CLAIMED: ContextVar[dict[Path, tuple[int, ...] | None] | None] = ContextVar("claimed", default=None)
-"""Files that :func:`new_files` is going to write, with what stood there when it began."""
+
+
+@dataclass(slots=True)
+class _Claims:
+    """Files that :func:`new_files` is going to write.
+
+    Attributes:
+        before: What stood there when it began.
+        parts: Those that are whole by now, under their temporary names.
+        open: Removes the temporary ones in the end.
+    """
+
+    before: dict[Path, tuple[int, ...] | None]
+    parts: dict[Path, Path] = field(default_factory=dict)
+    open: contextlib.ExitStack = field(default_factory=contextlib.ExitStack)
+
+
+_CLAIMED: ContextVar[_Claims | None] = ContextVar("claimed", default=None)
 
 
 def write_bytes(path: Path, data: bytes) -> None:
@@ -48,42 +72,50 @@ def write_bytes(path: Path, data: bytes) -> None:
 def new_file(path: Path) -> Iterator[BinaryIO]:
     """Open a file under a temporary name, that takes the place of ``path`` when the block ends well.
 
+    Inside :func:`new_files` it does so when all of them are whole.
+
     Raises:
         OutputError: The folder is missing, read-only or full.
     """
     _check_name(path)
-    with clear_errors(path):
+    claims, place = _CLAIMED.get(), path.absolute()
+    with clear_errors(path), contextlib.ExitStack() as here:
         clear_files(path)
         temporary = part_of_file(path)
-        with unfinished(temporary, path):
-            with temporary.open("wb") as file:
-                yield file
-                file.flush()
-                os.fsync(file.fileno())
-            _put(temporary, path)
-
-
-def _put(temporary: Path, path: Path) -> None:
-    """Move a whole file to its place; inside :func:`new_files` only there where nothing has appeared or changed."""
-    claimed = _CLAIMED.get()
-    if claimed is None or path.absolute() not in claimed:
-        temporary.replace(path)
-        return
-    before = claimed.pop(path.absolute())
-    if before is None:
-        # A link is made only where there is nothing, in one step.
-        try:
-            os.link(temporary, path)
-        except FileExistsError:
-            raise OutputError(f"a file has appeared at the output meanwhile; expected none: {path}") from None
-        except OSError:  # a file system without links
-            if os.path.lexists(path):
-                raise OutputError(f"a file has appeared at the output meanwhile; expected none: {path}") from None
+        claimed = claims is not None and place in claims.before
+        if claims is None or place not in claims.parts:
+            (claims.open if claims is not None and claimed else here).enter_context(unfinished(temporary, path))
+        with temporary.open("wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        if claims is not None and claimed:
+            claims.parts[place] = temporary
+        else:
             temporary.replace(path)
-    elif before != _identity(path):
-        raise OutputError(f"the output was changed meanwhile; expected the file that was there before: {path}")
-    else:
-        temporary.replace(path)
+
+
+def _put(claims: _Claims) -> None:
+    """Move whole files to their places, only there where nothing has appeared or changed."""
+    for path in claims.parts:
+        _check_unchanged(path, claims.before[path])
+    for path, temporary in claims.parts.items():
+        if claims.before[path] is None:
+            # A link is made only where there is nothing, in one step; not every file system has links.
+            with contextlib.suppress(OSError):
+                os.link(temporary, path)
+                continue
+            _check_unchanged(path, None)
+        with clear_errors(path):
+            temporary.replace(path)
+
+
+def _check_unchanged(path: Path, before: tuple[int, ...] | None) -> None:
+    if before == _identity(path):
+        return
+    if before is None:
+        raise OutputError(f"a file has appeared at the output meanwhile; expected none: {path}")
+    raise OutputError(f"the output was changed meanwhile; expected the file that was there before: {path}")
 
 
 def _identity(path: Path) -> tuple[int, ...] | None:
@@ -135,10 +167,10 @@ def check_new_files(paths: Iterable[Path], *, force: bool = False, sources: Iter
 
 @contextlib.contextmanager
 def new_files(paths: Iterable[Path], *, force: bool = False, sources: Iterable[Path] = ()) -> Iterator[None]:
-    """Write single files inside the block: :func:`check_new_files` now, and nothing replaced that comes in between.
+    """Write single files inside the block, all of them or none; nothing is replaced that comes in between.
 
     Args:
-        paths: Every file that the block is going to write, each once.
+        paths: Every file that the block is going to write; they are there when it has ended.
         force: Files that are there now may be replaced.
         sources: Files that the command reads: never replaced.
 
@@ -147,11 +179,14 @@ def new_files(paths: Iterable[Path], *, force: bool = False, sources: Iterable[P
     """
     paths = list(paths)
     check_new_files(paths, force=force, sources=sources)
-    token = _CLAIMED.set({path.absolute(): _identity(path) for path in paths})
-    try:
-        yield
-    finally:
-        _CLAIMED.reset(token)
+    claims = _Claims({path.absolute(): _identity(path) for path in paths})
+    with claims.open:
+        token = _CLAIMED.set(claims)
+        try:
+            yield
+        finally:
+            _CLAIMED.reset(token)
+        _put(claims)
 
 
 def is_ours(folder: Path, command: object = None) -> bool:
@@ -365,7 +400,7 @@ def clear_errors(where: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise OutputError(f"cannot write ({error.strerror or error}): {where}") from error
+        raise OutputError(f"cannot write ({error.strerror or error}): {final_place(where)}") from error
 
 
 def _check_name(path: Path) -> None:

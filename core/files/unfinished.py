@@ -46,6 +46,14 @@ def unfinished(path: Path, target: Path) -> Iterator[None]:
         del _OPEN[path]
 
 
+def final_place(path: Path) -> Path:
+    """Return where a file will be in the end, of one that is written in a folder under a temporary name."""
+    for part, target in _OPEN.items():
+        if path.is_relative_to(part):
+            return target / path.relative_to(part)
+    return path
+
+
 def remove_unfinished() -> None:
     """Remove, or put back, all that this process has under way; for a process that ends at once."""
     for path, target in list(_OPEN.items()):

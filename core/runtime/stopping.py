@@ -19,6 +19,7 @@ from typing import Any
 PATIENCE = 1.4
 """How long a process may take to end in order [s]; with what follows it is gone within 2 s."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_STUCK: list[bool] = []
 
 
 class Terminated(BaseException):
@@ -107,6 +108,20 @@ def _overlook(before: Callable[[Any], object]) -> Callable[[Any], object]:
             before(lost)
 
     return hook
+
+
+def wait_for_nothing() -> None:
+    """Say that a library waits for ever, so that the interpreter must not end in order: it would wait with it."""
+    _STUCK.append(True)
+
+
+def leave_if_stuck(status: int) -> None:
+    """End the process at once where the interpreter's own end would not come (:func:`wait_for_nothing`)."""
+    if _STUCK:
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
+        os._exit(status)
 
 
 def leave_at_once(numbers: Sequence[int] = SIGNALS) -> None:

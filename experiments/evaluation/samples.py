@@ -1,6 +1,7 @@
 """Samples on disk: a map, its closed doors and the truth, in one folder each."""
 
 import contextlib
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -94,7 +95,7 @@ def read_sample(sample: SamplePath) -> Sample:
     folder = sample.folder
     about = _read_about(sample)
     observed, truth = read_map(folder / "map.yaml"), read_map(folder / "truth.yaml")
-    authors = read_map(folder / "authors.yaml") if (folder / "authors.yaml").is_file() else None
+    authors = read_map(folder / "authors.yaml") if os.path.lexists(folder / "authors.yaml") else None
     grids = [grid for grid in (observed, truth, authors) if grid is not None]
     windows = [grid.known_bounds() for grid in grids]
     bounds = [grid.frame.cropped(*w).bounds for grid, w in zip(grids, windows, strict=True) if w is not None]
@@ -113,7 +114,7 @@ def read_sample(sample: SamplePath) -> Sample:
         cropped = [grid.on(window_frame) for grid in grids]
     except InvalidInputError as error:
         raise InvalidInputError("map and truth on different lattices", expected="one lattice", where=folder) from error
-    rooms = read_rooms(folder / "truth_rooms.geojson") if (folder / "truth_rooms.geojson").is_file() else []
+    rooms = read_rooms(folder / "truth_rooms.geojson") if os.path.lexists(folder / "truth_rooms.geojson") else []
     doors = read_doors(folder / "doors.geojson")
     closed, seen, repetition = about.get("closed"), about.get("rooms_seen"), about.get("repetition")
     return Sample(
@@ -132,7 +133,7 @@ def read_sample(sample: SamplePath) -> Sample:
 def _read_about(sample: SamplePath) -> dict[str, Any]:
     """``world``, ``closed``, ``repetition`` and ``rooms_seen`` of the sample's run.json, its checksums compared."""
     path = sample.folder / MANIFEST
-    if not path.is_file() and not sample.listed:
+    if not os.path.lexists(path) and not sample.listed:
         return {}
     data = read_json(path, what="the manifest of a run")
     if not isinstance(data, dict):

@@ -289,3 +289,49 @@ def test_help_imports_nothing_heavy() -> None:
         "loaded = sorted(heavy & set(sys.modules)); assert not loaded, loaded\n"
     )
     subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=60)
+
+
+@pytest.mark.parametrize("how", ["line", "json", "toml"])
+def test_a_setting_that_would_take_all_memory_is_refused(
+    corridor: Path, capsys: pytest.CaptureFixture[str], how: str
+) -> None:
+    words: list[str | Path] = ["predict", corridor / "map.yaml", "--doors", corridor / "doors.geojson"]
+    words += ["--out", corridor / "out"]
+    if how == "line":
+        words += ["--predictor.door-reach", "1e9"]
+    else:
+        text = "[predictor]\ndoor_reach = 1e9\n" if how == "toml" else '{"predictor": {"door_reach": 1e9}}'
+        (corridor / f"set.{how}").write_text(text)
+        words += ["--config", corridor / f"set.{how}"]
+    assert call(*words) == 1
+    line = one_line(capsys)
+    assert "--predictor.door-reach 1e+09; expected a number from -10000 to 10000" in line
+    assert how == "line" or line.endswith(f"set.{how}")
+    assert not (corridor / "out").exists()
+
+
+DEFECT = """
+import sys
+from closedrooms.cli import commands
+def broken(*_):
+    raise {error}
+commands._main = broken
+sys.exit(commands.main())
+"""
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        ("ValueError('of ours')", "internal error, please report it: ValueError: of ours (<string>:5); -v shows where"),
+        ("MemoryError", "more memory than there is; expected smaller input, or settings that ask for less"),
+    ],
+)
+def test_a_defect_of_ours_is_one_line_and_a_traceback_for_those_who_ask(error: str, said: str) -> None:
+    words = [sys.executable, "-c", DEFECT.format(error=error), "worlds", "list"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (1, f"closedrooms: {said}\n")
+    if error != "MemoryError":
+        done = subprocess.run([*words, "-v"], capture_output=True, text=True, check=False)
+        assert done.returncode == 1
+        assert "Traceback" in done.stderr

@@ -114,6 +114,28 @@ COMMANDS = {
     "convert-stage": ("pyrobosim", ["worlds", "convert", "w.yaml", "out.world", "--to", "stage"]),
     "convert-rosmap": ("kth", ["worlds", "convert", "k.xml", "out", "--to", "rosmap"]),
 }
+QUICKLY = ["--repetitions", "1", "--workers", "1", "--out", "out"]
+# These simulate where a file can still be read, so each sees few mutations: of the file, which ones, the command.
+LONG = {
+    "run": ("plan", ("half", "fifo", "exponents", "aliases"), ["run", "plan.json", "--no-record", "--out", "out"]),
+    "dataset": ("plan", ("noise", "circle", "huge-numbers"), ["dataset", "plan.json", "--max-closed", "1", *QUICKLY]),
+    "robustness": ("plan", ("but-two", "device", "nan"), ["robustness", "plan.json", "--factors", "shift", *QUICKLY]),
+}
+EVALUATE = [
+    "evaluate",
+    "data",
+    "--methods",
+    "paper",
+    "--no-tours",
+    "--resamples",
+    "20",
+    "--workers",
+    "1",
+    "--out",
+    "out",
+]
+SAMPLE = {"map.yaml": "map", "map.png": "picture", "truth.yaml": "map", "doors.geojson": "doors",
+          "truth_rooms.geojson": "rooms", "run.json": "manifest"}  # fmt: skip
 # The readers have seen every mutation above; the commands see one of each kind of failure.
 SEEN = ("missing", "half", "noise", "huge-numbers", "brackets", "aliases", "fifo", "dangling", "exponents")
 
@@ -122,14 +144,22 @@ def answer(
     command: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> tuple[int, list[str], set[str]]:
     """Exit status, lines of complaint and what is new in the folder; files that were there are unchanged."""
+    return answered(COMMANDS[command][1], folder, monkeypatch, capfd)
+
+
+def answered(
+    words: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> tuple[int, list[str], set[str]]:
+    """As :func:`answer`, of a command line."""
     monkeypatch.chdir(folder)
     before = {path: path.lstat() for path in folder.rglob("*")}
     with patience():
-        status = main(COMMANDS[command][1])
+        status = main(words)
     said = capfd.readouterr()
     for text in (said.out, said.err):
         assert "\x1b" not in text
         assert "Traceback" not in text
+        assert "internal error" not in text
     after = {path: path.lstat() for path in folder.rglob("*")}
     for path, stat in before.items():
         assert (after[path].st_mtime_ns, after[path].st_ino) == (stat.st_mtime_ns, stat.st_ino)
@@ -158,6 +188,59 @@ def test_a_command_on_a_spoilt_file_says_one_line_and_leaves_nothing(
     if status == 1:
         assert new == set()
         assert any(path.name in line for line in complaints)
+
+
+@pytest.mark.parametrize(
+    ("command", "mutation"), [(command, mutation) for command, (_, some, _) in LONG.items() for mutation in some]
+)
+def test_a_long_command_on_a_spoilt_plan_says_one_line_and_leaves_nothing(
+    tmp_path: Path, command: str, mutation: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    kind, _, words = LONG[command]
+    path = tmp_path / FORMATS[kind].name
+    inputs.spoil(path, FORMATS[kind].content, mutation)
+    status, complaints, new = answered(words, tmp_path, monkeypatch, capfd)
+    assert (status, new) == (1, set())
+    assert len(complaints) == 1
+    assert path.name in complaints[0]
+
+
+def sample(folder: Path) -> Path:
+    """A sample as somebody else may have put it together."""
+    (folder / "data" / "s").mkdir(parents=True)
+    contents = {kind: other.content for kind, other in FORMATS.items()}
+    contents["manifest"] = json.dumps({"world": "w", "closed": ["d0"], "metrics": {"rooms_seen": 1}}).encode()
+    for name, kind in SAMPLE.items():
+        (folder / "data" / "s" / name).write_bytes(contents[kind])
+    (folder / "data" / "s" / "truth.yaml").write_bytes(contents["map"])
+    return folder / "data" / "s"
+
+
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """The libraries of an evaluation, which take longer than any answer on a busy machine."""
+    folder = tmp_path_factory.mktemp("honest")
+    sample(folder)
+    words = [str(folder / word) if word in {"data", "out"} else word for word in EVALUATE]
+    assert main([*words, "-q"]) == 0
+
+
+@pytest.mark.usefixtures("imported")
+@pytest.mark.parametrize("mutation", ["empty", "half", "brackets", "exponents", "fifo", "dangling"])
+@pytest.mark.parametrize("name", SAMPLE)
+def test_an_evaluation_tells_a_spoilt_sample_and_goes_on(
+    tmp_path: Path, name: str, mutation: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = sample(tmp_path) / name
+    content = path.read_bytes()
+    path.unlink()
+    inputs.spoil(path, content, mutation)
+    status, complaints, new = answered(EVALUATE, tmp_path, monkeypatch, capfd)
+    assert status in {0, 1, 3}
+    assert len(complaints) <= 3
+    assert new <= {"out"}
+    assert status != 0 or mutation == "exponents"
+    assert status == 0 or "data" in complaints[0]
 
 
 NAMES = [

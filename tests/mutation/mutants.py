@@ -19,6 +19,7 @@ import random
 import re
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -189,6 +190,8 @@ def fate(root: Path, mutant: Mutant, pytest: str) -> tuple[str, str]:
 
 
 def _end_hangs() -> None:
+    # A job in the background of a script ignores Ctrl-C, and so would the tests of it.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     resource.setrlimit(resource.RLIMIT_CPU, (HANGS, HANGS))
 
 
@@ -227,11 +230,15 @@ def main() -> int:
     parser.add_argument("--pytest", default=str(Path(sys.executable).with_name("pytest")))
     parser.add_argument("--out", type=Path, default=Path("mutants.json"))
     options = parser.parse_args()
-    results: list[Result] = []
+    # The same command goes on where it stopped.
+    results = [Result(**value) for value in json.loads(options.out.read_text())] if options.out.exists() else []
+    done = {(result.module, result.operator, result.occurrence) for result in results}
     with tempfile.TemporaryDirectory(prefix="mutants-") as scratch:
         root = Path(scratch)
         _copy(root)
         for mutant in _drawn(root, options):
+            if (mutant.module, mutant.operator, mutant.occurrence) in done:
+                continue
             outcome, noticed = fate(root, mutant, options.pytest)
             before = (root / mutant.module).read_text()
             lines = difflib.unified_diff(before.splitlines(), mutant.changed.splitlines(), n=0, lineterm="")
@@ -251,11 +258,12 @@ def main() -> int:
 
 
 def _drawn(root: Path, options: argparse.Namespace) -> Iterator[Mutant]:
-    """The mutants that are asked for, folder by folder."""
+    """The mutants that are asked for, with ``--each`` one of each folder in turn."""
     modules = _modules(options.wanted)
     if options.each:
-        for _, own in groupby(modules, key=lambda module: Path(module).parts[0]):
-            yield from spread(list(own), root, options.each, options.seed)
+        folders = [list(own) for _, own in groupby(modules, key=lambda module: Path(module).parts[0])]
+        piles = [spread(own, root, options.each, options.seed) for own in folders]
+        yield from (mutant for turn in zip_longest(*piles) for mutant in turn if mutant is not None)
         return
     for module in modules:
         # Of its own for each module: what one holds does not change the draw of the next.

@@ -2,6 +2,7 @@
 
 import contextlib
 import logging
+import threading
 from collections.abc import Iterator, Sequence
 from enum import IntEnum
 from pathlib import Path
@@ -13,6 +14,8 @@ import rerun.blueprint as rrb
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import OutputError
+from closedrooms.core.files.unfinished import final_place
+from closedrooms.core.runtime.stopping import wait_for_nothing
 
 APPLICATION = "closedrooms"
 # Chunks are cut by size alone: a cut by wall-clock time would differ from one run to the next.
@@ -20,8 +23,10 @@ CHUNK_BYTES = 1_000_000
 NEVER_SECONDS = 1e6
 # How long those who watch wait for what has happened [s].
 LIVE_SECONDS = 0.2
-# On a full disk the writer has been seen to wait for ever; an honest flush takes milliseconds.
-FLUSH_SECONDS = 60.0
+# On a full disk the writer has been seen to wait for ever; an honest flush takes milliseconds, and the file grows. So
+# long without growth is enough [s].
+FLUSH_SECONDS = 5.0
+CLOSE_SECONDS = 1.0
 
 
 class Stage(IntEnum):
@@ -99,16 +104,36 @@ class RecordingStream:
         rr.set_thread_local_data_recording(self._previous)
         try:
             with self._clear_errors():
+                self._flush()
+        except BaseException:
+            # To close a file whose writer has ended may wait for ever too.
+            closing = threading.Thread(target=self._rec.disconnect, daemon=True)
+            closing.start()
+            closing.join(CLOSE_SECONDS)
+            if closing.is_alive():
+                wait_for_nothing()
+            raise
+        self._rec.disconnect()
+
+    def _flush(self) -> None:
+        """Wait until all is written, as long as the file grows."""
+        size = -1
+        while True:
+            try:
                 self._rec.flush(timeout_sec=FLUSH_SECONDS)
-        finally:
-            self._rec.disconnect()
+            except RuntimeError:
+                before, size = size, self._path.stat().st_size
+                if size <= before:
+                    raise
+            else:
+                return
 
     @contextlib.contextmanager
     def _clear_errors(self) -> Iterator[None]:
         try:
             yield
         except RuntimeError as failure:
-            raise OutputError(f"cannot write the recording ({failure}): {self._path}") from failure
+            raise OutputError(f"cannot write the recording ({failure}): {final_place(self._path)}") from failure
 
     def arrange(self, blueprint: rrb.Blueprint) -> None:
         """Say how the recording opens; the last one counts."""

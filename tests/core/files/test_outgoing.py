@@ -332,6 +332,39 @@ def test_a_file_of_a_claim_is_written_and_others_as_ever(tmp_path: Path) -> None
     assert tree(tmp_path) == {"a": b"3", "other": b"2"}
 
 
+def test_of_several_files_all_appear_or_none(tmp_path: Path) -> None:
+    (tmp_path / "b").write_text("before")
+    paths = [tmp_path / "a", tmp_path / "b"]
+
+    def write(then: Callable[[], object]) -> None:
+        with new_files(paths, force=True):
+            write_bytes(paths[0], b"1")
+            write_bytes(paths[1], b"2")
+            assert not paths[0].exists()
+            then()
+
+    with pytest.raises(ZeroDivisionError):
+        write(lambda: 1 / 0)
+    assert tree(tmp_path) == {"b": b"before"}
+    with pytest.raises(OutputError, match="changed meanwhile"):
+        write(lambda: paths[1].write_text("of somebody else"))
+    assert tree(tmp_path) == {"b": b"of somebody else"}
+    write(lambda: None)
+    assert tree(tmp_path) == {"a": b"1", "b": b"2"}
+
+
+def test_a_message_names_the_output_not_where_it_is_written_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OutputError) as caught:
+        make(tmp_path / "out", a=b"new")
+    assert str(caught.value).endswith(f": {tmp_path / 'out' / 'a'}")
+
+
 @pytest.mark.parametrize("source", ["out/a", "out", "link"])
 def test_a_folder_that_is_read_is_not_replaced(tmp_path: Path, source: str) -> None:
     make(tmp_path / "out")

@@ -74,3 +74,13 @@ def test_a_process_that_does_not_stop_is_ended_in_time_and_quietly(what: str, nu
     out, err = process.communicate(timeout=20)
     assert (process.returncode, out, err) == (128 + number, "left", "")
     assert time.monotonic() - begin < 10
+
+
+def test_a_process_whose_library_waits_for_ever_ends_all_the_same_with_its_status() -> None:
+    code = (
+        "import atexit, sys, time; from closedrooms.core import stopping\n"
+        "atexit.register(time.sleep, 1000); stopping.leave_if_stuck(2); print('said', end='')\n"
+        "stopping.wait_for_nothing(); stopping.leave_if_stuck(3)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (3, "said")

@@ -234,6 +234,13 @@ def test_tabu_search_stops_on_convergence_long_before_the_ceiling():
     assert sorted(tour) == list(range(20))
 
 
+def test_a_search_says_whether_time_or_a_bound_ended_it() -> None:
+    distances = _distances(_points(2, 30))
+    assert run_tabu_search(distances, solutions=3, convergence=None, seconds=60.0)[1] == "bounded"
+    assert run_tabu_search(distances, solutions=3, convergence=None, seconds=None)[1] == "bounded"
+    assert run_tabu_search(distances, solutions=None, convergence=None, seconds=0.2)[1] == "time"
+
+
 def test_a_single_vertex_is_a_tour_of_length_zero():
     tour = solve_tour(make_graph(np.array([[1.0, 2.0]]), np.zeros((0, 2))))
     assert tour.length == tour.lower_bound == tour.gap == 0.0
