@@ -1,6 +1,6 @@
 """How well closed doors are found in maps alone: precision and recall against the doors that simulated runs closed.
 
-    python benchmarks/door_proposals.py RUN_FOLDER... [--tolerance 0.3] [--fit]
+    python benchmarks/door_proposals.py RUN_FOLDER... [--tolerance 0.3] [--fit] [--quick]
 
 A sample is any folder at any depth with ``map.yaml`` and ``doors.geojson`` (``closedrooms run`` leaves both). A
 proposal is right when its middle lies within the tolerance of a closed door's, one proposal a door; the others are
@@ -26,6 +26,7 @@ from closedrooms.predictor.structure.door_proposal_config import ProposalConfig
 from closedrooms.predictor.structure.door_proposals import SMOOTH, DoorProposal, propose_doors
 
 THRESHOLDS = (0.1, 0.3, 0.5, 0.7, 0.9)
+QUICK = 8
 
 
 @dataclass
@@ -97,9 +98,11 @@ def main() -> None:
     parser.add_argument("--tolerance", type=float, default=0.3, help="how far a proposal's middle may be off [m]")
     parser.add_argument("--fit", action="store_true")
     parser.add_argument("--misses", action="store_true", help="list the wrong and the missing ones at 0.5")
+    parser.add_argument("--quick", action="store_true", help=f"the first {QUICK} maps of each folder")
     options = parser.parse_args()
     for folder in options.folders:
         paths = sorted(p.parent for p in folder.rglob("map.yaml") if (p.parent / "doors.geojson").exists())
+        paths = paths[: QUICK if options.quick else None]
         samples = [measure(path, options.tolerance) for path in paths]
         if options.fit:
             fit(samples[::2])

@@ -1,6 +1,6 @@
 """Exploration side by side: known area, simulated time and the share of each step, on any worlds.
 
-Usage: python benchmarks/exploration.py office-07 school-03 [--noise medium] [--close 5] [--seed 0]
+    python benchmarks/exploration.py [WORLD ...] [--noise medium] [--close 5] [--seed 0] [--quick]
 
 Prints one row a world: status, simulated seconds, way, plans, share of the reachable free cells that is known at the
 end, trajectory error, doors seen, and milliseconds a scan for sensing, mapping and navigating.
@@ -49,12 +49,13 @@ def measure(world: str, *, noise: str, close: int, seed: int) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("worlds", nargs="+")
+    parser.add_argument("worlds", nargs="*", default=["office-01", "office-07"])
+    parser.add_argument("--quick", action="store_true", help="the first world only")
     parser.add_argument("--noise", default="medium")
     parser.add_argument("--close", type=int, default=5)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    for world in options.worlds:
+    for world in options.worlds[: 1 if options.quick else None]:
         print(measure(world, noise=options.noise, close=options.close, seed=options.seed), flush=True)
 
 

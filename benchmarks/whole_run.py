@@ -1,6 +1,6 @@
 """The whole job on buildings of growing size: seconds by stage, and how many times faster than real time it is.
 
-    python benchmarks/whole_run.py [WORLD ...] [--record]
+    python benchmarks/whole_run.py [WORLD ...] [--record] [--quick]
 
 Without arguments it takes bundled worlds from the smallest to the largest. Every world runs once with the same
 options, one after the other in one process, so that the figures can be compared with each other; they are this
@@ -24,7 +24,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("worlds", nargs="*", default=WORLDS)
     parser.add_argument("--record", action="store_true", help="with the recording")
+    parser.add_argument("--quick", action="store_true", help="the smallest world only")
     options = parser.parse_args()
+    if options.quick:
+        options.worlds = WORLDS[:1]
     heads = "".join(f"{stage:>12}" for stage in STAGES)
     print(f"{'world':<24}{'size':>12}{'scans':>7}{heads}{'x real time':>13}")
     for name in options.worlds:

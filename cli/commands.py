@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from closedrooms.cli.command_list import overview, wants_overview
 from closedrooms.cli.usage import UsageError
 from closedrooms.core.errors import ClosedroomsError, OutputError, reason
 from closedrooms.core.files.unfinished import remove_unfinished
@@ -128,15 +129,19 @@ def _main(words: Sequence[str]) -> int:
         with _printing():
             _say(f"closedrooms {version('closedrooms')}")
         return DONE
+    if wants_overview(words):
+        with _printing():
+            _say(overview())
+        return DONE if words else WRONG_USAGE
     from closedrooms.cli.options import configured, load
     from closedrooms.cli.table import read_line
 
     options, status = None, DONE
     with _printing():
         try:
-            options = read_line(words or ["--help"])
+            options = read_line(words)
         except SystemExit as stop:  # the help was printed
-            status = WRONG_USAGE if not words else int(stop.code or DONE)
+            status = int(stop.code or DONE)
     if options is None:
         return status
     from closedrooms.pipeline.reporting.progress import Terminal

@@ -4,11 +4,13 @@ import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, make_dataclass
 from functools import partial
+from itertools import zip_longest
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_type_hints
 
 import tyro
 
+from closedrooms.cli.command_list import Command
 from closedrooms.cli.config_file import read_settings
 from closedrooms.cli.settings import field_values
 from closedrooms.cli.usage import UsageError
@@ -16,7 +18,6 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.nearest import unknown
 from closedrooms.core.runtime.options import check_numbers
 
-HELP, HELP_ALL = {"-h", "--help"}, "--help-all"
 # Of these a command takes one; the line's takes the place of another one in the file.
 ALTERNATIVES = ({"close", "close_doors"},)
 
@@ -43,25 +44,6 @@ class SharedOptions:
     """Show every option, the settings of each stage included."""
 
 
-@dataclass(frozen=True, slots=True)
-class Command:
-    """One command.
-
-    Attributes:
-        name: As it is typed, ``worlds list`` for one in a group.
-        summary: One line for people.
-        config: Its configuration class, ``module:name``.
-        work: The function that does it, ``module:name``: from a configuration and ``progress`` to a report.
-        needs: Packages that not every installation has, as they are imported, and that it cannot do without.
-    """
-
-    name: str
-    summary: str
-    config: str
-    work: str
-    needs: tuple[str, ...] = ()
-
-
 def load(place: str) -> Any:
     """Load what stands at ``module:name``; the module is imported, so that a command imports no more than it needs."""
     module, name = place.split(":")
@@ -78,6 +60,24 @@ class _Named:
     lidar: str | None = None
     close: str | None = None
     close_doors: str | None = None
+
+
+def _read_named(words: Sequence[str]) -> _Named:
+    """Find these few options on a line, as tyro will: ``--name value`` or ``--name=value``, the last one wins.
+
+    Tyro itself would take 0.1 s of processor time more for them, most of it to load typeguard.
+    """
+    words = words[: words.index("--")] if "--" in words else words
+    known = {item.name for item in fields(_Named)}
+    found: dict[str, Any] = {}
+    for word, behind in zip_longest(words, words[1:]):
+        option, equals, value = word.partition("=")
+        name = option.removeprefix("--").replace("-", "_")
+        if option.startswith("--") and name in known:
+            given = value if equals else behind
+            if given is not None and (equals or not given.startswith("--")):
+                found[name] = Path(given) if name == "config" else given
+    return _Named(**found)
 
 
 def options_class(command: Command, words: Sequence[str] = (), *, brief: bool = False) -> type[Any]:
@@ -97,8 +97,7 @@ def options_class(command: Command, words: Sequence[str] = (), *, brief: bool = 
     """
     config = load(command.config)
     names = {item.name for item in fields(config)}
-    prog = f"closedrooms {command.name}"
-    line, _ = tyro.cli(_Named, args=list(words), return_unknown_args=True, add_help=False, prog=prog)
+    line = _read_named(words)
     saved = {} if line.config is None else read_settings(line.config, command.name, config)
     saved = _without_what_the_line_names(saved, line)
     try:

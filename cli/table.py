@@ -11,110 +11,17 @@ import tyro
 # that is not known here is told in tyro's own words.
 from tyro._errors import on_parse_error
 
-from closedrooms.cli.options import HELP, HELP_ALL, Command, option_names, options_class
+from closedrooms.cli.command_list import ABOUT, COMMANDS, GROUPS, HELP, HELP_ALL, Command
+from closedrooms.cli.options import option_names, options_class
+from closedrooms.cli.quick_types import tell_quickly
 from closedrooms.cli.usage import Place, UsageError, explain
 from closedrooms.core.errors import InvalidInputError
-
-TOURS = ("networkx", "ortools", "skimage")
-SIMULATION = ("pybullet", "mapbox_earcut", "skimage")
-TABLES = ("pyarrow", "matplotlib")
-COMMANDS = (
-    Command(
-        "run",
-        "Simulate a robot in a building with closed doors, map it, predict the closed rooms, plan a tour.",
-        "pipeline.config:RunConfig",
-        "pipeline.runs:run_all",
-        needs=(*SIMULATION, *TOURS),
-    ),
-    Command(
-        "predict",
-        "Predict the rooms behind the closed doors of a ROS map.",
-        "pipeline.config:PredictConfig",
-        "pipeline.predict:predict_map",
-    ),
-    Command(
-        "cover",
-        "Plan a coverage tour on a ROS map.",
-        "pipeline.config:CoverConfig",
-        "pipeline.cover:cover_map",
-        needs=TOURS,
-    ),
-    Command(
-        "map",
-        "Build the map of a recorded run.",
-        "pipeline.config:MapConfig",
-        "pipeline.map:map_log",
-    ),
-    Command(
-        "doors",
-        "Propose closed doors on a ROS map, from the map alone.",
-        "pipeline.propose_doors_config:DoorsConfig",
-        "pipeline.propose_doors:doors_map",
-    ),
-    Command(
-        "edit",
-        "Mark closed doors on a map in the browser and see the rooms behind them at once.",
-        "web.config:EditConfig",
-        "web.server:edit_map",
-    ),
-    Command(
-        "view",
-        "Open the recording of a result in the rerun viewer.",
-        "pipeline.view_config:ViewConfig",
-        "pipeline.view:view_recording",
-    ),
-    Command(
-        "worlds list",
-        "List the bundled worlds, one a line, its name first.",
-        "pipeline.config:ListWorlds",
-        "cli.work:list_worlds",
-    ),
-    Command(
-        "worlds show", "Draw a floor plan.", "pipeline.config:ShowWorld", "cli.work:show_world", needs=("matplotlib",)
-    ),
-    Command("worlds generate", "Generate a floor plan.", "pipeline.config:GenerateWorld", "cli.work:generate_world"),
-    Command(
-        "worlds convert",
-        "Convert a floor plan to another format.",
-        "pipeline.config:ConvertWorld",
-        "cli.work:convert_world",
-    ),
-    Command(
-        "dataset",
-        "Make maps of many buildings with closed doors, and what is really behind them.",
-        "experiments.dataset.config:DatasetConfig",
-        "experiments.dataset.dataset:dataset",
-        needs=(*SIMULATION, *TOURS, "pyarrow"),
-    ),
-    Command(
-        "evaluate",
-        "Compare predictions with the truth over a dataset.",
-        "experiments.evaluation.config:EvaluateConfig",
-        "experiments.evaluation.evaluate:evaluate",
-        needs=(*TOURS, *TABLES),
-    ),
-    Command(
-        "robustness",
-        "Find at which noise the prediction starts to suffer, and which stage gives way first.",
-        "experiments.robustness.config:RobustnessConfig",
-        "experiments.robustness.sweep:robustness",
-        needs=(*SIMULATION, *TOURS, *TABLES),
-    ),
-)
-GROUPS = {"worlds": "List, show, generate and convert floor plans."}
 
 MARKERS = (
     tyro.conf.OmitSubcommandPrefixes,
     tyro.conf.AvoidSubcommands,
     tyro.conf.PositionalMetavarFromFieldName,
 )
-ABOUT = """Predicts the layout of rooms behind closed doors and completes a robot's map with them.
-
-closedrooms COMMAND --help shows the options that people set, --help-all every one.
-
-closedrooms --tyro-print-completion bash (or zsh, fish) prints what completes commands and options in a shell,
-closedrooms --version the version.
-"""
 
 
 def read_line(words: Sequence[str]) -> Any:
@@ -128,6 +35,7 @@ def read_line(words: Sequence[str]) -> Any:
         InvalidInputError: A value that a configuration refuses, a file of settings that cannot be used.
         SystemExit: The help or a completion script was printed.
     """
+    tell_quickly()
     command = named_command(words)
     rest = list(words) if command is None else list(words[len(command.name.split()) :])
     brief = bool(HELP & set(rest)) and HELP_ALL not in rest

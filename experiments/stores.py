@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import hashlib
+import os
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -10,7 +11,8 @@ from typing import Any, BinaryIO, Protocol
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError
 from closedrooms.core.files.incoming import opened
-from closedrooms.core.files.outgoing import clear_errors, new_file
+from closedrooms.core.files.outgoing import clear_errors
+from closedrooms.core.files.unfinished import part_of_file, unfinished
 from closedrooms.core.runtime.packages import MissingPackageError, require
 from closedrooms.experiments.places import Url
 
@@ -86,12 +88,20 @@ class Folder:
 
     @contextlib.contextmanager
     def new(self, name: str) -> Iterator[BinaryIO]:
-        """Write a file beside its place and move it there."""
+        """Write a file beside its place and move it there.
+
+        Unlike ``core.files.new_file`` it does not look for what others left there, which takes longer the more files
+        there are: who works on a dataset clears that away once.
+        """
         path = self._root / name
-        with clear_errors(path):
+        temporary = part_of_file(path)
+        with clear_errors(path), unfinished(temporary, path):
             path.parent.mkdir(parents=True, exist_ok=True)
-        with new_file(path) as file:
-            yield file
+            with temporary.open("wb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(path)
 
     def remove(self, names: Iterable[str]) -> None:
         """Remove files."""

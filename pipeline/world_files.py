@@ -2,19 +2,44 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.outgoing import new_files
 from closedrooms.core.names import shown
 from closedrooms.worlds.library import DEFAULT_WORLD, PLANS, bundled_names, load_world, read_world
-from closedrooms.worlds.plan import FloorPlan
 
+if TYPE_CHECKING:
+    from closedrooms.worlds.plan import FloorPlan
+
+BUNDLED_LIST = "bundled.txt"
 # Resolution of maps written by ``convert`` [m].
 MAP_RESOLUTION = 0.05
 
 
 def list_worlds(*, verbose: bool = False) -> list[str]:
+<<<<<<< HEAD
     """List the bundled worlds, a line each, the name first; with ``verbose`` more lines on each."""
+=======
+    """Return one line a bundled world, its name first; with ``verbose`` more lines on each.
+
+    The lines stand in a file beside the plans, which a test compares with :func:`describe_bundled`: to read and check
+    twenty plans takes longer than most commands.
+    """
+    from closedrooms.core.files.incoming import read_text
+
+    lines = read_text(PLANS.parent / BUNDLED_LIST, what="the list of bundled worlds").splitlines()
+    if not verbose:
+        return lines
+    from closedrooms.worlds.formats.native import read_plan
+
+    plans = [read_plan(PLANS / f"{name}.json") for name in bundled_names()]
+    return [text for line, plan in zip(lines, plans, strict=True) for text in (line, *_details(plan))]
+
+
+def describe_bundled() -> list[str]:
+    """Work out the lines of :func:`list_worlds` from the plans."""
+>>>>>>> large
     import shapely
 
     from closedrooms.worlds.closing import closable_rooms
@@ -31,13 +56,16 @@ def list_worlds(*, verbose: bool = False) -> list[str]:
             f"{name:<10} {size:>11}  {len(plan.rooms):3d} rooms  {len(plan.doors):3d} doors  "
             f"{len(closable_rooms(plan)):2d} closable  {plan.meta.get('shape', ''):<6}{default}".rstrip()
         )
-        if verbose:
-            lines += _details(plan)
     return lines
 
 
+<<<<<<< HEAD
 def _details(plan: FloorPlan) -> list[str]:
     """Describe what a plan holds beside its figures."""
+=======
+def _details(plan: "FloorPlan") -> list[str]:
+    """What a plan holds beside its figures."""
+>>>>>>> large
     from collections import Counter
 
     from closedrooms.worlds.closing import closable_rooms
@@ -49,8 +77,13 @@ def _details(plan: FloorPlan) -> list[str]:
     return [f"    {area:.0f} m2 of floor{furniture}: {kinds}", f"    can be closed: {', '.join(doors) or 'none'}"]
 
 
+<<<<<<< HEAD
 def describe_world(plan: FloorPlan) -> list[str]:
     """Describe a plan in words: its rooms with area and doors, its doors with place, width and rooms."""
+=======
+def describe_world(plan: "FloorPlan") -> list[str]:
+    """Return a plan in words: its rooms with area and doors, its doors with place, width and rooms."""
+>>>>>>> large
     from closedrooms.worlds.closing import closable_rooms
 
     closable = closable_rooms(plan)
@@ -73,7 +106,7 @@ def describe_world(plan: FloorPlan) -> list[str]:
     return lines
 
 
-def show_world(world: str, out_png: str | Path, *, level: str | None = None, force: bool = False) -> FloorPlan:
+def show_world(world: str, out_png: str | Path, *, level: str | None = None, force: bool = False) -> "FloorPlan":
     """Write a picture of a world; returns its plan, with what was dropped, repaired or guessed in ``remarks``.
 
     Raises:
@@ -93,7 +126,7 @@ def show_world(world: str, out_png: str | Path, *, level: str | None = None, for
 
 def generate_world(
     kind: str, seed: int, out_json: str | Path, *, furniture: bool = False, force: bool = False
-) -> FloorPlan:
+) -> "FloorPlan":
     """Write a generated world as JSON; returns its plan.
 
     Raises:
@@ -109,7 +142,7 @@ def generate_world(
     return plan
 
 
-def convert_world(src: str, dst: str | Path, to: str, *, level: str | None = None, force: bool = False) -> FloorPlan:
+def convert_world(src: str, dst: str | Path, to: str, *, level: str | None = None, force: bool = False) -> "FloorPlan":
     """Write a world of any known format in the format ``to``; returns its plan, with ``remarks``.
 
     Raises:
@@ -143,8 +176,13 @@ def map_stem(path: Path) -> Path:
     return path.with_suffix("") if path.suffix in {".yaml", ".yml", ".png", ".pgm"} else path
 
 
+<<<<<<< HEAD
 def exporters() -> dict[str, Callable[[Path, FloorPlan], None]]:
     """List the writers of floor plans by the name of their format."""
+=======
+def exporters() -> dict[str, Callable[[Path, "FloorPlan"], None]]:
+    """Writers of floor plans by the name of their format."""
+>>>>>>> large
     from closedrooms.worlds.formats.mesh import write_obj, write_urdf
     from closedrooms.worlds.formats.native import write_plan
     from closedrooms.worlds.formats.sdf import write_sdf
@@ -160,7 +198,7 @@ def exporters() -> dict[str, Callable[[Path, FloorPlan], None]]:
     }
 
 
-def write_ros_map(path: Path, plan: FloorPlan) -> None:
+def write_ros_map(path: Path, plan: "FloorPlan") -> None:
     """Write the true map of a plan in the building frame at 0.05 m, and its doors beside it.
 
     ``<stem>.yaml`` and ``<stem>.png`` show all doors open; ``<stem>.doors.geojson`` lists them, so that the map can be

@@ -10,7 +10,6 @@ import importlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, Protocol
 
 from closedrooms.core.errors import InvalidInputError
@@ -194,6 +193,9 @@ def predict(
 
 @cache
 def _entries() -> tuple[Any, ...]:
+    # Only who names a method that is not ours, or asks for all, waits for this.
+    from importlib.metadata import entry_points
+
     return tuple(entry_points(group=GROUP))
 
 

@@ -124,7 +124,7 @@ def as_bytes(row: "pa.RecordBatch") -> bytes:
     import pyarrow as pa
 
     sink = io.BytesIO()
-    options = pa.ipc.IpcWriteOptions(compression="zstd")
+    options = pa.ipc.IpcWriteOptions(compression="zstd", use_threads=False)
     with pa.ipc.new_stream(sink, row.schema, options=options) as stream:
         stream.write_batch(row)
     return sink.getvalue()
@@ -139,7 +139,8 @@ def from_bytes(content: bytes, where: str) -> "pa.Table":
     import pyarrow as pa
 
     with reading(where, "a part of a dataset"):
-        table = pa.ipc.open_stream(content).read_all()
+        options = pa.ipc.IpcReadOptions(use_threads=False)
+        table = pa.ipc.open_stream(content, options=options).read_all()
     if table.num_rows != 1:  # cut off behind the names of the columns
         raise InvalidInputError(f"{table.num_rows} samples", expected="a part of a dataset, one sample", where=where)
     return table
@@ -175,7 +176,7 @@ def read_rows(
                 raise InvalidInputError(
                     f"{size} bytes in one group of rows", expected=f"at most {MAX_GROUP}", where=where
                 )
-            rows += source.read_row_group(number, columns=columns).to_pylist()
+            rows += source.read_row_group(number, columns=columns, use_threads=False).to_pylist()
         return rows
 
 

@@ -85,51 +85,37 @@ class Terminal:
     """
 
     def __init__(self, *, quiet: bool = False, verbose: bool = False) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-        self._out = Console(file=sys.stdout, soft_wrap=False, width=None if sys.stdout.isatty() else 120)
-        console = Console(file=sys.stderr)
-        self._live = console.is_terminal and not quiet and not verbose
+        live = sys.stderr.isatty() and not quiet and not verbose
         self._quiet, self._every = quiet, 0.0 if verbose else EVERY
-        self._progress = Progress(
-            SpinnerColumn(),
-            TextColumn("{task.description:<12}"),
-            BarColumn(bar_width=24),
-            TextColumn("{task.fields[note]}", markup=False),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            console=console,
-            transient=True,
-            disable=not self._live,
-        )
+        self._bars = _bars() if live else None
         self._task: int | None = None
         self._pace = Pace("", None, time.monotonic())
 
     def __enter__(self) -> Self:
-        self._progress.start()
+        if self._bars is not None:
+            self._bars.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._progress.stop()
+        if self._bars is not None:
+            self._bars.stop()
 
     def stage(self, name: str, total: float | None = None) -> None:
         """Begin a stage: a new bar on a terminal, a line elsewhere."""
         self._pace = Pace(name, total, time.monotonic())
-        if not self._live:
+        if self._bars is None:
             self.tell(f"{name} ...")
             return
         if self._task is not None:
-            self._progress.remove_task(self._task)  # type: ignore[arg-type]
-        self._task = self._progress.add_task(name, total=total, note="")
+            self._bars.remove_task(self._task)
+        self._task = self._bars.add_task(name, total=total, note="")
 
     def advance(self, done: float, note: str = "") -> None:
         """Move the bar of the current stage; elsewhere say now and then how far it is."""
-        if self._live and self._task is not None:
-            self._progress.update(self._task, completed=done, note=shown(note))  # type: ignore[arg-type]
+        if self._bars is not None and self._task is not None:
+            self._bars.update(self._task, completed=done, note=shown(note))
             return
         now = time.monotonic()
         line = self._pace.line(done, shown(note), now)
@@ -164,7 +150,28 @@ class Terminal:
         self._print(shown(line, longest=LONGEST_CELL), markup=False, highlight=False, soft_wrap=True)
 
     def _print(self, what: Any, **how: Any) -> None:
+        from rich.console import Console
+
+        out = Console(file=sys.stdout, soft_wrap=False, width=None if sys.stdout.isatty() else 120)
         try:
-            self._out.print(what, **how)
+            out.print(what, **how)
         except SystemExit as stop:  # what rich makes of it
             raise BrokenPipeError("nobody reads") from stop
+
+
+def _bars() -> Any:
+    """Bars on a terminal, by rich, which is not imported where there is none."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    return Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description:<12}"),
+        BarColumn(bar_width=24),
+        TextColumn("{task.fields[note]}", markup=False),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=Console(file=sys.stderr),
+        transient=True,
+    )

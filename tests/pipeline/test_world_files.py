@@ -7,6 +7,7 @@ from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files.rosmap import read_map
 from closedrooms.pipeline.world_files import (
     convert_world,
+    describe_bundled,
     describe_world,
     exporters,
     generate_world,
@@ -17,6 +18,11 @@ from closedrooms.worlds.formats.native import read_plan
 from closedrooms.worlds.library import bundled_names, load_world
 
 FIXTURES = Path(__file__).parents[1] / "fixtures"
+
+
+def test_the_list_of_bundled_worlds_is_that_of_their_plans() -> None:
+    # python -c "from closedrooms.pipeline.world_files import *; print(*describe_bundled(), sep='\\n')" writes it anew.
+    assert list_worlds() == describe_bundled()
 
 
 def test_the_list_has_a_line_a_world_with_its_name_first() -> None:
