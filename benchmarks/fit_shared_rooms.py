@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 from sklearn.linear_model import LogisticRegression
-from sklearn.model_selection import GroupKFold, cross_val_predict
+from sklearn.model_selection import GroupKFold
 
-from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.experiments.evaluation.listing import find_samples
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
 from closedrooms.experiments.training.buildings import read_groups, use_of
@@ -48,18 +48,20 @@ def measure(sample: Sample) -> list[tuple[FloatArray, bool]]:
     return found
 
 
-def fit(values: FloatArray, shared: BoolArray, groups: list[str]) -> None:
+def fit(values: FloatArray, shared: BoolArray, groups: list[str], counts: IntArray) -> None:
     """Print the weights and how well those of other buildings tell the doors apart."""
     scale = np.maximum(values.std(axis=0), 1e-9)
+    values = values / scale
     model = LogisticRegression(max_iter=500)
-    likely = cross_val_predict(
-        model, values / scale, shared, groups=groups, cv=GroupKFold(FOLDS), method="predict_proba"
-    )[:, 1]
-    model.fit(values / scale, shared)
-    print(f"{len(shared)} sets of doors, {shared.sum()} of one room")
-    for least in (0.3, 0.5, 0.7):
+    likely = np.zeros(len(shared))
+    for known, asked in GroupKFold(FOLDS).split(values, shared, groups):
+        model.fit(values[known], shared[known], sample_weight=counts[known])
+        likely[asked] = model.predict_proba(values[asked])[:, 1]
+    model.fit(values, shared, sample_weight=counts)
+    print(f"{counts.sum()} sets of doors, {counts @ shared} of one room")
+    for least in (0.3, 0.4, 0.5, 0.6, 0.7):
         said = likely > least
-        print(f"probability above {least}: {(said & shared).sum()} right, {(said & ~shared).sum()} wrong")
+        print(f"probability above {least}: {counts @ (said & shared)} right, {counts @ (said & ~shared)} wrong")
     print(f"{FEATURES[0].name:16s} {model.intercept_[0]:.2f}")
     for feature, weight in zip(FEATURES[1:], model.coef_[0] / scale, strict=True):
         print(f"{feature.name:16s} {weight:.2f}")
@@ -70,7 +72,7 @@ def main() -> None:
     parser.add_argument("fit", type=Path, nargs="+")
     parser.add_argument("--every", type=int, default=1)
     args = parser.parse_args()
-    rows, groups = [], []
+    rows, groups, counts = [], [], []
     for number, path in enumerate(find_samples(args.fit)):
         sample = read_sample(path)
         if use_of(sample.world) != "fit":
@@ -80,7 +82,9 @@ def main() -> None:
         found = measure(sample)
         rows += found
         groups += [group_of(sample.world)] * len(found)
-    fit(np.array([values[1:] for values, _ in rows]), np.array([same for _, same in rows]), groups)
+        # What was left out counts as well.
+        counts += [1 if any(len(room.doors) > 1 for room in sample.rooms) else args.every] * len(found)
+    fit(np.array([values[1:] for values, _ in rows]), np.array([same for _, same in rows]), groups, np.array(counts))
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ from closedrooms.mapping.logs import RecordedRun, read_run
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
-from closedrooms.mapping.scan_preparation import sweeps
+from closedrooms.mapping.scan_preparation import prepare_scans
 from closedrooms.mapping.trajectory import ate
 
 WITHOUT_LOOPS = MapperConfig(loops=LoopConfig(enabled=False))
@@ -67,8 +67,8 @@ def mapped(run: RecordedRun, config: MapperConfig) -> tuple[Mapper, FloatArray, 
     """The mapper after a run, the poses as estimated at the time, and the processor and wall-clock time it took [s]."""
     mapper = Mapper(config)
     start = clocks()
-    taken = zip(run.scans, run.odometry, sweeps(run.scans, config), strict=True)
-    online = [mapper.process(scan, Pose2(*pose), sweep=sweep).as_tuple() for scan, pose, sweep in taken]
+    taken = zip(run.scans, run.odometry, prepare_scans(run.scans, config), strict=True)
+    online = [mapper.process(scan, Pose2(*pose), prepared=ready).as_tuple() for scan, pose, ready in taken]
     mapper.finish()
     mapper.grid()
     return mapper, np.array(online), since(start)

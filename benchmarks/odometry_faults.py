@@ -20,7 +20,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2, wrap_angle
-from closedrooms.mapping.logs.recorded_run import RecordedRun, read_run
+from closedrooms.mapping.logs import RecordedRun, read_run
 from closedrooms.mapping.trajectory import ate
 
 Method = Callable[[RecordedRun], FloatArray]

@@ -5,6 +5,7 @@ the recording to be loaded, and it goes through all tabs, tabs within tabs too, 
 views are empty: what a view shows between its frame and its title is one colour.
 """
 
+import contextlib
 import socket
 import sys
 import time
@@ -28,6 +29,8 @@ DIFFERS, COLOURED = 24, 48
 # The headless window of 1920 x 1080: menu, bar of tabs or title of a view, collapsed time panel, and what of a view may
 # belong to the line between two [pixels].
 MENU, BAR, TIME_PANEL, EDGE = 38, 28, 29, 4
+# How often a picture is asked for before the viewer counts as gone.
+TRIES = 5
 Area = tuple[float, float, float, float]
 PLOTS = {"TimeSeries", "BarChart", "StateTimeline"}
 
@@ -95,11 +98,19 @@ def take(config: ScreenshotConfig) -> list[Shot]:
                     viewer.set_time(where["timeline"], play_state="paused", **rest)
                 time.sleep(config.settle)
                 path = config.out / f"{_file_name(name)}-{moment}.png"
-                picture = Image.open(BytesIO(viewer.take_screenshot())).convert("RGB")
+                picture = _take_picture(viewer)
                 shots.append(Shot(name, moment, path, tuple(_find_empty(viewer, blueprint, picture))))
                 picture.thumbnail((config.width, config.width))
                 picture.save(path)
     return shots
+
+
+def _take_picture(viewer: ViewerClient) -> Image.Image:
+    """Take a picture; a machine with other work to do, drawing without a GPU, is given more than one chance."""
+    for _ in range(TRIES - 1):
+        with contextlib.suppress(TimeoutError):
+            return Image.open(BytesIO(viewer.take_screenshot())).convert("RGB")
+    return Image.open(BytesIO(viewer.take_screenshot())).convert("RGB")
 
 
 def _free_port() -> int:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from closedrooms.mapping.config import RecoveryConfig as RecoveryConfig
     from closedrooms.mapping.graph.keyframe import Keyframe as Keyframe
     from closedrooms.mapping.mapper import Mapper as Mapper
-    from closedrooms.mapping.scan_preparation import Sweep as Sweep
-    from closedrooms.mapping.scan_preparation import sweeps as sweeps
+    from closedrooms.mapping.scan_preparation import PreparedScan as PreparedScan
+    from closedrooms.mapping.scan_preparation import prepare_scans as prepare_scans
     from closedrooms.mapping.trajectory import align as align
     from closedrooms.mapping.trajectory import ate as ate
 
@@ -30,7 +30,7 @@ __getattr__, __dir__, __all__ = lazy_face(
         "config": ("LoopConfig", "MapperConfig", "MatcherConfig", "RecoveryConfig"),
         "graph.keyframe": ("Keyframe",),
         "mapper": ("Mapper",),
-        "scan_preparation": ("Sweep", "sweeps"),
+        "scan_preparation": ("PreparedScan", "prepare_scans"),
         "trajectory": ("align", "ate"),
     },
 )

@@ -147,8 +147,8 @@ class RecoveryConfig:
     enabled: bool = True
     """Look for contradictions, search wide windows and start submaps."""
 
-    suspect: float = 0.8
-    """Share of the usual score below which a match is looked at for contradictions, as every keyframe is."""
+    check_below: float = 0.8
+    """Share of the usual score below which a match is checked for contradictions, as every keyframe is."""
 
     max_conflict: float = 0.20
     """Share of the surfaces [0..1] that a scan and the keyframe before may see through before the pose is taken for

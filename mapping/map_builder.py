@@ -15,7 +15,7 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.scan_odometry import ScanOdometry
-from closedrooms.mapping.scan_preparation import sweeps
+from closedrooms.mapping.scan_preparation import prepare_scans
 from closedrooms.mapping.trajectory import ate
 
 
@@ -70,15 +70,15 @@ def build_map(
     mapper = Mapper(config)
     online = np.empty((len(run.scans), 3))
     seconds = 0.0
-    made_ready = sweeps(run.scans, config)
+    made_ready = prepare_scans(run.scans, config)
     follower = None if run.has_odometry else ScanOdometry(config)
     odometry = np.array(run.odometry)
     for i, scan in enumerate(run.scans):
         start = time.perf_counter()
-        sweep = next(made_ready)
+        prepared = next(made_ready)
         if follower is not None:
-            odometry[i] = follower.follow(sweep.points, scan.stamp).as_tuple()
-        estimate = mapper.process(scan, Pose2(*odometry[i]), sweep=sweep)
+            odometry[i] = follower.follow(prepared.points, scan.stamp).as_tuple()
+        estimate = mapper.process(scan, Pose2(*odometry[i]), prepared=prepared)
         seconds += time.perf_counter() - start
         online[i] = estimate.as_tuple()
         if watch is not None:
@@ -103,8 +103,20 @@ def build_map(
         len(mapper.keyframes),
         seconds,
         errors,
-        (*(() if follower is None else _lost_remarks(follower.lost)), *mapper.events),
+        (
+            *(() if follower is None else _lost_remarks(follower.lost)),
+            *mapper.events,
+            *(() if grid.occupied.any() else _empty_remarks(run, config)),
+        ),
     )
+
+
+def _empty_remarks(run: RecordedRun, config: MapperConfig) -> tuple[Remark, ...]:
+    """Why a map shows no wall: as a rule, ranges in another unit."""
+    ranges = np.concatenate([scan.ranges[scan.hits] for scan in run.scans])
+    seen = f"half of the echoes are farther than {np.median(ranges):.4g} m" if ranges.size else "no echo in any scan"
+    why = f"{seen}; the map takes those up to {config.max_range:g} m"
+    return (Remark(action="dropped", what="walls", why=why, loss=True),)
 
 
 def _lost_remarks(count: int) -> tuple[Remark, ...]:

@@ -26,7 +26,7 @@ from closedrooms.mapping.matching.relocalisation import relocalise
 from closedrooms.mapping.matching.scan_matcher import ADVANTAGE, Match, match_scan
 from closedrooms.mapping.motion import UncertainMotion
 from closedrooms.mapping.motion_prediction import MotionPrediction
-from closedrooms.mapping.scan_preparation import Sweep
+from closedrooms.mapping.scan_preparation import PreparedScan
 from closedrooms.mapping.sweep_motion import SweepMotion
 from closedrooms.mapping.visibility import conflict
 
@@ -34,7 +34,7 @@ MOVED = (0.015, 0.003)
 """Correction of a keyframe ([m], [rad]) beyond which it is drawn anew."""
 SCORE_MEMORY = 0.05
 """Weight of the newest match in the usual score."""
-WITNESSES = 2
+COMPARED_KEYFRAMES = 2
 """Keyframes that a scan must contradict."""
 GOOD_SCORE = 0.75
 """Mean likelihood [0..1] of a good match, before the usual one is known."""
@@ -92,7 +92,7 @@ class Mapper:
         odometry: Pose2 | None,
         sightings: Sequence[DoorSighting] = (),
         *,
-        sweep: Sweep | None = None,
+        prepared: PreparedScan | None = None,
     ) -> Pose2:
         """Take in one scan.
 
@@ -100,15 +100,15 @@ class Mapper:
             scan: The sweep.
             odometry: ``odom_T_robot`` at its time, accumulated since any start; ``None`` where there is none.
             sightings: Closed doors seen in it, robot frame.
-            sweep: What is taken from the scan, where that was found for many at once (:func:`sweeps`).
+            prepared: What is taken from the scan, where that was found for many at once (:func:`prepare_scans`).
 
         Returns:
             ``map_T_robot`` as estimated.
         """
         motion = self._sweep_motion(scan, odometry)
         matcher, max_range = self._config.matcher, self._config.max_range
-        if sweep is not None and motion is None:
-            points = sweep.points
+        if prepared is not None and motion is None:
+            points = prepared.points
         else:
             reach = matched_range(scan, max_range=max_range, margin=matcher.range_margin)
             hits = hit_points(scan, max_range=reach, motion=motion)
@@ -116,7 +116,7 @@ class Mapper:
 
         @functools.cache
         def beams() -> Beams:
-            made = None if sweep is None or motion is not None else sweep.beams
+            made = None if prepared is None or motion is not None else prepared.beams
             return clean(scan, max_range=max_range, motion=motion) if made is None else made
 
         before = self._pose
@@ -199,7 +199,7 @@ class Mapper:
         if len(points) < self._config.matcher.min_points or not self._config.recovery.enabled:
             return False
         score = refine(self._local.field, points, self._pose, iterations=1).score
-        if score >= self._config.recovery.suspect * max(self._usual_score, GOOD_SCORE):
+        if score >= self._config.recovery.check_below * max(self._usual_score, GOOD_SCORE):
             return False
         self._motion = self._motion.without_odometry(*self._prediction.possible)
         return True
@@ -207,14 +207,14 @@ class Mapper:
     def _contradicts(self, match: Match | None, beams: Callable[[], Beams]) -> bool:
         """Check if a match, or the prediction without one, puts surfaces where the last keyframe saw none."""
         recovery, pose = self._config.recovery, self._pose if match is None else match.pose
-        if match is not None and match.score >= recovery.suspect * self._usual_score and not self._far(pose):
+        if match is not None and match.score >= recovery.check_below * self._usual_score and not self._far(pose):
             return False
         return self._conflict_at(pose, beams) > recovery.max_conflict
 
     def _conflict_at(self, pose: Pose2, beams: Callable[[], Beams]) -> float:
         """Measure the smallest conflict with the last keyframes: people that walk by contradict only one."""
         least: float | None = None
-        for keyframe in reversed(self.keyframes[-WITNESSES:]):
+        for keyframe in reversed(self.keyframes[-COMPARED_KEYFRAMES:]):
             if keyframe.submap != self.keyframes[-1].submap:
                 break
             share = conflict(keyframe.beams, beams(), keyframe.pose.inverse() @ pose)

@@ -92,7 +92,7 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class EarlyEnd:
     """Why a run ends early.
 
     Attributes:
@@ -143,7 +143,7 @@ def run_loop(
     config: NavigationConfig,
     *,
     on_step: Callable[[Step], None] | None = None,
-    stop: Callable[[Step], Stop | None] | None = None,
+    stop: Callable[[Step], EarlyEnd | None] | None = None,
 ) -> LoopLog:
     """Sense, map, decide and move until the decider has done what it wanted, or a limit is met.
 
@@ -207,17 +207,17 @@ class Limits:
         self._cells = grid.frame.rows * grid.frame.cols
         return grid
 
-    def check(self, step: Step) -> Stop | None:
+    def check(self, step: Step) -> EarlyEnd | None:
         """Check whether a limit is met by now."""
         config = self._config
         self._begun_at = step.stamp if self._begun_at is None else self._begun_at
         seconds = step.stamp - self._begun_at
         if seconds >= config.time_limit or math.isclose(seconds, config.time_limit):
-            return Stop("limit", f"not done after {config.time_limit:g} simulated seconds (time_limit)")
+            return EarlyEnd("limit", f"not done after {config.time_limit:g} simulated seconds (time_limit)")
         if self._cells > config.most_cells:
-            return Stop("limit", f"the map has {self._cells} cells, more than {config.most_cells} (most_cells)")
+            return EarlyEnd("limit", f"the map has {self._cells} cells, more than {config.most_cells} (most_cells)")
         if process_time() - self._begun >= config.cpu_limit:
-            return Stop("limit", f"not done after {config.cpu_limit:g} s of processor time (cpu_limit)")
+            return EarlyEnd("limit", f"not done after {config.cpu_limit:g} s of processor time (cpu_limit)")
         return None
 
 

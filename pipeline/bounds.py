@@ -8,7 +8,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig, RobotNavigation
-from closedrooms.navigation.control_loop import Stop
+from closedrooms.navigation.control_loop import EarlyEnd
 from closedrooms.worlds.connectivity import connected_parts
 from closedrooms.worlds.geometry import areal, wall_area
 from closedrooms.worlds.plan import FloorPlan
@@ -28,12 +28,12 @@ class Outline:
         self._area = shapely.union_all(filled).buffer(OUTSIDE_MARGIN)
         shapely.prepare(self._area)
 
-    def check(self, world_T_robot: Pose2) -> Stop | None:
+    def check(self, world_T_robot: Pose2) -> EarlyEnd | None:
         """End the run of a robot that is outside; its true pose in the building frame."""
         x, y = world_T_robot.x, world_T_robot.y
         if shapely.contains_xy(self._area, x, y):
             return None
-        return Stop("outside", f"the robot left the building at ({x:.1f}, {y:.1f}): its outline has a gap")
+        return EarlyEnd("outside", f"the robot left the building at ({x:.1f}, {y:.1f}): its outline has a gap")
 
 
 def check_size(plan: FloorPlan, resolution: float, limits: NavigationConfig) -> None:

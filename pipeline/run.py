@@ -130,7 +130,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
         Simulation(plan, closed, config.sim, config.seed) as sim,
     ):
         recorder.configuration(manifest["configuration"])
-        recorder.building(plan, sim.world_T_map.inverse(), closed)
+        recorder.building(sim.plan, sim.world_T_map.inverse(), closed)
         log, mapper = RunLog(sim, progress, keep_scans=config.keep_scans or config.bag), Mapper(config.mapper)
         found = _find_out(config, closed, log, mapper, recorder, progress, watch)
         remarks = [
@@ -197,7 +197,7 @@ def _find_out(
         progress.stage("cover")
         tours, missing, notes = plan_tours(survey, prediction, truth.grid, config)
         recorder.tours(tours)
-        spread = _spread(survey, prediction, tours, config)
+        spread = _spread(survey, prediction, tours, config, recorder)
     found = Finding(survey, prediction, truth, tours, missing, notes, spread)
     if not config.drive or "predicted" not in tours:
         return found
@@ -255,12 +255,16 @@ def plan_tours(
 
 
 def _spread(
-    survey: Survey, prediction: Prediction, tours: Mapping[str, CoverageTour], config: RunConfig
+    survey: Survey,
+    prediction: Prediction,
+    tours: Mapping[str, CoverageTour],
+    config: RunConfig,
+    recorder: "Recorder",
 ) -> CostSpread | None:
     """What covering the building may cost, where asked for and where there is a tour on the predicted map."""
     if not config.completions or "predicted" not in tours:
         return None
-    return spread_cost(
+    spread = spread_cost(
         tours["predicted"].length,
         survey.grid.frame,
         survey.doors,
@@ -270,6 +274,9 @@ def _spread(
         count=config.completions,
         seed=config.seed,
     )
+    likely = f"{spread.mean:.1f} m, likely {spread.low:.1f} to {spread.high:.1f} m"
+    recorder.note(f"tour over {config.completions} completions: {likely}")
+    return spread
 
 
 def _coverage(config: RunConfig) -> CoverageConfig:

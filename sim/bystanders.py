@@ -2,6 +2,7 @@
 
 import heapq
 import math
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -26,6 +27,17 @@ CELL, ELBOWS = 0.25, 0.3
 BOX, MOVED_EVERY, AWAY = 0.4, 60.0, 4.0
 # Places tried before a thing stays where it is.
 TRIES = 40
+
+
+class Mover(Protocol):
+    """Something that moves by itself."""
+
+    @property
+    def outline(self) -> Polygon:
+        """Where it stands, building frame [m]."""
+
+    def advance(self, duration: float, x: float, y: float, radius: float) -> None:
+        """Move on for ``duration`` [s] beside a robot of ``radius`` [m] at ``(x, y)`` [m]."""
 
 
 class _Body:

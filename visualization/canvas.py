@@ -11,13 +11,13 @@ import numpy.typing as npt
 import shapely
 from PIL import Image, ImageDraw, ImageFont
 from shapely.geometry.base import BaseGeometry
-from shapely.ops import substring
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.names import shown
 from closedrooms.visualization import colours
 from closedrooms.visualization.colours import Colour
+from closedrooms.visualization.dashes import cut_dashes
 
 Pixels = npt.NDArray[np.uint8]
 Bounds = tuple[float, float, float, float]
@@ -25,8 +25,6 @@ Bounds = tuple[float, float, float, float]
 COURSE_START, COURSE_END = np.array([48, 18, 140]), np.array([250, 150, 20])
 # Pieces of one colour in which a way is drawn.
 COURSE_PIECES = 240
-# Dashes that one ring is drawn in at most.
-MOST_DASHES = 500
 # OpenCV takes coordinates as fixed-point numbers with this many bits behind the point.
 SHIFT = 4
 # Further out than this nothing is drawn where it is [pixels]: what a user gives may lie anywhere.
@@ -90,12 +88,8 @@ class Canvas:
 
     def dashed(self, shape: BaseGeometry, colour: Colour, *, width: int = 2, dash: float = 9.0) -> None:
         """Draw the rings of a polygon in dashes of a length [pixels] with gaps as long."""
-        for ring in shapely.get_rings(shapely.get_parts(shape)):
-            line = shapely.LineString(ring.coords)
-            step = max(dash / self.scale, line.length / MOST_DASHES)
-            for start in np.arange(0.0, line.length, 2 * step):
-                piece = substring(line, start, min(start + step, line.length))
-                self.line(shapely.get_coordinates(piece), colour, width=width)
+        for piece in cut_dashes(shape, dash / self.scale):
+            self.line(piece, colour, width=width)
 
     def line(self, points: FloatArray, colour: Colour, *, width: int = 2) -> None:
         """Draw a polyline, shape (k, 2)."""

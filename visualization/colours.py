@@ -34,6 +34,9 @@ WALL: Colour = (188, 184, 176)
 FLOOR: Colour = (238, 236, 230)
 INK: Colour = (60, 60, 70)
 PAPER: Colour = (255, 255, 255)
+GLASS: Colour = (120, 190, 225)
+MOVER: Colour = (190, 130, 20)
+CONTACT: Colour = (160, 0, 60)
 LOOP: Colour = (150, 60, 190)
 TOURS: dict[str, Colour] = {
     "closed": (117, 90, 170),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
@@ -63,7 +64,7 @@ def draw_summary(
         OutputError: The folder cannot be written.
     """
     grids = [observed, prediction.grid, *([] if truth is None else [truth])]
-    bounds = _bounds(grids)
+    bounds = _bounds(grids, [other.polygon for room in prediction.rooms for other in room.alternatives])
     palette = colours.room_colours([d.id for d in doors] + [d for room in truth_rooms for d in room.doors])
     panels = [
         _map_panel(bounds, observed, doors, trajectory),
@@ -133,7 +134,7 @@ def _prediction_panel(
     _draw_doors(canvas, doors)
     title = f"Predicted: {len(prediction.rooms)} of {len(doors)} closed doors"
     if any(room.alternatives for room in prediction.rooms):
-        title += " (the fainter, the less sure; dashed: what else)"
+        title += " (faint: less sure, dashed: or else)"
     if room_iou:
         title += f", mean IoU {np.mean(list(room_iou.values())):.2f}"
     return title, canvas.finished()
@@ -178,6 +179,11 @@ def _draw_doors(canvas: "Canvas", doors: Sequence[ClosedDoor], *, named: bool = 
             canvas.text((door.midpoint[0], door.midpoint[1] + 14 / canvas.scale), door.id, colour=colours.DOOR_CLOSED)
 
 
+def room_opacity(confidence: float) -> float:
+    """Tell how strongly a room of a confidence is drawn, 0..1."""
+    return FAINTEST + (STRONGEST - FAINTEST) * confidence
+
+
 def _draw_rooms(
     canvas: "Canvas", rooms: Sequence[Room], palette: Mapping[str, colours.Colour], figures: Mapping[str, float]
 ) -> None:
@@ -186,7 +192,7 @@ def _draw_rooms(
         sure = USUAL if room.confidence is None else room.confidence
         for other in room.alternatives:
             canvas.dashed(other.polygon, colour)
-        canvas.fill(room.polygon, colour, opacity=FAINTEST + (STRONGEST - FAINTEST) * sure)
+        canvas.fill(room.polygon, colour, opacity=room_opacity(sure))
         canvas.outline(room.polygon, colour)
         label = "+".join(room.doors)
         known = [figures[door] for door in room.doors if door in figures]
@@ -197,9 +203,9 @@ def _draw_rooms(
         canvas.text(place, label)
 
 
-def _bounds(grids: Sequence[OccupancyGrid]) -> "Bounds":
-    """What is known in any of the grids, with a margin [m]."""
-    boxes = []
+def _bounds(grids: Sequence[OccupancyGrid], shapes: Sequence[BaseGeometry] = ()) -> "Bounds":
+    """What is known in any of the grids, and some shapes, with a margin [m]."""
+    boxes = [shape.bounds for shape in shapes if not shape.is_empty]
     for grid in grids:
         window = grid.known_bounds()
         if window is not None:

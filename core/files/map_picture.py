@@ -4,6 +4,7 @@ import os
 import re
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 import numpy.typing as npt
@@ -65,10 +66,12 @@ def _named(image: str) -> Path:
     text = re.sub("/{2,}", "/", text) if not SCHEME.match(text) else text
     scheme = SCHEME.match(text)
     if scheme:
-        rest = text[scheme.end() :]
-        _, _, below = rest.partition("/")
+        rest = unquote(text[scheme.end() :])
+        host, slash, below = rest.partition("/")
         # file://host/path and file:///path; the first word of the others is a package or host.
-        text = f"/{below}" if scheme[1].lower() == "file" else below
+        text = (f"/{below}" if slash else host) if scheme[1].lower() == "file" else below
+    elif text.lower().startswith("file:"):
+        text = unquote(text[len("file:") :])
     elif re.match("[A-Za-z]:/", text):
         text = text[2:]
     named = Path(text)

@@ -20,6 +20,7 @@ from closedrooms.experiments.dataset.layout import (
     Count,
     alone,
     claim,
+    early_end,
     file_sums,
     fingerprint,
     row,
@@ -73,7 +74,8 @@ def dataset(config: DatasetConfig, *, progress: Progress | None = None) -> Repor
         else:
             failed = _make_folders(config, worlds, progress)
             progress.stage("tables")
-            counts = _finish(config, worlds, failed)
+            counts, stopped = _finish(config, worlds, failed)
+            failed |= stopped
         return _report(config, worlds, counts, failed)
 
 
@@ -100,6 +102,7 @@ def _report(
             *((split, str(c.buildings), str(c.samples), f"{c.size / 1e6:.1f}") for split, c in counts.items()),
         ],
         failures=dict(sorted(failed.items())),
+        remarks=[remark for world in worlds for remark in world.remarks],
         figures={
             "fingerprint": fingerprint(config.out),
             "splits": {
@@ -182,8 +185,10 @@ def _there(folder: Path) -> bool:
     return True
 
 
-def _finish(config: DatasetConfig, worlds: Sequence[World], failed: Mapping[str, str]) -> dict[Split, Count]:
-    """Write what stands at the root and in front of each split of a dataset of folders."""
+def _finish(
+    config: DatasetConfig, worlds: Sequence[World], failed: Mapping[str, str]
+) -> tuple[dict[Split, Count], dict[str, str]]:
+    """Write root and tables of a dataset of folders; what is in it, and which samples hold less than their building."""
     assert isinstance(config.out, Path), "folders are of this machine"
     out = config.out
     if len(failed) == count_variants(worlds, config):
@@ -192,6 +197,7 @@ def _finish(config: DatasetConfig, worlds: Sequence[World], failed: Mapping[str,
             expected="at least one", where=out,
         )  # fmt: skip
     counts: dict[Split, Count] = {}
+    stopped: dict[str, str] = {}
     # One run.json is in memory at a time: a million of them have 21 GB. What the tables and sums need goes to disk.
     with tempfile.TemporaryFile("w+", dir=out, prefix=".sums.") as sums:
         surveys = [Task(config, world).folder for world in worlds if config.maps == "erased"]
@@ -199,7 +205,7 @@ def _finish(config: DatasetConfig, worlds: Sequence[World], failed: Mapping[str,
             _read(folder, out, sums)[1] for folder in sorted(surveys, key=lambda path: f"{path}/") if folder.exists()
         )
         for split in sorted(SPLITS):
-            counts[split] = _write_table(config, in_order(worlds, split), failed, sums)
+            counts[split] = _write_table(config, in_order(worlds, split), failed, sums, stopped)
         size += sum(count.size for count in counts.values())
         made: dict[Split, int] = {split: count.samples for split, count in counts.items()}
         write_bytes(out / CARD, card(config, worlds, made, failed, size).encode())
@@ -207,7 +213,7 @@ def _finish(config: DatasetConfig, worlds: Sequence[World], failed: Mapping[str,
         sums.seek(0)
         parts = (line.rstrip("\n").partition("  ") for line in sums)
         write_sums(out, ((name, value) for value, _, name in parts))
-    return {split: counts[split] for split in SPLITS}
+    return {split: counts[split] for split in SPLITS}, stopped
 
 
 def _read(folder: Path, out: Path, sums: TextIO) -> tuple[dict[str, Any], int]:
@@ -218,8 +224,10 @@ def _read(folder: Path, out: Path, sums: TextIO) -> tuple[dict[str, Any], int]:
     return about, sum(path.stat().st_size for path in folder.iterdir())
 
 
-def _write_table(config: DatasetConfig, worlds: Sequence[World], failed: Mapping[str, str], sums: TextIO) -> Count:
-    """The table of a split; what is in it."""
+def _write_table(
+    config: DatasetConfig, worlds: Sequence[World], failed: Mapping[str, str], sums: TextIO, stopped: dict[str, str]
+) -> Count:
+    """Write the table of a split; what is in it. Explorations that ended early are added to ``stopped``."""
     assert isinstance(config.out, Path), "folders are of this machine"
     out, sizes, samples, buildings = config.out, 0, 0, set()
 
@@ -231,6 +239,7 @@ def _write_table(config: DatasetConfig, worlds: Sequence[World], failed: Mapping
                     about, size = _read(out / variant.id, out, sums)
                     sizes, samples = sizes + size, samples + 1
                     buildings.add(world.name)
+                    stopped.update(early_end(variant.id, about))
                     yield row(variant, about)
 
     source = rows()

@@ -192,6 +192,26 @@ def description(config: DatasetConfig, worlds: Sequence[World]) -> dict[str, Any
     }
 
 
+def said(worlds: Sequence[World]) -> dict[str, Any]:
+    """Return what was said on reading the plans, as an entry of a manifest; nothing where nothing was said."""
+    remarks = [remark.as_json() for world in worlds for remark in world.remarks]
+    return {"remarks": remarks} if remarks else {}
+
+
+def early_end(sample: str, about: Mapping[str, Any]) -> dict[str, str]:
+    """Return why a sample holds less than its building, by its id; nothing of one that was explored whole.
+
+    Args:
+        sample: Its id.
+        about: Its ``run.json``.
+    """
+    exploration = about["exploration"]
+    if exploration["status"] == "complete":
+        return {}
+    why = f", {exploration['reason']}" if exploration.get("reason") else ""
+    return {sample: f"exploration ended early: {exploration['status']}{why}"}
+
+
 def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], place: Path | Url) -> None:
     """Refuse to mix two datasets.
 
@@ -215,7 +235,7 @@ def write_manifest(config: DatasetConfig, worlds: Sequence[World], failed: Mappi
         OutputError: It cannot be written.
     """
     assert isinstance(config.out, Path), "folders are of this machine"
-    head = {"command": "dataset", **description(config, worlds), "complete": True, "samples": []}
+    head = {"command": "dataset", **description(config, worlds), "complete": True, **said(worlds), "samples": []}
     empty = b"[]\n}\n"
     with new_file(config.out / DATASET_MANIFEST) as file:
         file.write(json_bytes(head).removesuffix(empty) + b"[")

@@ -25,6 +25,7 @@ class Shard:
         sha256: Of the file, hexadecimal.
         worlds: Buildings of its samples, in order.
         failures: Why samples between ``first`` and ``end`` are missing, by id.
+        stopped: Why samples hold less than their building, by id.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Shard:
     sha256: str
     worlds: tuple[str, ...] = ()
     failures: Mapping[str, str] = field(default_factory=dict)
+    stopped: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """Return plain values."""
@@ -51,6 +53,7 @@ def read_shard(data: Any, where: str) -> Shard:
     """
     try:
         shard = Shard(**{**data, "worlds": tuple(data["worlds"]), "failures": dict(data["failures"])})
+        dict(shard.stopped)
         whole = [shard.number, shard.first, shard.end, shard.rows, shard.size]
         if any(isinstance(value, bool) or not isinstance(value, int) or value < 0 for value in whole):
             raise ValueError

@@ -16,6 +16,7 @@ from closedrooms.experiments.dataset.layout import (
     description,
     json_bytes,
     read_stored_json,
+    said,
 )
 from closedrooms.experiments.dataset.sample import Outcome, Task
 from closedrooms.experiments.dataset.shard import DATA, PARTS, Shard, read_shard
@@ -238,7 +239,7 @@ def finish(config: DatasetConfig, worlds: Sequence[World], shards: Sequence[Shar
     """Write card, manifest and checksums; notes of shards are not needed any more.
 
     Returns:
-        Why samples are missing, by id, and the bytes of all shards and surveys.
+        Why samples are missing or hold less than their building, by id, and the bytes of all shards and surveys.
 
     Raises:
         InvalidInputError: There is no sample at all.
@@ -259,10 +260,11 @@ def finish(config: DatasetConfig, worlds: Sequence[World], shards: Sequence[Shar
         **description(config, worlds),
         "complete": True,
         "shards": [shard.as_json() for shard in shards],
+        **said(worlds),
     }
     write_file(store, DATASET_MANIFEST, json_bytes(manifest))
     sums = {shard.name: shard.sha256 for shard in shards if shard.rows}
     sums |= {name: file_digest(store, name) for name in [*surveys, CARD, DATASET_MANIFEST]}
     write_file(store, SUMS, "".join(f"{value}  {name}\n" for name, value in sorted(sums.items())).encode())
     store.remove(name for name in store.sizes(PARTS) if NOTE.fullmatch(name) or PART.fullmatch(name))
-    return failures, size
+    return failures | {name: why for shard in shards for name, why in shard.stopped.items()}, size

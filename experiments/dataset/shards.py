@@ -4,6 +4,7 @@ A part is one row (``parts/``, an Arrow stream), so that a killed command loses 
 the parts in front reach the size of a shard, a worker puts them together, writes down what is in it, and removes them.
 """
 
+import json
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.experiments.dataset.config import DatasetConfig
-from closedrooms.experiments.dataset.layout import json_bytes
+from closedrooms.experiments.dataset.layout import early_end, json_bytes
 from closedrooms.experiments.dataset.packing import (
     as_bytes,
     from_bytes,
@@ -107,6 +108,7 @@ def fill(job: Filling) -> Outcome:
     parts = [part_name(job.split, index) for index in range(job.first, job.end) if index not in missing]
     name, worlds = shard_name(job.split, job.number), dict[str, None]()
     size, digest = 0, ""
+    stopped: dict[str, str] = {}
     if parts:
         with store.new(name) as file:
             sink = Summed(file)
@@ -115,11 +117,15 @@ def fill(job: Filling) -> Outcome:
                 for at in range(0, len(parts), ROW_GROUP):
                     table = _joined(store, parts[at : at + ROW_GROUP])
                     worlds |= dict.fromkeys(table.column("world").to_pylist())
+                    for sample, text in zip(
+                        table.column("id").to_pylist(), table.column("run_json").to_pylist(), strict=True
+                    ):
+                        stopped |= early_end(sample, json.loads(text))
                     writer.write_table(table, row_group_size=ROW_GROUP)
             size, digest = sink.size, sink.digest
     failures = {sample: why for _, sample, why in job.failures}
     shard = Shard(
-        name, job.split, job.number, job.first, job.end, len(parts), size, digest, tuple(worlds), failures
+        name, job.split, job.number, job.first, job.end, len(parts), size, digest, tuple(worlds), failures, stopped
     )  # fmt: skip
     write_note(store, shard)
     store.remove(parts)

@@ -4,12 +4,13 @@ import hashlib
 import re
 import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.random import stream
+from closedrooms.core.remarks import Remark
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.formats.native import plan_text
@@ -33,6 +34,7 @@ class World:
         split: Where all its samples go.
         closable: Doors that close one room each, in plan order.
         digest: SHA-256 of the plan as our JSON: tells whether a file changed.
+        remarks: What was dropped, repaired or guessed on reading it.
     """
 
     name: str
@@ -40,6 +42,7 @@ class World:
     split: Split
     closable: tuple[str, ...]
     digest: str
+    remarks: tuple[Remark, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +90,13 @@ def find_worlds(config: DatasetConfig) -> list[World]:
         if not closable:
             raise InvalidInputError("no room that one door closes", expected="a world with such rooms", where=source)
         digest = hashlib.sha256(plan_text(plan).encode()).hexdigest()
-        worlds.append(World(name, source, splits[name], closable, digest))
+        worlds.append(World(name, source, splits[name], closable, digest, remarks_on(plan, name)))
     return worlds
+
+
+def remarks_on(plan: FloorPlan, name: str) -> tuple[Remark, ...]:
+    """Return what was said on reading one plan of several, with its name."""
+    return tuple(replace(remark, why=f"{remark.why}, in {name}") for remark in plan.remarks)
 
 
 def split_buildings(names: Sequence[str], seed: int) -> dict[str, Split]:

@@ -35,14 +35,14 @@ def score_cost(sample: Sample, prediction: Prediction, predicted: CoverageTour, 
         InvalidInputError: A true map without free space.
         OutputError: The folder cannot be written.
     """
-    truth = float(kept_tour(out, sample.truth, start=_find_start(sample, predicted))["length_m"])
+    truth = float(kept_tour(out, sample.truth, start=find_start(sample, predicted))["length_m"])
     length = predicted.length
     frame, rooms, probability = sample.observed.frame, prediction.rooms, prediction.probability
     spread = spread_cost(length, frame, sample.doors, rooms, probability, CoverageConfig(), count=count, seed=SEED)
     return spread.figures(truth) | {"predicted_m": round(length, 6), "truth_m": truth}
 
 
-def _find_start(sample: Sample, predicted: CoverageTour) -> Point:
+def find_start(sample: Sample, predicted: CoverageTour) -> Point:
     """Find where the robot is: at the origin, or, on a map that was not driven and shows nothing there, in its tour."""
     grid = sample.observed
     cell = grid.frame.to_cells(np.array(START))

@@ -14,8 +14,10 @@ from closedrooms.core.errors import InvalidInputError, OutputError, reason
 from closedrooms.core.files.incoming import read_json
 from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, only_writer, write_json
 from closedrooms.core.names import file_name
+from closedrooms.core.remarks import Remark
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
+from closedrooms.experiments.dataset.variants import remarks_on
 from closedrooms.experiments.evaluation.claimed_folder import claim
 from closedrooms.experiments.evaluation.tours import code_digest
 from closedrooms.experiments.robustness.config import FACTORS, RobustnessConfig
@@ -50,13 +52,13 @@ def robustness(config: RobustnessConfig, *, progress: Progress | None = None) ->
     """
     progress = progress or Silent()
     require("pyarrow", "matplotlib", by="closedrooms robustness")
-    worlds = _worlds(config.worlds)
+    worlds, remarks = _worlds(config.worlds)
     claim(config.out, "robustness")
     with only_writer(config.out):
-        return _sweep(worlds, config, progress)
+        return _sweep(worlds, config, progress, remarks)
 
 
-def _sweep(worlds: dict[str, str], config: RobustnessConfig, progress: Progress) -> Report:
+def _sweep(worlds: dict[str, str], config: RobustnessConfig, progress: Progress, remarks: Sequence[Remark]) -> Report:
     """Do what is not done yet, then write figures and manifest."""
     wanted = cases(config)
     total = len(worlds) * len({case.name for case in wanted})
@@ -77,7 +79,8 @@ def _sweep(worlds: dict[str, str], config: RobustnessConfig, progress: Progress)
         "paths": {"worlds": [input_path(world) for world in config.worlds]},
         "versions": versions(),
         "onsets": [asdict(onset) for onset in found],
-        "failures": failures,
+        "failures": failures | early_ends(rows),
+        "remarks": [remark.as_json() for remark in remarks],
         "files": sorted(path.name for path in config.out.iterdir() if path.name != MANIFEST),
     }
     write_json(config.out / MANIFEST, manifest)
@@ -85,7 +88,8 @@ def _sweep(worlds: dict[str, str], config: RobustnessConfig, progress: Progress)
         folder=config.out,
         title=f"{len(worlds) - len(failures)} worlds, {config.repetitions} sets of {config.closed} doors each",
         rows=_rows(found),
-        failures=failures,
+        failures=failures | early_ends(rows),
+        remarks=remarks,
         figures={"onsets": manifest["onsets"]},
     )
 
@@ -105,12 +109,23 @@ def _rows(onsets: Sequence[Onset]) -> list[tuple[str, ...]]:
     return rows
 
 
-def _worlds(given: Sequence[str]) -> dict[str, str]:
-    """Name the worlds by what was given."""
+def early_ends(rows: Sequence[Row]) -> dict[str, str]:
+    """Name the worlds some of whose explorations ended early: their maps hold less than the building."""
+    found: dict[str, set[str]] = {}
+    for row in rows:
+        if row["exploration"] != "complete":
+            found.setdefault(row["world"], set()).add(row["exploration"])
+    return {world: f"exploration ended early: {', '.join(sorted(how))}" for world, how in found.items()}
+
+
+def _worlds(given: Sequence[str]) -> tuple[dict[str, str], list[Remark]]:
+    """Name the worlds by what was given, and tell what was said on reading them."""
     wanted = [name for text in given for name in (bundled_names() if text == ALL else [text])]
     given = list(dict.fromkeys(wanted))
-    names = distinct_names([load_world(text) for text in given], given)
-    return {text: file_name(name) for text, name in zip(given, names, strict=True)}
+    plans = [load_world(text) for text in given]
+    names = [file_name(name) for name in distinct_names(plans, given)]
+    remarks = [remark for plan, name in zip(plans, names, strict=True) for remark in remarks_on(plan, name)]
+    return dict(zip(given, names, strict=True)), remarks
 
 
 @contextlib.contextmanager

@@ -115,6 +115,7 @@ class BuildingTrials:
         row: Row = {
             "world": self.name,
             "repetition": repetition,
+            "exploration": drive.status,
             "closed_doors": len(closing.closed),
             "doors_seen": len(known),
             "ate_m": _rounded(position),

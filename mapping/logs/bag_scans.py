@@ -11,6 +11,10 @@ from closedrooms.core.pose import wrap_angle
 from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.logs.transform_tree import Mount
 
+LARGEST_VIEW = 2.0 * math.pi + 0.1
+"""No sweep looks further around [rad], one beam and rounding more than a turn."""
+SAME_VIEW = 0.02
+"""Share by which last angle less first may miss the beams' steps: headers are rounded."""
 SCAN, ECHOES = "sensor_msgs/msg/LaserScan", "sensor_msgs/msg/MultiEchoLaserScan"
 
 
@@ -31,6 +35,33 @@ def _first_echo(echoes: FloatArray, shortest: float) -> float:
     return math.inf if (echoes == math.inf).any() else math.nan
 
 
+def sector_of(message: Any, beams: int) -> tuple[float, float, str]:
+    """Resolve the angles of a sweep whose header need not make sense: public writers put degrees or a count of steps.
+
+    Args:
+        message: LaserScan or MultiEchoLaserScan.
+        beams: Number of its ranges.
+
+    Returns:
+        Angle of the first beam and from one beam to the next [rad], and what was mended; empty where nothing was.
+
+    Raises:
+        InvalidInputError: Nothing to tell the angles by.
+    """
+    start, step = float(message.angle_min), float(message.angle_increment)
+    view = float(message.angle_max) - start
+    if not (math.isfinite(start) and math.isfinite(step) and beams):
+        raise InvalidInputError("a scan without angles", expected="finite angles")
+    if step != 0.0 and abs(step) * (beams - 1) <= LARGEST_VIEW:
+        return start, step, ""
+    agree = step != 0.0 and any(abs(step * gaps - view) <= SAME_VIEW * abs(view) for gaps in (beams - 1, beams))
+    if agree and math.radians(abs(step)) * (beams - 1) <= LARGEST_VIEW:
+        return math.radians(start), math.radians(step), "in degrees"
+    if beams > 1 and 0.0 < abs(view) <= LARGEST_VIEW:
+        return start, view / (beams - 1), "the step makes no sense; taken from the first and the last angle"
+    raise InvalidInputError("a scan of more than a turn, or of none", expected="angles in radians")
+
+
 def scan_of(message: Any, ranges: FloatArray, mount: Mount) -> LaserScan:
     """Convert a message to a sweep, counter-clockwise from above.
 
@@ -42,10 +73,8 @@ def scan_of(message: Any, ranges: FloatArray, mount: Mount) -> LaserScan:
     Raises:
         InvalidInputError: Angles or limits of no sense, or no ranges.
     """
-    start, step = float(message.angle_min), float(message.angle_increment)
+    start, step, _ = sector_of(message, ranges.size)
     longest, shortest = float(message.range_max), max(float(message.range_min), 0.0)
-    if not (math.isfinite(start) and math.isfinite(step) and step != 0.0 and ranges.size):
-        raise InvalidInputError("a scan without angles", expected="finite angles")
     if mount.upside_down:
         start, step = -start, -step
     if step < 0.0:

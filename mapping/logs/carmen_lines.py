@@ -154,7 +154,9 @@ def resolve_sector(start: float, view: float, step: float, beams: int) -> Sector
         raise ValueError("angles that are not finite")
     degrees = max(abs(start), abs(view)) > LARGEST_ANGLE
     if degrees:
-        start, view = math.radians(start), math.radians(view)
+        # Some writers turn only the field of view and the step into degrees: half of it tells.
+        view = math.radians(view)
+        start = start if abs(abs(start) - abs(view) / 2.0) < START_OFF else math.radians(start)
     view = abs(view)
     if max(abs(start), view) > LARGEST_ANGLE:
         raise ValueError("angles of more than a turn")

@@ -89,7 +89,10 @@ def scan_and_odometry_times(scans: Times, odometry: Times | None) -> tuple[Float
         count = sum(times.header.size for times in untold or streams[:1])
         remark = Remark(action="repaired", what="stamps", why=why, count=count)
         return scans.by_recorder(), empty if odometry is None else odometry.by_recorder(), [remark]
-    return scans.by_header(), empty if odometry is None else odometry.by_header(), []
+    unset = sum(int((times.header <= 0.0).sum()) for times in streams if times.told)
+    why = "not set by their sensor; the times of recording are taken, less its usual delay"
+    remarks = [Remark(action="repaired", what="stamps", why=why, count=unset)] if unset else []
+    return scans.by_header(), empty if odometry is None else odometry.by_header(), remarks
 
 
 def forward(stamps: FloatArray) -> tuple[FloatArray, list[Remark]]:

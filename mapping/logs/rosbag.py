@@ -18,7 +18,7 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.logs.bag_limits import limited
 from closedrooms.mapping.logs.bag_messages import MAX_SCANS, BagMessages, choose_connections, read_messages, stamp_of
 from closedrooms.mapping.logs.bag_options import BagOptions
-from closedrooms.mapping.logs.bag_scans import ranges_of, scan_of
+from closedrooms.mapping.logs.bag_scans import ranges_of, scan_of, sector_of
 from closedrooms.mapping.logs.clocks import Times, forward, scan_and_odometry_times
 from closedrooms.mapping.logs.odometry import bridge_jumps, jump_remarks, odometry_at
 from closedrooms.mapping.logs.recorded_run import RecordedRun
@@ -126,20 +126,26 @@ def _run(
 ) -> RecordedRun:
     """Put the scans that have odometry together."""
     scans, rows, broken, echoes = [], [], 0, 0
+    mended: Counter[str] = Counter()
     for row, i in enumerate(np.flatnonzero(known).tolist()):
         message = messages.scans[i][0]
         try:
             ranges, dropped = ranges_of(message)
             scan = scan_of(message, ranges, mounts[clean_name(message.header.frame_id)])
+            repair = sector_of(message, ranges.size)[2]
         except InvalidInputError:
             broken += 1
             continue
         echoes += dropped
+        mended.update([repair] if repair else [])
         scans.append(scan)
         rows.append(row)
     if broken:
         why = "no finite angles, no ranges, or no sense in their limits"
         remarks.append(Remark(action="dropped", what="scans", why=why, count=broken, loss=True))
+    remarks += [
+        Remark(action="repaired", what="angles of scans", why=how, count=count) for how, count in mended.items()
+    ]
     if echoes:
         remarks.append(Remark(action="dropped", what="echoes", why="the first of each beam is mapped", count=echoes))
     forwards, backwards = forward(stamps[np.flatnonzero(known)[rows]] if rows else np.zeros(0))
@@ -167,15 +173,18 @@ def _motion(
     """Read odometry as ``header stamp, recording time, x, y, yaw``; says which frame moves and what was guessed."""
     odometry = np.array(messages.odometry, dtype=np.float64).reshape(-1, 5)
     odometry = odometry[np.isfinite(odometry).all(axis=1)]
-    if len(odometry):
+    moving = messages.tree.odometry(lidar)
+    # Simulators and drivers without wheels publish an odometry that stands still beside transforms that move.
+    stands = options.odometry_topic is None and len(odometry) > 0 and not np.ptp(odometry[:, 2:], axis=0).any()
+    if len(odometry) and not (stands and moving is not None and np.ptp(moving.track[:, 2:], axis=0).any()):
         base = messages.base or messages.tree.base_of(lidar)
         if messages.base or base is None:
             return odometry, base, []
         why = f"the odometry does not say what it moves; taken to be {base}"
         return odometry, base, [Remark(action="guessed", what="frame of the robot", why=why)]
-    moving = messages.tree.odometry(lidar)
     if moving is not None:
-        why = f"no nav_msgs/Odometry; taken from the transforms {moving.frame} to {moving.base}"
+        what = "nav_msgs/Odometry never changes" if stands else "no nav_msgs/Odometry"
+        why = f"{what}; taken from the transforms {moving.frame} to {moving.base}"
         return moving.track, moving.base, [Remark(action="guessed", what="odometry", why=why)]
     if options.odometry_topic is not None:
         raise InvalidInputError(

@@ -142,8 +142,9 @@ class TransformTree:
         if goal is None or goal not in found:
             moving = start is not None and goal is not None and self._joined(start, goal)
             what = "a lidar that moves against its robot" if moving else "unknown mounting of the lidar"
+            ends = f"{base or 'the base'} to {lidar or 'a lidar without a frame'}"
             raise InvalidInputError(
-                f"{what}: {'no constant' if moving else 'no'} transform from {base or 'the base'} to {lidar}",
+                f"{what}: {'no constant' if moving else 'no'} transform from {ends}",
                 expected="one on /tf_static or /tf, or --mount X Y YAW",
             )
         matrix = found[goal]

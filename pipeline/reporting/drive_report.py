@@ -91,6 +91,7 @@ def draw_drive(path: Path, drive: DriveResult, truth_rooms: Sequence[Room]) -> N
     from closedrooms.core.files.outgoing import write_bytes
     from closedrooms.visualization import colours
     from closedrooms.visualization.canvas import Canvas
+    from closedrooms.visualization.summary import room_opacity
 
     log, outcome = drive.log, drive.outcome
     grid = outcome.prediction.grid
@@ -100,7 +101,10 @@ def draw_drive(path: Path, drive: DriveResult, truth_rooms: Sequence[Room]) -> N
     canvas.grid(grid)
     palette = colours.room_colours([door for room in truth_rooms for door in room.doors])
     for room in outcome.prediction.rooms:
-        canvas.fill(room.polygon, palette.get(room.doors[0], colours.INK), opacity=0.3)
+        colour = palette.get(room.doors[0], colours.INK)
+        for other in room.alternatives:
+            canvas.dashed(other.polygon, colour)
+        canvas.fill(room.polygon, colour, opacity=0.3 if room.confidence is None else room_opacity(room.confidence))
     for room in truth_rooms:
         canvas.outline(room.polygon, colours.TOURS["truth"], width=2)
     canvas.course(log.path, width=2)

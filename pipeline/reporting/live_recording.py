@@ -126,6 +126,8 @@ def record_step(recorder: "Recorder", log: RunLog, step: Step) -> None:
     """Record what was sensed, where the robot thinks it is and where it is."""
     observation = step.observation
     recorder.scan(observation.scan, observation.odometry, step.map_T_robot, truth=log.map_T_robot)
+    recorder.movers(log.sim.movers, observation.stamp)
+    recorder.contacts(observation.bumps, step.map_T_robot, observation.stamp)
 
 
 def _said(revision: Revision) -> str:

@@ -97,9 +97,8 @@ def spread_rows(spread: Mapping[str, Any] | None) -> Rows:
     if spread is None:
         return []
     share, low, high = 100 * spread["interval"], spread["low_m"], spread["high_m"]
-    rows = [
-        (f"tour, {spread['count']} completions", f"{spread['mean_m']:.1f} m, {share:.0f} %: {low:.1f} to {high:.1f} m")
-    ]
+    told = f"{spread['mean_m']:.1f} m ({share:.0f} %: {low:.1f} to {high:.1f} m)"
+    rows = [(f"tour, {spread['count']} completions", told)]
     if "true_within" in spread:
         rows.append(("true tour within", "yes" if spread["true_within"] else "no"))
     return rows

@@ -14,7 +14,7 @@ from closedrooms.predictor.best.pair_features import score_pairs
 
 # Doors share a room from this probability on. A shared room that is less likely than the other is not thought of.
 SHARED, LEAST = 0.5, 0.05
-OPEN = [feature.name for feature in features.FEATURES].index("open")
+COLUMNS = {feature.name: column for column, feature in enumerate(features.FEATURES)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,6 +37,10 @@ class Together:
     def sides(self) -> FloatArray:
         """Width and height of the best room of all, in the turned map [m]."""
         return np.asarray((self.both.boxes[0, 2:] - self.both.boxes[0, :2]) * RESOLUTION)
+
+    def measured(self, *names: str) -> float:
+        """Sum of some features of the best room of all."""
+        return float(sum(self.both.measured[0, COLUMNS[name]] for name in names))
 
     @property
     def quarters(self) -> set[int]:
@@ -66,6 +70,11 @@ def facing_walls(t: Together) -> float:
     return float(len(t.quarters) == 2 and len({quarter % 2 for quarter in t.quarters}) == 1)
 
 
+def meeting_walls(t: Together) -> float:
+    """Tell whether the doors are in walls of which two meet."""
+    return float(len({quarter % 2 for quarter in t.quarters}) == 2)
+
+
 def count_doors(t: Together) -> float:
     """Count the doors."""
     return float(len(t.alone))
@@ -86,7 +95,17 @@ def log_short_side(t: Together) -> float:
 
 def open_share(t: Together) -> float:
     """Share of the room with nothing known beyond it."""
-    return float(t.both.measured[0, OPEN])
+    return t.measured("open")
+
+
+def corner_gain(t: Together) -> float:
+    """Tell the same where the doors are in walls that meet."""
+    return gain(t) * meeting_walls(t)
+
+
+def corner_closed(t: Together) -> float:
+    """Sides with known space behind them where walls meet: a pocket closed all around holds two rooms as a rule."""
+    return t.measured("sides closed", "back closed") * meeting_walls(t)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,15 +124,17 @@ class SharedFeature:
 
 
 FEATURES = (
-    SharedFeature("always", lambda _: 1.0, weight=0.65),
-    SharedFeature("gain", gain, weight=0.17),
-    SharedFeature("crowd", crowd, weight=1.19),
-    SharedFeature("one wall", one_wall, weight=-4.88),
-    SharedFeature("facing walls", facing_walls, weight=-1.21),
-    SharedFeature("doors", count_doors, weight=-1.85),
-    SharedFeature("wall filled", wall_filled, weight=5.3),
-    SharedFeature("log short side", log_short_side, weight=1.24),
-    SharedFeature("open", open_share, weight=-1.34),
+    SharedFeature("always", lambda _: 1.0, weight=1.72),
+    SharedFeature("gain", gain, weight=0.089),
+    SharedFeature("corner gain", corner_gain, weight=0.256),
+    SharedFeature("crowd", crowd, weight=1.21),
+    SharedFeature("one wall", one_wall, weight=-5.95),
+    SharedFeature("facing walls", facing_walls, weight=-2.25),
+    SharedFeature("doors", count_doors, weight=-1.77),
+    SharedFeature("wall filled", wall_filled, weight=4.84),
+    SharedFeature("log short side", log_short_side, weight=1.1),
+    SharedFeature("open", open_share, weight=-2.18),
+    SharedFeature("corner closed", corner_closed, weight=-1.7),
 )
 WEIGHTS = np.array([feature.weight for feature in FEATURES])
 

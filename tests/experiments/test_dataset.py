@@ -426,3 +426,23 @@ def test_what_a_killed_worker_writes_after_its_parent_is_cleared_away_too(tmp_pa
         kept.write_text("whole")
     assert not late.exists()
     assert kept.exists()
+
+
+@pytest.mark.parametrize("layout", ["folders", "shards"])
+def test_explorations_that_end_early_and_doors_left_out_end_with_status_3(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], write_world: Callable[[Path, str, float], Path], layout: str
+) -> None:
+    path = write_world(tmp_path, "a", 3.0)
+    plan = json.loads(path.read_text())
+    plan["doors"].append(plan["doors"][0] | {"id": "astray", "segment": [[1, 1], [2, 1]]})
+    path.write_text(json.dumps(plan))
+    words = ["dataset", str(path), "--out", str(tmp_path / "set"), "--maps", "simulated", "--sim.lidar.beams", "90"]
+    words += ["--repetitions", "1", "--max-closed", "1", "--navigation.time-limit", "3", "--json"]
+    words += ["--format", layout]
+    assert main(words) == 3
+    told = json.loads(capsys.readouterr().out)
+    (why,) = told["failures"].values()
+    assert why == "exploration ended early: limit, not done after 3 simulated seconds (time_limit)"
+    (remark,) = told["remarks"]
+    assert (remark["names"], remark["loss"]) == (["astray"], True)
+    assert json.loads((tmp_path / "set" / "manifest.json").read_text())["remarks"] == told["remarks"]

@@ -2,6 +2,7 @@ import csv
 import json
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
@@ -269,6 +270,28 @@ def test_tours_can_be_left_out(tmp_path: Path) -> None:
     evaluate(config)
     assert not (tmp_path / "out" / "tours").exists()
     assert not (tmp_path / "out" / "figure-12.png").exists()
+
+
+def test_the_cost_of_coverage_is_told_as_a_distribution_on_request(tmp_path: Path) -> None:
+    write_sample(tmp_path / "data" / "01")  # no run.json: nobody knows |R|, and none is needed
+    write_sample(tmp_path / "data" / "02", width=80)
+    config = EvaluateConfig(
+        datasets=(tmp_path / "data",), out=tmp_path / "out", methods=("best", "geometric"), workers=1, completions=20
+    )
+    assert not evaluate(config).failures
+    with (tmp_path / "out" / "completions.csv").open() as file:
+        (row,) = csv.DictReader(file)  # none for rooms that overlap
+    assert (row["method"], row["samples"], row["completions"]) == ("best", "2", "20")
+    scores = [json.loads(path.read_text()) for path in sorted((tmp_path / "out" / "best").rglob("scores.json"))]
+    costs = [score["completions"] for score in scores]
+    assert float(row["within"]) == np.mean([cost["low_m"] <= cost["truth_m"] <= cost["high_m"] for cost in costs])
+    assert all(len(cost["lengths_m"]) == 20 and cost["low_m"] < cost["mean_m"] < cost["high_m"] for cost in costs)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "Cost of coverage" in page
+    assert (tmp_path / "out" / "completions.png").is_file()
+    # Without them nothing is said, and what was kept with them is not taken for it.
+    evaluate(replace(config, completions=0))
+    assert "completions" not in json.loads((tmp_path / "out" / "best" / "01" / "scores.json").read_text())
 
 
 def test_the_page_opens_in_a_browser_without_network_and_without_complaint(toured: Path, tmp_path: Path) -> None:

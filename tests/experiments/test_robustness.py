@@ -19,7 +19,7 @@ from closedrooms.experiments.robustness.door_noise import disturbed_doors, phant
 from closedrooms.experiments.robustness.drives import RecordedDrive, furnished, map_drive, odometry_noise
 from closedrooms.experiments.robustness.levels import cases, first_setting
 from closedrooms.experiments.robustness.onset import LevelResult, level_results, onsets
-from closedrooms.experiments.robustness.sweep import sweep_world
+from closedrooms.experiments.robustness.sweep import early_ends, sweep_world
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.sim.config import NOISE_LEVELS, FaultConfig, SimConfig
@@ -250,7 +250,7 @@ def test_a_defect_in_one_world_is_told_in_one_line(tmp_path: Path, monkeypatch: 
     def broken(*_: object) -> None:
         raise ZeroDivisionError("two\nlines")
 
-    monkeypatch.setattr("closedrooms.experiments.robustness.trial.Building", broken)
+    monkeypatch.setattr("closedrooms.experiments.robustness.trial.BuildingTrials", broken)
     why = sweep_world(("office-01", "office-01"), replace(CONFIG, out=tmp_path))
     assert why.startswith("internal error, please report it: ZeroDivisionError: two lines (test_robustness.py:")
 
@@ -285,3 +285,9 @@ def test_a_sweep_tells_where_the_prediction_suffers_and_goes_on_where_it_stopped
     assert main(words) == 0
     assert kept.stat().st_mtime_ns == stamp
     assert {name: (out / name).read_bytes() for name in before} == before
+
+
+def test_worlds_whose_explorations_ended_early_are_failures_in_part() -> None:
+    rows = [{"world": "a", "exploration": "complete"}, {"world": "b", "exploration": "limit"}]
+    rows += [{"world": "b", "exploration": "outside"}, {"world": "b", "exploration": "limit"}]
+    assert early_ends(rows) == {"b": "exploration ended early: limit, outside"}

@@ -8,7 +8,7 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.beams import clean, hit_points, thin_points
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.mapping.scan_preparation import TOGETHER, sweeps
+from closedrooms.mapping.scan_preparation import TOGETHER, prepare_scans
 
 CONFIG = MapperConfig()
 MOUNT = (0.2, -0.1, 0.3)
@@ -42,22 +42,22 @@ def few(hits: int) -> LaserScan:
 )
 def test_many_scans_at_once_give_what_each_gives_alone(scans: list[LaserScan]) -> None:
     matcher = CONFIG.matcher
-    for scan, sweep in zip(scans, sweeps(scans, CONFIG), strict=True):
+    for scan, prepared in zip(scans, prepare_scans(scans, CONFIG), strict=True):
         alone = clean(scan, max_range=CONFIG.max_range)
         hits = hit_points(scan, max_range=CONFIG.max_range)
-        assert sweep.points == pytest.approx(thin_points(hits, matcher.point_spacing, matcher.max_points), abs=1e-12)
-        assert sweep.beams.points == pytest.approx(alone.points, abs=1e-12)
-        assert sweep.beams.outline == pytest.approx(alone.outline, abs=1e-12)
-        assert sweep.beams.origin == pytest.approx(alone.origin)
+        assert prepared.points == pytest.approx(thin_points(hits, matcher.point_spacing, matcher.max_points), abs=1e-12)
+        assert prepared.beams.points == pytest.approx(alone.points, abs=1e-12)
+        assert prepared.beams.outline == pytest.approx(alone.outline, abs=1e-12)
+        assert prepared.beams.origin == pytest.approx(alone.origin)
 
 
-def test_no_scan_gives_no_sweep() -> None:
-    assert list(sweeps([], CONFIG)) == []
+def test_no_scan_gives_none() -> None:
+    assert list(prepare_scans([], CONFIG)) == []
 
 
 def test_a_sweep_does_not_keep_the_scans_beside_it() -> None:
-    sweep = next(sweeps([noisy(i) for i in range(5)], CONFIG))
-    for array in (sweep.points, sweep.beams.points, sweep.beams.outline):
+    prepared = next(prepare_scans([noisy(i) for i in range(5)], CONFIG))
+    for array in (prepared.points, prepared.beams.points, prepared.beams.outline):
         assert array.base is None or array.base.size == array.size
 
 
@@ -66,6 +66,6 @@ def test_the_mapper_estimates_the_same_from_sweeps(office: Any) -> None:
     poses = [Pose2(1.0 + 0.2 * i, 1.0, 0.05 * i) for i in range(12)]
     scans = [office.scan(pose, noise=0.03, rng=rng, stamp=0.1 * i) for i, pose in enumerate(poses)]
     alone, together = Mapper(config), Mapper(config)
-    for scan, pose, sweep in zip(scans, poses, sweeps(scans, config), strict=True):
-        assert alone.process(scan, pose) == together.process(scan, pose, sweep=sweep)
+    for scan, pose, prepared in zip(scans, poses, prepare_scans(scans, config), strict=True):
+        assert alone.process(scan, pose) == together.process(scan, pose, prepared=prepared)
     assert (alone.grid().cells == together.grid().cells).all()

@@ -15,7 +15,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.control_loop import LoopLog, Step, Stop, run_loop
+from closedrooms.navigation.control_loop import EarlyEnd, LoopLog, Step, run_loop
 from closedrooms.navigation.explorer import Explorer
 
 RESOLUTION, BEAMS, RANGE, RADIUS = 0.05, 180, 6.0, 0.2
@@ -190,8 +190,8 @@ def test_whoever_knows_more_may_stop_the_run() -> None:
     world = CellWorld(building(), START)
     config = NavigationConfig().for_robot(RobotConfig())
 
-    def after_a_second(step: Step) -> Stop | None:
-        return Stop("outside", "far out") if step.stamp >= 0.95 else None
+    def after_a_second(step: Step) -> EarlyEnd | None:
+        return EarlyEnd("outside", "far out") if step.stamp >= 0.95 else None
 
     result = run_loop(world, CellMapper(world.walls.shape), Explorer(config), config, stop=after_a_second)
     assert (result.status, result.reason) == ("outside", "far out")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from closedrooms.cli.commands import main
+from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.logs import RecordedRun
 from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.map_builder import build_map
@@ -78,3 +79,14 @@ def test_scans_that_fit_nowhere_without_odometry_are_counted(office: Any) -> Non
     (remark,) = [remark for remark in built.remarks if remark.what == "scans' poses"]
     assert (remark.what, remark.count, remark.loss) == ("scans' poses", 2, True)
     assert built.errors["final"][0] < 0.1
+
+
+def test_a_map_without_a_wall_says_why(office: Any) -> None:
+    drive = office.drive([(1.0, 1.0), (2.4, 1.0)])
+    scans = tuple(
+        LaserScan(1000.0 * scan.ranges, scan.angle_min, scan.angle_increment, 20_000.0, 50.0, scan.stamp)
+        for scan in drive.scans
+    )
+    (remark,) = [r for r in build_map(RecordedRun(scans, drive.odometry, None)).remarks if r.loss]
+    assert (remark.action, remark.what) == ("dropped", "walls")
+    assert "the map takes those up to 25 m" in remark.why

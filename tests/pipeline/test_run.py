@@ -4,10 +4,12 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from closedrooms.cli.commands import main
+from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import read_doors, read_features, read_rooms
 from closedrooms.core.files.rosmap import read_map
 from closedrooms.core.files.tum import read_trajectory
@@ -34,6 +36,21 @@ def test_names_set_noise_and_lidar_where_the_numbers_are_not_given() -> None:
     assert RunConfig(noise="high", sim=SimConfig()).sim.noise == NOISE_LEVELS["medium"]
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"completions": -3}, "--completions -3"),
+        ({"completions": 10_001}, "0 to 10000"),
+        ({"unsure_first": 0.5}, "--unsure-first without a drive"),
+        ({"unsure_first": 1.5, "drive": True}, "a confidence, 0 to 1"),
+        ({"unsure_first": float("nan"), "drive": True}, "a confidence, 0 to 1"),
+    ],
+)
+def test_options_of_what_is_unsure_that_cannot_be_are_refused(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(InvalidInputError, match=said):
+        RunConfig(**options)
+
+
 def test_the_seed_draws_the_rooms_to_close() -> None:
     plan = load_world("office-07")
     first, again, other = (choose_closed(plan, RunConfig(seed=seed)) for seed in (1, 1, 2))
@@ -48,8 +65,8 @@ def test_the_seed_draws_the_rooms_to_close() -> None:
 def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     base = tmp_path_factory.mktemp("runs")
     for name in ("a", "b"):
-        words = ["run", "office-01", "--close", "2", "--seed", "1", "--keep-scans", "--out", str(base / name)]
-        assert main(words) == 0
+        words = ["run", "office-01", "--close", "2", "--seed", "1", "--keep-scans", "--completions", "20"]
+        assert main([*words, "--out", str(base / name)]) == 0
     return base / "a", base / "b"
 
 
@@ -63,6 +80,11 @@ def test_a_run_leaves_every_file_in_one_frame_with_usable_figures(runs: tuple[Pa
     metrics = record["metrics"]
     assert metrics["area_mapped"] > 0.97
     assert metrics["ate_m"] < 0.10
+    spread, tour = metrics["completions"], metrics["tour"]
+    assert len(spread["lengths_m"]) == 20
+    assert spread["low_m"] < spread["mean_m"] < spread["high_m"]
+    assert spread["mean_m"] == pytest.approx(tour["predicted"]["length_m"], rel=0.2)
+    assert spread["true_within"] == (spread["low_m"] <= tour["truth"]["length_m"] <= spread["high_m"])
     doors, rooms = read_doors(folder / "doors.geojson"), read_rooms(folder / "rooms.geojson")
     assert sorted(door.id for door in doors) == record["closed"]
     assert sorted(metrics["room_iou"]) == record["closed"]

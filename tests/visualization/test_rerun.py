@@ -2,6 +2,7 @@ import logging
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,14 +17,17 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import OutputError
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
-from closedrooms.core.room import Room
+from closedrooms.core.room import Alternative, Room
 from closedrooms.core.scan import LaserScan
 from closedrooms.predictor.prediction import Level, Prediction, PredictionTrace
+from closedrooms.sim.config import SimConfig
+from closedrooms.sim.simulation import Simulation
 from closedrooms.visualization import colours
 from closedrooms.visualization.no_recording import no_recording
 from closedrooms.visualization.rerun import drawables
 from closedrooms.visualization.rerun.recorder import Recorder
 from closedrooms.visualization.rerun.stream import Stage
+from closedrooms.visualization.rerun.sureness import NOTHING_YET, probability_map
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom, Wall
 
 FRAME = GridFrame(0.1, -1.0, -1.0, 80, 120)
@@ -314,3 +318,87 @@ def test_no_recording_takes_every_call_of_a_recorder_and_wants_nothing() -> None
 def test_recording_nothing_loads_no_rerun() -> None:
     code = "import sys, closedrooms.pipeline.survey; sys.exit('rerun' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def a_sure_prediction(confidence: float) -> Prediction:
+    others = (Alternative(box(0, 3.1, 8, 6), 0.2), Alternative(box(0, 3.1, 10, 5), 0.1))
+    room = Room(box(0, 3.1, 10, 6), ("d01",), "independent", 3.0, confidence=confidence, alternatives=others)
+    percent = np.zeros(a_map().frame.shape, dtype=np.int8)
+    percent[20:30] = 80
+    return Prediction(a_map(), (room,), probability=OccupancyGrid(a_map().frame, percent))
+
+
+def test_a_room_is_the_fainter_the_less_sure_and_its_alternatives_are_dashed(tmp_path: Path) -> None:
+    alphas = []
+    for confidence in (0.2, 0.9):
+        path = tmp_path / f"{confidence}.rrd"
+        with Recorder(path, name="sure") as recorder:
+            recorder.prediction(a_map(), [], a_sure_prediction(confidence), iou={"d01": 0.5})
+        (row,) = rows(path, "/rooms/predicted/rooms/d01")
+        alphas.append(row["Mesh3D:albedo_factor"][0] & 0xFF)
+        dashes = rows(path, "/rooms/predicted/alternatives/d01")[-1]["LineStrips3D:strips"]
+        assert len(dashes) > 20
+        labels = rows(path, "/rooms/predicted/labels")[-1]["Points3D:labels"]
+        assert labels == [f"d01  IoU 0.50, confidence {confidence:.2f}"]
+        (first, last) = (row["TextDocument:text"][0] for row in rows(path, "/sureness/table"))
+        assert first == NOTHING_YET
+        assert f"| d01 | {confidence:.2f} | 0.50 | 29.0 | 23.2 m², 20 %; 19.0 m², 10 % |" in last
+    assert alphas[0] < alphas[1]
+
+
+def test_what_the_map_does_not_know_is_the_bluer_the_more_probably_it_is_floor() -> None:
+    frame = GridFrame(0.1, 0.0, 0.0, 4, 3)
+    cells = np.full(frame.shape, UNKNOWN, dtype=np.int8)
+    cells[0], cells[1] = FREE, OCCUPIED
+    percent = np.full(frame.shape, -1, dtype=np.int8)
+    percent[2], percent[3] = 100, 50
+    observed = OccupancyGrid(frame, cells)
+    drawn = probability_map(observed, Prediction(observed, (), probability=OccupancyGrid(frame, percent)))
+    assert drawn.data is not None
+    pixels = np.array(drawn.data.as_arrow_array()[0].as_py(), dtype=np.uint8).reshape(4, 3, 3)[::-1]
+    assert [tuple(int(value) for value in pixels[row, 1]) for row in range(3)] == [
+        (255, 255, 255), (40, 40, 40), colours.ESTIMATE,
+    ]  # fmt: skip
+    assert pixels[3, 1].tolist() == [111, 168, 200]
+
+
+def test_people_boxes_glass_and_contacts_are_drawn_where_there_are_any(recorded: set[str], tmp_path: Path) -> None:
+    path, plan = tmp_path / "busy.rrd", a_plan()
+    walls = (replace(plan.walls[0], material="glass"), *plan.walls[1:])
+    with Simulation(a_plan(), (), SimConfig(people=1, clutter=1), 0) as sim, Recorder(path, name="busy") as recorder:
+        recorder.building(replace(plan, walls=walls), Pose2(-1.0, -1.5), ())
+        for stamp in (0.0, 0.1, 0.5):
+            recorder.scan(a_scan(stamp), Pose2(), Pose2(2.0, 1.0, np.pi / 2))
+            recorder.movers(sim.movers, stamp)
+        recorder.contacts((), Pose2(), 0.5)
+        recorder.contacts((0.0,), Pose2(2.0, 1.0, np.pi / 2), 0.5)
+        person = sim.movers[0].outline.centroid
+    busy = {"/building/glass", "/building/people", "/building/boxes", "/map/contacts"}
+    assert busy <= entities(path)
+    assert not busy & recorded
+    people = rows(path, "/building/people")
+    assert [row["sim_time"].total_seconds() for row in people] == [0.0, 0.5]  # as often as a scan is kept
+    assert people[0]["Cylinders3D:centers"][0][:2] == pytest.approx([person.x - 1.0, person.y - 1.5], abs=1e-4)
+    assert rows(path, "/map/contacts")[0]["Points3D:positions"][0][:2] == pytest.approx([2.0, 1.2], abs=1e-5)
+
+
+def test_curves_have_many_values_over_time_and_one_a_stage(recording: Path) -> None:
+    values = rows(recording, "/metrics/known_area/map")
+    over_time = [row for row in values if row.get("sim_time") is not None]
+    by_stage = [row for row in values if row.get("stage") is not None]
+    assert len(over_time) == 3
+    assert not [row for row in values if row.get("sim_time") is not None and row.get("stage") is not None]
+    assert [row["stage"] for row in by_stage] == sorted({int(stage) for stage in Stage})
+    errors = rows(recording, "/metrics/position_error/estimate")
+    assert {row["stage"] for row in errors if row.get("stage") is not None} == {int(stage) for stage in Stage}
+
+
+def test_how_well_a_room_is_predicted_is_told_level_by_level(tmp_path: Path) -> None:
+    path = tmp_path / "levels.rrd"
+    with Recorder(path, name="levels") as recorder:
+        recorder.map(a_map(), 0.0)
+        recorder.truth(a_map(), [Room(box(0, 3, 10, 6), ("d01",))])
+        recorder.prediction(a_map(), [ClosedDoor("d01", (5.0, 3.0))], a_prediction(), iou={"d01": 0.9})
+    told = {row["stage"]: row["Scalars:scalars"][0] for row in rows(path, "/metrics/room_iou/d01") if "stage" in row}
+    assert told[Stage.EXPANSION] == pytest.approx(1.0)
+    assert told[Stage.ROOMS] == pytest.approx(0.9)

@@ -69,7 +69,7 @@ def test_no_view_of_a_run_is_empty_at_any_moment(tmp_path: Path, method: str) ->
     shots = screenshots.take(config)
     tabs = {shot.tab.split(" - ")[0] for shot in shots}
     own = {"Evidence", "Weighing"} if method == "best" else {"Structure", "Expansion"}
-    assert tabs == {"Building", "Mapping", "Rooms", "Coverage", "Result"} | own
+    assert tabs == {"Building", "Mapping", "Rooms", "How sure", "Coverage", "Result"} | own
     assert {(shot.tab, shot.moment): shot.empty for shot in shots if shot.empty} == {}
 
 

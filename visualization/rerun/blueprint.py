@@ -31,6 +31,7 @@ class Contents:
         weighed: Entity names of the rooms whose candidates a method weighed (tabs ``Evidence``, ``Weighing``).
         expansion: Lines, faces and layouts level by level (tabs ``Structure``, ``Expansion``).
         rooms: Predicted rooms (tab ``Rooms``).
+        sureness: How sure they are (tab ``How sure``).
         room_iou: How well each room is predicted, over time.
         truth: The true map and rooms.
         tours: Names of the maps with a tour (tab ``Coverage``).
@@ -47,6 +48,7 @@ class Contents:
     weighed: tuple[str, ...] = ()
     expansion: bool = False
     rooms: bool = False
+    sureness: bool = False
     room_iou: bool = False
     truth: bool = False
     tours: tuple[str, ...] = ()
@@ -83,6 +85,8 @@ def arrange(holds: Contents, bounds: Bounds | None) -> rrb.Blueprint:
         tabs += [_structure(layout), _expansion(layout)]
     if holds.rooms or holds.truth:
         tabs.append(_rooms(layout))
+    if holds.sureness:
+        tabs.append(_sureness(layout))
     if holds.tours:
         tabs.append(_coverage(layout))
     if holds.driving:
@@ -139,7 +143,7 @@ def _building(layout: Layout) -> rrb.Container:
 
 
 def _mapping(layout: Layout) -> rrb.Container:
-    view = _from_above(layout, "Map", ["+ /map/**"], aspect=1.3)
+    view = _from_above(layout, "Map", ["+ /map/**", "+ /building/people", "+ /building/boxes"], aspect=1.3)
     errors = {
         "position_error": "Position error [m]",
         "heading_error": "Heading error [deg]",
@@ -254,6 +258,15 @@ def _rooms(layout: Layout) -> rrb.Container:
     return rrb.Horizontal(maps, rrb.Vertical(*curves), column_shares=[2, 1], name="Rooms")
 
 
+def _sureness(layout: Layout) -> rrb.Container:
+    """What every cell and every room may be."""
+    contents = ["+ /sureness/grid", "+ /rooms/predicted/**", "- /rooms/predicted/grid", "+ /prediction/doors/bars"]
+    title = "Probability to be floor, from grey (0) to blue (1); rooms fainter where less sure, dashed what else"
+    table = rrb.TextDocumentView(origin="/sureness/table", name="Rooms by confidence")
+    view = _from_above(layout, title, contents, aspect=1.3)
+    return rrb.Horizontal(view, table, column_shares=[2, 1], name="How sure")
+
+
 def _coverage(layout: Layout) -> rrb.Container:
     titles = {
         "closed": ("Tour on the map M with its closed doors", "+ /coverage/closed/grid"),
@@ -305,11 +318,11 @@ def _log() -> rrb.View:
 
 
 def _series(name: str, title: str, *, top: float | None = None) -> rrb.View:
-    """Curves over the whole run, whatever the cursor; along the axis the time [s]."""
+    """Curves over the whole run, whatever the cursor; along the axis the time [s], or the stage where that is shown."""
     always = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
     return rrb.TimeSeriesView(
         origin=f"/metrics/{name}",
-        name=f"{title} over sim_time [s]",
+        name=f"{title} over sim_time [s], or stage",
         axis_x=rrb.TimeAxis(view_range=always),
         axis_y=None if top is None else rrb.ScalarAxis(range=(0.0, 1.05 * top)),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),

@@ -1,18 +1,20 @@
 """The simulated building in a recording: walls, floors, and doors that move."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 import rerun as rr
 import shapely
-from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry import MultiPolygon, Point, Polygon
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.pose import Pose2
 from closedrooms.sim.building import FURNITURE_HEIGHT
+from closedrooms.sim.bystanders import BOX, PERSON_HEIGHT, PERSON_RADIUS, Mover, Person
 from closedrooms.sim.config import SimConfig
 from closedrooms.sim.door_leaves import Leaf, door_leaves
 from closedrooms.sim.doors import DOOR_HEIGHT
+from closedrooms.sim.glass import glass_area
 from closedrooms.visualization import colours
 from closedrooms.visualization.rerun import drawables
 from closedrooms.visualization.rerun.stream import RecordingStream
@@ -21,6 +23,8 @@ from closedrooms.worlds.geometry import areal, wall_area
 from closedrooms.worlds.plan import FloorPlan
 
 Area = Polygon | MultiPolygon
+# One sees through glass [0..255].
+GLASS_ALPHA = 90
 
 
 class RecordedBuilding:
@@ -66,16 +70,58 @@ class RecordedBuilding:
                 if opens:
                     self._stream.log(f"door_states/{door}", rr.StateChange(state="open"))
 
+    def draw_movers(self, movers: Sequence[Mover]) -> None:
+        """Draw people as upright cylinders and boxes as boxes."""
+        people = [mover.outline.centroid for mover in movers if isinstance(mover, Person)]
+        boxes = [mover.outline.centroid for mover in movers if not isinstance(mover, Person)]
+        if people:
+            centres = self._lift(people, PERSON_HEIGHT / 2)
+            count = len(people)
+            self._stream.log(
+                "building/people",
+                rr.Cylinders3D(
+                    lengths=[PERSON_HEIGHT] * count,
+                    radii=[PERSON_RADIUS] * count,
+                    centers=centres,
+                    colors=[colours.MOVER] * count,
+                    fill_mode="solid",
+                ),
+            )
+        if boxes:
+            half = [[BOX / 2] * 3] * len(boxes)
+            centres, turned = (
+                self._lift(boxes, BOX / 2),
+                rr.RotationAxisAngle([0, 0, 1], rr.Angle(rad=self._map_T_world.theta)),
+            )
+            self._stream.log(
+                "building/boxes",
+                rr.Boxes3D(
+                    half_sizes=half,
+                    centers=centres,
+                    rotation_axis_angles=[turned] * len(boxes),
+                    colors=[colours.MOVER] * len(boxes),
+                    fill_mode="solid",
+                ),
+            )
+
+    def _lift(self, places: Sequence[Point], z: float) -> FloatArray:
+        """Places of the building frame in the map frame, at a height [m], shape (n, 3)."""
+        flat = self._map_T_world.transform(shapely.get_coordinates(np.asarray(places, dtype=object)))
+        return np.column_stack((flat, np.full(len(flat), z)))
+
     def _draw_shell(self, plan: FloorPlan, walls: Area, furniture: Area) -> None:
-        self._draw_solid("building/walls", walls, WALL_HEIGHT, colours.WALL)
+        glass = glass_area(plan, walls)
+        self._draw_solid("building/walls", areal(walls.difference(glass)), WALL_HEIGHT, colours.WALL)
+        if not glass.is_empty:
+            self._draw_solid("building/glass", glass, WALL_HEIGHT, colours.GLASS, alpha=GLASS_ALPHA)
         floors = [Polygon(self._map_T_world.transform(np.asarray(room.polygon.exterior.coords))) for room in plan.rooms]
         self._stream.log("building/floor", drawables.fill(floors, colours.FLOOR, alpha=255, z=-0.02), static=True)
         if not furniture.is_empty:
             self._draw_solid("building/furniture", furniture, FURNITURE_HEIGHT, colours.FURNITURE)
 
-    def _draw_solid(self, path: str, area: Area, height: float, colour: colours.Colour) -> None:
+    def _draw_solid(self, path: str, area: Area, height: float, colour: colours.Colour, *, alpha: int = 255) -> None:
         vertices, triangles = extrude(area, height=height)
-        self._stream.log(path, drawables.solid(self._in_map(vertices), triangles, colour), static=True)
+        self._stream.log(path, drawables.solid(self._in_map(vertices), triangles, colour, alpha=alpha), static=True)
 
     def _draw_open_doors(self, doors: Collection[str]) -> None:
         """Doors that stay open are one mesh: a large floor has hundreds."""

@@ -23,6 +23,7 @@ class Curves:
         self._poses: list[tuple[float, ...]] = []
         self._sent = 0
         self._styled: set[str] = set()
+        self._by_stage: dict[str, dict[int, float]] = {}
         self.corrected: tuple[FloatArray, FloatArray] | None = None
 
     def __len__(self) -> int:
@@ -42,20 +43,56 @@ class Curves:
         """True poses of every scan, where they come afterwards."""
         self._poses = [(*row[:8], *map(float, pose)) for row, pose in zip(self._poses, poses, strict=True)]
 
-    def add(self, path: str, value: float, name: str, colour: colours.Colour, *, dots: bool = False) -> None:
-        """Add one value of a curve, now."""
+    def add(
+        self,
+        path: str,
+        value: float,
+        name: str,
+        colour: colours.Colour,
+        *,
+        stamp: float | None,
+        stage: int,
+        dots: bool = False,
+    ) -> None:
+        """Add one value of a curve.
+
+        Over the time it is one of many; over the stages the last one counts (:meth:`send_stages`).
+
+        Args:
+            path: Of the curve.
+            value: The value.
+            name: Of the curve, for people.
+            colour: Of the curve.
+            stamp: When [s]; ``None`` where no time goes by.
+            stage: At which stage.
+            dots: Mark the values.
+        """
         if path not in self._styled:
             self._styled.add(path)
             marks = [rr.SeriesPoints(colors=[colour], marker_sizes=[5.0])] if dots else []
             lines = rr.SeriesLines(colors=[colour], names=[name], widths=[1.5])
             self._stream.log(path, lines, *marks, static=True)
-        self._stream.log(path, rr.Scalars(value))
+        if stamp is not None:
+            self._stream.columns(path, rr.Scalars.columns(scalars=[value]), stamps=np.array([stamp]))
+        self._by_stage.setdefault(path, {})[int(stage)] = value
 
-    def add_iou(self, iou: Mapping[str, float], palette: Mapping[str, colours.Colour]) -> None:
-        """Add how well each room is predicted now, by door."""
+    def add_iou(
+        self, iou: Mapping[str, float], palette: Mapping[str, colours.Colour], *, stamp: float | None, stage: int
+    ) -> None:
+        """Add how well each room is predicted, by door."""
         for door, value in iou.items():
-            colour = palette.get(door, colours.INK)
-            self.add(f"metrics/room_iou/{rr.escape_entity_path_part(door)}", value, door, colour, dots=True)
+            path, colour = f"metrics/room_iou/{rr.escape_entity_path_part(door)}", palette.get(door, colours.INK)
+            self.add(path, value, door, colour, stamp=stamp, stage=stage, dots=True)
+
+    def send_stages(self, last: int) -> None:
+        """Send every curve over the stages: each value stays until the next one, up to the last stage."""
+        for path, values in self._by_stage.items():
+            stages = sorted({*values, *(stage for stage in (*Stage, last) if min(values) <= stage <= last)})
+            held, told = 0.0, []
+            for stage in stages:
+                held = values.get(stage, held)
+                told.append(held)
+            self._stream.columns(path, rr.Scalars.columns(scalars=told), stages=stages)
 
     def send_poses(self) -> None:
         """Send the poses since the last time, so that a robot moves."""
@@ -63,9 +100,9 @@ class Curves:
         if not rows:
             return
         stamps, steps, _, estimate, truth = _split(rows)
-        self._stream.columns("map/robot", stamps, drawables.pose_columns(estimate), steps)
+        self._stream.columns("map/robot", drawables.pose_columns(estimate), stamps=stamps, stages=steps)
         if np.isfinite(truth[:, 0]).all():
-            self._stream.columns("building/robot", stamps, drawables.pose_columns(truth), steps)
+            self._stream.columns("building/robot", drawables.pose_columns(truth), stamps=stamps, stages=steps)
 
     def send_errors(self) -> None:
         """Errors against the true poses, once they are all known."""
@@ -86,7 +123,9 @@ class Curves:
 
     def _send(self, path: str, stamps: FloatArray, values: FloatArray, name: str, colour: colours.Colour) -> None:
         self._stream.log(path, rr.SeriesLines(colors=[colour], names=[name], widths=[1.5]), static=True)
-        self._stream.columns(path, stamps, rr.Scalars.columns(scalars=values), [Stage.MAPPING] * len(stamps))
+        self._stream.columns(path, rr.Scalars.columns(scalars=values), stamps=stamps)
+        if len(values):
+            self._by_stage[path] = {Stage.BUILDING: float(values[0]), Stage.MAPPING: float(values[-1])}
 
 
 def _split(rows: list[tuple[float, ...]]) -> tuple[FloatArray, list[int], FloatArray, FloatArray, FloatArray]:

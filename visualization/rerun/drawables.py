@@ -1,8 +1,10 @@
 """Values of closedrooms as rerun archetypes: metres, map frame, z up, flat things lifted a little above the floor."""
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 import rerun as rr
 import shapely
 from shapely.geometry.base import BaseGeometry
@@ -12,11 +14,14 @@ from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.visualization import colours
 from closedrooms.visualization.colours import Colour
+from closedrooms.visualization.dashes import cut_dashes
 
 # Heights of flat things [m]: far enough apart for the depth buffer, too small for a parallax that one could see.
 Z_GRID, Z_FILL, Z_LINE, Z_PATH, Z_POINT = 0.0, 0.02, 0.04, 0.06, 0.08
 # Radii below 0 are in points of the screen, whatever the zoom (what `Radius.ui_points` makes).
 THIN, MEDIUM, THICK = -0.75, -1.5, -2.5
+# Length of a dash [m].
+DASH = 0.25
 
 
 def _grey_values() -> np.ndarray[tuple[int], np.dtype[np.uint8]]:
@@ -44,14 +49,19 @@ def grid_map(grid: OccupancyGrid) -> rr.GridMap:
     rerun draws the first row at the top and places the lower-left corner, so that the rows are turned.
     """
     row, col, rows, cols = grid.known_bounds() or (0, 0, 1, 1)
-    frame: GridFrame = grid.frame.cropped(row, col, rows, cols)
     pixels = GREY[grid.cells[row : row + rows, col : col + cols].view(np.uint8)]
+    return picture(pixels, grid.frame.cropped(row, col, rows, cols))
+
+
+def picture(pixels: npt.NDArray[np.uint8], frame: GridFrame) -> rr.GridMap:
+    """Return the cells of a frame in grey, shape (rows, cols), or in colour, shape (rows, cols, 3)."""
+    model: Literal["L", "RGB"] = "L" if pixels.ndim == 2 else "RGB"
     return rr.GridMap(
         data=pixels[::-1].tobytes(),
-        format=rr.components.ImageFormat(width=cols, height=rows, color_model="L", channel_datatype="U8"),
+        format=rr.components.ImageFormat(width=frame.cols, height=frame.rows, color_model=model, channel_datatype="U8"),
         cell_size=frame.resolution,
         translation=[frame.origin_x, frame.origin_y, Z_GRID],
-        colormap=rr.components.Colormap.Grayscale,
+        colormap=rr.components.Colormap.Grayscale if model == "L" else None,
     )
 
 
@@ -77,6 +87,12 @@ def outlines(
     rings = shapely.get_rings(shapely.get_parts(np.asarray(list(shapes), dtype=object)))
     strips = [lifted(shapely.get_coordinates(ring), z) for ring in rings]
     return rr.LineStrips3D(strips, colors=[colour], radii=[radius])
+
+
+def dashed(shapes: Sequence[BaseGeometry], colour: Colour, *, z: float = Z_LINE) -> rr.LineStrips3D:
+    """Return the rings of polygons in dashes."""
+    pieces = [lifted(piece, z) for shape in shapes for piece in cut_dashes(shape, DASH)]
+    return rr.LineStrips3D(pieces, colors=[colour], radii=[MEDIUM])
 
 
 def strips(

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from closedrooms.coverage.tour.coverage_tour import CoverageTour
     from closedrooms.predictor.prediction import PredictionTrace
 
+# Opacity of a room of which nothing tells how sure it is, of one that is not sure at all, and of one that is sure.
+USUAL, FAINTEST, STRONGEST = 110, 25, 190
 LINE_COLOURS: dict[str, Colour] = {"wall": (0, 114, 178), "border": (110, 110, 120), "split": (213, 94, 0)}
 
 
@@ -75,14 +77,21 @@ def draw_rooms(
     iou: Mapping[str, float] | None = None,
     static: bool = False,
 ) -> None:
-    """Draw a whole map with the rooms in their doors' colours, labelled with IoU where known, else area."""
+    """Draw a whole map with the rooms in their doors' colours, fainter where less sure, dashed what else they may be.
+
+    They are labelled with IoU where known, else area, and with their confidence.
+    """
     stream.log(f"{root}/grid", drawables.grid_map(grid), static=static)
     if not static:
         stream.clear(f"{root}/rooms")
+        stream.clear(f"{root}/alternatives")
     names = ["+".join(room.doors) or f"room-{number}" for number, room in enumerate(rooms)]
     for name, room in zip(names, rooms, strict=True):
         colour = palette.get(next(iter(room.doors), ""), colours.INK)
-        _draw_room(stream, f"{root}/rooms/{name}", room.polygon, colour, static=static)
+        _draw_room(stream, f"{root}/rooms/{name}", room.polygon, colour, static=static, alpha=_alpha(room))
+        if room.alternatives:
+            others = drawables.dashed([other.polygon for other in room.alternatives], colour)
+            stream.log(f"{root}/alternatives/{name}", others, static=static)
     places = np.array([shapely.get_coordinates(r.polygon.representative_point())[0] for r in rooms]).reshape(-1, 2)
     stream.log(
         f"{root}/labels",
@@ -181,13 +190,25 @@ def _draw_scores(stream: RecordingStream, trace: "PredictionTrace", palette: Map
 
 
 def _draw_room(
-    stream: RecordingStream, root: str, shape: BaseGeometry, colour: Colour, *, static: bool = False
+    stream: RecordingStream,
+    root: str,
+    shape: BaseGeometry,
+    colour: Colour,
+    *,
+    static: bool = False,
+    alpha: int = USUAL,
 ) -> None:
-    stream.log(root, drawables.fill([shape], colour), static=static)
+    stream.log(root, drawables.fill([shape], colour, alpha=alpha), static=static)
     stream.log(f"{root}/outline", drawables.outlines([shape], colour), static=static)
 
 
 def _label(room: Room, iou: Mapping[str, float]) -> str:
     known = [iou[door] for door in room.doors if door in iou]
     figure = f"IoU {min(known):.2f}" if known else f"{room.polygon.area:.1f} m²"
-    return f"{'+'.join(room.doors)}  {figure}"
+    sure = "" if room.confidence is None else f", confidence {room.confidence:.2f}"
+    return f"{'+'.join(room.doors)}  {figure}{sure}"
+
+
+def _alpha(room: Room) -> int:
+    """How strongly a room is filled, 0 to 255."""
+    return USUAL if room.confidence is None else round(FAINTEST + (STRONGEST - FAINTEST) * room.confidence)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import rerun as rr
+import shapely
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor, Point
@@ -17,17 +18,20 @@ from closedrooms.core.names import markdown_text
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.core.scan import LaserScan
+from closedrooms.core.shapes import Shape
 from closedrooms.visualization import colours
 from closedrooms.visualization.rerun import drawables
 from closedrooms.visualization.rerun.blueprint import Bounds, Contents, arrange
 from closedrooms.visualization.rerun.curves import Curves
 from closedrooms.visualization.rerun.prediction import draw_doors, draw_input, draw_rooms, draw_tours, draw_trace
 from closedrooms.visualization.rerun.stream import RecordingStream, Stage
+from closedrooms.visualization.rerun.sureness import draw_nothing_yet, draw_sureness
 from closedrooms.visualization.rerun.weighed import draw_weighed, room_name
 
 if TYPE_CHECKING:
     from closedrooms.coverage.tour.coverage_tour import CoverageTour
-    from closedrooms.predictor.prediction import Prediction
+    from closedrooms.predictor.prediction import Level, Prediction
+    from closedrooms.sim.bystanders import Mover
     from closedrooms.visualization.rerun.building import RecordedBuilding
     from closedrooms.worlds.plan import FloorPlan
 
@@ -48,6 +52,8 @@ LEGEND = """| colour | what |
 | pink | frontiers |
 | yellow | goal and the way there |
 | violet | loops that were closed |
+| ochre | people and boxes that move |
+| crimson | where the robot touched something |
 """
 
 
@@ -90,6 +96,8 @@ class Recorder:
         self._seen: set[str] = set()
         self._floor, self._quarters = 0.0, 0
         self._grids: dict[str, OccupancyGrid] = {}
+        self._truth: dict[str, Shape] = {}
+        self._touched: list[Point] = []
         self._last_scan = self._last_map = -np.inf
 
     def __enter__(self) -> Self:
@@ -106,10 +114,17 @@ class Recorder:
                 self._send_scans()
                 self._curves.send_poses()
                 self._curves.send_errors()
+                self._curves.send_stages(self._last_stage())
                 self._hold(reference=self._curves.has_reference)
                 self._stream.arrange(arrange(self._holds, self._bounds))
         finally:
             self._stream.__exit__(kind, error, trace)
+
+    def _last_stage(self) -> int:
+        """Tell how far it got on the timeline of stages."""
+        holds = self._holds
+        reached = {Stage.DRIVING: holds.driving, Stage.COVERAGE: bool(holds.tours), Stage.ROOMS: holds.rooms}
+        return next((stage for stage, held in reached.items() if held), Stage.MAPPING)
 
     def configuration(self, values: Mapping[str, object]) -> None:
         """Record the configuration as it was resolved; paths (``out``) are left out, so that equal runs stay equal."""
@@ -141,6 +156,25 @@ class Recorder:
         if self._building is not None:
             self._stream.at(stamp, self._stage)
             self._building.move(states)
+
+    def movers(self, movers: Sequence["Mover"], stamp: float) -> None:
+        """Record where people and boxes are that move by themselves, as often as scans are kept."""
+        if self._building is not None and movers and self._last_scan == stamp:
+            self._stream.at(stamp, self._stage)
+            self._building.draw_movers(movers)
+
+    def contacts(self, bumps: Sequence[float], map_T_robot: Pose2, stamp: float) -> None:
+        """Record where something pressed against the robot, by directions in its frame [rad]."""
+        if not bumps:
+            return
+        ends = self._radius * np.column_stack((np.cos(bumps), np.sin(bumps)))
+        first = not self._touched
+        self._touched += [(float(x), float(y)) for x, y in map_T_robot.transform(ends)]
+        self._stream.at(stamp, self._stage)
+        places = np.array(self._touched)
+        self._stream.log("map/contacts", drawables.points(places, colours.CONTACT, radius=2 * drawables.THICK))
+        if first:
+            self.note("the robot touches something for the first time", stamp)
 
     def scan(self, scan: LaserScan, odometry: Pose2, map_T_robot: Pose2, *, truth: Pose2 | None = None) -> None:
         """Keep the poses, and draw every few scans."""
@@ -183,20 +217,26 @@ class Recorder:
         self._stream.log("map/grid", drawables.grid_map(grid))
         if first:
             # Until something is predicted, what is predicted is what is known.
-            for place in ("prediction/input", "rooms/predicted/grid"):
-                self._stream.log(place, drawables.grid_map(grid))
+            self._stream.log("prediction/input", drawables.grid_map(grid))
+            self._draw_nothing_yet(grid)
         if self._bounds is None or (final and self._building is None):
             self._bounds = _known_bounds(grid)
         if final:
             self.frontiers(NOTHING, None, None, stamp)
         area = float(np.count_nonzero(grid.known)) * grid.frame.resolution**2
-        self._curves.add("metrics/known_area/map", area, "known area", colours.ESTIMATE)
+        name, colour = "known area", colours.ESTIMATE
+        self._curves.add("metrics/known_area/map", area, name, colour, stamp=stamp, stage=self._stage)
         self._note_share(area)
         for name, path in self._paths.items():
             if path:
                 colour = {"odometry": colours.ODOMETRY, "estimate": colours.ESTIMATE, "truth": colours.TRUTH}[name]
                 self._stream.log(f"map/path/{name}", drawables.strips([np.array(path)], colour, z=drawables.Z_PATH))
         self._hold(mapping=True)
+
+    def _draw_nothing_yet(self, grid: OccupancyGrid) -> None:
+        """Draw what there is before the first prediction, so that no view is empty."""
+        self._stream.log("rooms/predicted/grid", drawables.grid_map(grid))
+        draw_nothing_yet(self._stream, grid)
 
     def _note_share(self, area: float) -> None:
         """A line of the log whenever another quarter of the floor is known."""
@@ -250,6 +290,7 @@ class Recorder:
     def truth(self, grid: OccupancyGrid, rooms: Sequence[Room]) -> None:
         """Record the true map and rooms, there whatever the time."""
         draw_rooms(self._stream, "rooms/truth", grid, rooms, self._palette, static=True)
+        self._truth = {door: room.polygon for room in rooms for door in room.doors}
         self._hold(truth=True)
 
     def prediction(
@@ -270,6 +311,9 @@ class Recorder:
         """
         if self._building is None and self._bounds is None:
             self._bounds = _known_bounds(prediction.grid)
+        if not self._holds.mapping:
+            self._stream.at(stage=Stage.SEGMENTS)
+            self._draw_nothing_yet(observed)
         self._draw_prediction(observed, doors, prediction, iou or {}, staged=True)
         failures = {markdown_text(door): markdown_text(why) for door, why in prediction.failures.items()}
         failed = "".join(f"\n- {door}: {why}" for door, why in failures.items())
@@ -293,7 +337,7 @@ class Recorder:
     ) -> None:
         """Record what would be predicted by what is known now, while the robot still explores."""
         self._stream.at(stamp, self._stage)
-        self._draw_prediction(observed, doors, prediction, iou or {}, staged=False)
+        self._draw_prediction(observed, doors, prediction, iou or {}, stamp=stamp)
 
     def _draw_prediction(
         self,
@@ -302,7 +346,8 @@ class Recorder:
         prediction: "Prediction",
         iou: Mapping[str, float],
         *,
-        staged: bool,
+        staged: bool = False,
+        stamp: float | None = None,
     ) -> None:
         from closedrooms.predictor.prediction import WeighedTrace
 
@@ -318,10 +363,22 @@ class Recorder:
             draw_trace(self._stream, trace, self._palette, staged=staged)
             self._hold(expansion=True)
         if staged:
+            self._add_levels(() if trace is None else trace.levels)
             self._stream.at(stage=Stage.ROOMS)
         draw_rooms(self._stream, "rooms/predicted", prediction.grid, prediction.rooms, self._palette, iou=iou)
-        self._curves.add_iou(iou, self._palette)
-        self._hold(rooms=True, room_iou=self._holds.room_iou or bool(iou))
+        draw_sureness(self._stream, observed, prediction, iou)
+        when = self._last_map if staged and np.isfinite(self._last_map) else stamp
+        self._curves.add_iou(iou, self._palette, stamp=when, stage=Stage.ROOMS if staged else self._stage)
+        sure = self._holds.sureness or prediction.probability is not None
+        self._hold(rooms=True, sureness=sure, room_iou=self._holds.room_iou or bool(iou))
+
+    def _add_levels(self, levels: Sequence["Level"]) -> None:
+        """Add how well each room is predicted level by level to the curves over the stages."""
+        for level in levels:
+            true = {door: self._truth[door] for door in level.layouts if door in self._truth}
+            iou = {door: measure_iou(level.layouts[door], shape) for door, shape in true.items()}
+            stage = min(Stage.EXPANSION + level.k, Stage.ROOMS - 1)
+            self._curves.add_iou(iou, self._palette, stamp=None, stage=stage)
 
     def tours(self, tours: Mapping[str, "CoverageTour"]) -> None:
         """Graphs and tours."""
@@ -382,7 +439,8 @@ class Recorder:
         places = drawables.lifted(np.concatenate([ends for _, _, ends in self._scans]), drawables.Z_POINT)
         columns = rr.Points3D.columns(positions=places).partition(lengths)
         stages = [stage for _, stage, _ in self._scans]
-        self._stream.columns("map/scan", np.array([stamp for stamp, _, _ in self._scans]), columns, stages)
+        stamps = np.array([stamp for stamp, _, _ in self._scans])
+        self._stream.columns("map/scan", columns, stamps=stamps, stages=stages)
         self._scans = []
 
 
@@ -407,8 +465,15 @@ def _room_said(room: Room, iou: Mapping[str, float]) -> str:
     """One line of the log on a predicted room."""
     known = [iou[door] for door in room.doors if door in iou]
     held = f", IoU with the true room {min(known):.2f}" if known else ""
+    sure = "" if room.confidence is None else f", confidence {room.confidence:.2f}"
     kind = f"{room.kind} room" if room.kind else "room"
-    return f"behind {', '.join(room.doors)}: {kind} of {room.polygon.area:.1f} m²{held}"
+    return f"behind {', '.join(room.doors)}: {kind} of {room.polygon.area:.1f} m²{sure}{held}"
+
+
+def measure_iou(one: Shape, other: Shape) -> float:
+    """Measure the intersection over union of two shapes, 0..1."""
+    shared = shapely.intersection(one, other).area
+    return float(shared / max(one.area + other.area - shared, 1e-9))
 
 
 def _markdown(text: str) -> rr.TextDocument:

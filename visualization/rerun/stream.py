@@ -126,12 +126,15 @@ class RecordingStream:
         """Log at the current time, or for all times."""
         self._rec.log(path, *archetypes, static=static)
 
-    def columns(self, path: str, stamps: FloatArray, columns: Any, stages: Sequence[int]) -> None:
-        """Send one value a stamp [s] and stage at once."""
-        times = [
-            rr.TimeColumn("sim_time", duration=stamps),
-            rr.TimeColumn("stage", sequence=[int(stage) for stage in stages]),
-        ]
+    def columns(
+        self, path: str, columns: Any, *, stamps: FloatArray | None = None, stages: Sequence[int] | None = None
+    ) -> None:
+        """Send one value a stamp [s] and stage at once; on the one timeline alone where the other is not given."""
+        times = []
+        if stamps is not None:
+            times.append(rr.TimeColumn("sim_time", duration=stamps))
+        if stages is not None:
+            times.append(rr.TimeColumn("stage", sequence=[int(stage) for stage in stages]))
         self._rec.send_columns(path, times, columns)
 
     def say(self, title: str, text: str) -> None:

@@ -57,7 +57,12 @@ def read_houseexpo(path: str | Path) -> FloorPlan:
             remarks.append(Remark(action="dropped", what="rooms", why=why, names=(label,), loss=True))
     if not inside:
         raise no_rooms("boxes inside the outline", [outline.area / len(boxes)], remarks, path)
-    labels, polygons = _rooms(outline, inside)
+    labels, polygons, hidden = _rooms(outline, inside)
+    if hidden:
+        why = "their boxes lie in those of smaller rooms"
+        remarks.append(
+            Remark(action="dropped", what="rooms", why=why, names=tuple(hidden), count=len(hidden), loss=True)
+        )
     rooms = tuple(PlanRoom(f"r{i:02d}", label, p) for i, (label, p) in enumerate(zip(labels, polygons, strict=True)))
     edges = shared_edges([room.polygon for room in rooms])
     doors = _doors(edges, rooms)
@@ -110,13 +115,16 @@ def _boxes(data: dict[str, Any], path: Path, remarks: list[Remark]) -> list[tupl
     return sorted(boxes, key=lambda box: (box[1].area, box[0]))
 
 
-def _rooms(outline: Polygon, boxes: list[tuple[str, Polygon]]) -> tuple[list[str], list[Polygon]]:
-    """Find labels and outlines of the rooms, and of the corridors between them."""
+def _rooms(outline: Polygon, boxes: list[tuple[str, Polygon]]) -> tuple[list[str], list[Polygon], list[str]]:
+    """Find labels and outlines of the rooms and of the corridors between them, and labels of boxes that are no room."""
     labels: list[str] = []
+    hidden: list[str] = []
     polygons: list[Polygon] = []
     left: Polygon | MultiPolygon = outline
     for label, box in boxes:
-        for part in _parts(left.intersection(box), SMALLEST):
+        own = _parts(left.intersection(box), SMALLEST)
+        hidden += [] if own else [label]
+        for part in own:
             labels.append(label)
             polygons.append(part)
         left = areal(shapely.difference(left, box))
@@ -133,7 +141,7 @@ def _rooms(outline: Polygon, boxes: list[tuple[str, Polygon]]) -> tuple[list[str
             grown = areal(polygons[best].union(part))
             if isinstance(grown, Polygon):
                 polygons[best] = grown
-    return labels, coverage(polygons, snap=0.005)
+    return labels, coverage(polygons, snap=0.005), hidden
 
 
 def _parts(area: BaseGeometry, smallest: float) -> list[Polygon]:

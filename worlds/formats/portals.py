@@ -9,7 +9,6 @@ import shapely
 
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.connectivity import connected_parts
 from closedrooms.worlds.door_hinges import hung, is_circulation
 from closedrooms.worlds.geometry import distance_along
 from closedrooms.worlds.plan import DoorKind, FloorPlan, Opening, PlanDoor, PlanRoom, Wall
@@ -128,7 +127,6 @@ def plan_of_portals(
         )
         sides = (rooms[deep.rooms[0]].id, rooms[deep.rooms[1]].id)
         doors.append(PlanDoor(f"d{len(doors):02d}", deep.segment, sides, _kind(frame.length)))
-    remarks += _unreached(rooms, doors, openings)
     return FloorPlan("", rooms, tuple(walls), hung(doors, openings, rooms), tuple(openings))
 
 
@@ -215,13 +213,3 @@ def _nearest(
             if best is None or cost < best[0] - 1e-9:
                 best = (cost, edge.part(centre, width))
     return best
-
-
-def _unreached(rooms: tuple[PlanRoom, ...], doors: list[PlanDoor], openings: list[Opening]) -> list[Remark]:
-    sides = [door.rooms for door in doors] + [opening.rooms for opening in openings]
-    parts = sorted(connected_parts([room.id for room in rooms], sides), key=lambda part: (-len(part), min(part)))
-    apart = tuple(room for part in parts[1:] for room in sorted(part))
-    if not apart:
-        return []
-    why = "no door of the file joins them to the rest, a robot cannot get there"
-    return [Remark(action="dropped", what="ways into rooms", why=why, names=apart, count=len(apart))]

@@ -24,6 +24,8 @@ from closedrooms.worlds.wall_assembly import coverage
 WHAT = "a pyrobosim world (YAML)"
 # pyrobosim's own default [m].
 WALL = 0.2
+# The name of the frame that poses are given in.
+WORLD = "world"
 # Lengths and coordinates beyond this are mistakes [m].
 LARGEST = 10_000.0
 MAX_ELEMENTS = 5000
@@ -93,7 +95,7 @@ def _hallways(
     for number, row in enumerate(rows):
         name = str(row.get("name", f"hallway {number}"))
         try:
-            start, end = (_room_of(row, key, name, names, path) for key in ("room_start", "room_end"))
+            start, end = (_room_of(row, key, name, names, path) for key in (("room_start", "from"), ("room_end", "to")))
             if start == end:
                 raise InvalidInputError(f"{name} leads from {names[start]} to itself", expected="two rooms", where=path)
             width = _number(row.get("width"), f"{name} width", path)
@@ -132,7 +134,7 @@ def _placed_footprints(rows: list[dict[str, Any]], names: list[str], path: Path)
         pose = poses[name]
         local = read_pose(pose, f"room {name} pose", path)
         parent = pose.get("relative_to") if isinstance(pose, dict) else None
-        if parent is None:
+        if parent is None or (parent == WORLD and WORLD not in poses):
             return local
         if not isinstance(parent, str) or parent not in poses or parent in (*above, name):
             raise InvalidInputError(f"room {name} pose relative to {parent!r}", expected="another room", where=path)
@@ -150,8 +152,9 @@ def _placed_footprints(rows: list[dict[str, Any]], names: list[str], path: Path)
 def read_pose(value: Any, what: str, path: Path) -> Pose2:
     """Read a pose in any form of the world schema, seen from above; what is not given is 0.
 
-    ``[x, y]``, ``[x, y, z]``, ``[x, y, z, yaw]``, ``[x, y, z, qw, qx, qy, qz]``, or a mapping of ``position`` (x, y, z)
-    with ``rotation_eul`` (yaw, in radians unless ``angle_units`` says degrees) or ``rotation_quat`` (w, x, y, z).
+    ``[x, y]``, ``[x, y, z]``, ``[x, y, z, yaw]``, ``[x, y, z, roll, pitch, yaw]``, ``[x, y, z, qw, qx, qy, qz]``, or a
+    mapping of ``position`` (x, y, z) with ``rotation_eul`` (yaw, in radians unless ``angle_units`` says degrees) or
+    ``rotation_quat`` (w, x, y, z).
 
     Raises:
         InvalidInputError: Another form, or a value that is no number.
@@ -162,9 +165,10 @@ def read_pose(value: Any, what: str, path: Path) -> Pose2:
 
     if value is None:
         return Pose2()
-    if isinstance(value, list) and len(value) in (2, 3, 4, 7):
+    if isinstance(value, list) and len(value) in (2, 3, 4, 6, 7):
         x, y, _, *turn = [number(v) for v in value] + [0.0] * (len(value) == 2)
-        return Pose2(x, y, turn[0] if len(turn) == 1 else _yaw(*turn, what=what, path=path) if turn else 0.0)
+        yaw = _yaw(*turn, what=what, path=path) if len(turn) == 4 else turn[-1] if turn else 0.0
+        return Pose2(x, y, yaw)
     if isinstance(value, dict):
         place, euler, quaternion = (value.get(key) or {} for key in ("position", "rotation_eul", "rotation_quat"))
         if all(isinstance(part, dict) for part in (place, euler, quaternion)):
@@ -210,8 +214,10 @@ def _points(value: Any, what: str, path: Path) -> list[Point]:
 
 
 def _footprint(row: dict[str, Any], name: str, path: Path) -> Polygon:
-    """Read the free floor of a room: a polygon, box or circle."""
+    """Read the free floor of a room: a polygon (its corners alone will do), box or circle."""
     shape = row.get("footprint")
+    if isinstance(shape, list):
+        shape = {"type": "polygon", "coords": shape}
     kind = shape.get("type") if isinstance(shape, dict) else None
     polygon = Polygon()
     if isinstance(shape, dict) and kind in ("polygon", "box", "circle"):
@@ -224,7 +230,7 @@ def _footprint(row: dict[str, Any], name: str, path: Path) -> Polygon:
         else:
             radius = _number(shape.get("radius"), f"room {name} radius", path)
             polygon = shapely.Point(0.0, 0.0).buffer(radius, quad_segs=6)
-        polygon = shapely.transform(polygon, read_pose(shape.get("offset"), f"room {name} offset", path).transform)
+        polygon = shapely.transform(polygon, _offset(shape.get("offset"), f"room {name} offset", path).transform)
     else:
         raise InvalidInputError(
             f"room {name} has a footprint of type {kind!r}", expected="polygon, box or circle", where=path
@@ -234,7 +240,16 @@ def _footprint(row: dict[str, Any], name: str, path: Path) -> Polygon:
     return polygon
 
 
-def _room_of(hall: dict[str, Any], key: str, name: str, names: list[str], path: Path) -> int:
+def _offset(value: Any, what: str, path: Path) -> Pose2:
+    """Where a footprint lies in its room: as a pose, but a third number is the yaw."""
+    if isinstance(value, list) and len(value) == 3:
+        value = [*value[:2], 0.0, value[2]]
+    return read_pose(value, what, path)
+
+
+def _room_of(hall: dict[str, Any], keys: tuple[str, str], name: str, names: list[str], path: Path) -> int:
+    """Which room one end of a hallway is in, under its key or the one of pyrobosim before 2.0."""
+    key = next((key for key in keys if key in hall), keys[0])
     if str(hall.get(key)) not in names:
         raise InvalidInputError(
             f"{name} has the {key} {hall.get(key)!r}", expected=f"one of {', '.join(names)}", where=path

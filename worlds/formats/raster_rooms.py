@@ -140,7 +140,8 @@ def _blocked_share(grid: OccupancyGrid, point: Point, u: FloatArray, width: floa
 
 def _reach(grid: OccupancyGrid, point: Point, u: FloatArray) -> float:
     """Measure how far free space reaches from a point along ``u`` [m]; a usual half door where a leaf is drawn."""
-    steps = np.arange(0.0, HALF_WIDEST, grid.frame.resolution / 2)
+    # So fine that the end never reaches the middle of the jamb's first cell: it would count as part of the door.
+    steps = np.arange(0.0, HALF_WIDEST, grid.frame.resolution / 8)
     blocked = _values(grid, grid.occupied, np.array(point) + steps[:, None] * u)
     if blocked[0]:
         return HALF_DEFAULT

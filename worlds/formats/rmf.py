@@ -16,7 +16,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.door_hinges import hung
 from closedrooms.worlds.formats.rmf_level import RmfLevel, read_level
-from closedrooms.worlds.formats.settlement import Source, settle
+from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom, Wall
 
 # Thickness that the RMF tools give walls [m].
@@ -45,12 +45,13 @@ def read_rmf(path: str | Path, level: str | None = None) -> FloorPlan:
     read = read_level(path, level, remarks)
     name = read.name
     if not read.walls:
-        raise InvalidInputError(f"no walls on level {name}", expected="walls that close rooms", where=path)
+        lost = "".join(f"; {remark}" for remark in remarks if remark.what in ("vertices", "walls"))
+        raise InvalidInputError(f"no walls on level {name}{lost}", expected="walls that close rooms", where=path)
     closers = _closers(read, remarks)
     lines = [LineString(s) for s in (*read.walls, *(door.segment for door in read.doors), *closers)]
-    rooms = _rooms(lines, read, remarks)
+    rooms, faces = _rooms(lines, read, remarks)
     if not rooms:
-        raise InvalidInputError(f"a plan without rooms on level {name}", expected="walls that close rooms", where=path)
+        raise no_rooms(f"walls that close rooms on level {name}", faces, remarks, path)
     doors = _doors(read, rooms, remarks)
     segments = [*read.walls, *closers, *(door.segment for door in read.doors)]
     walls = tuple(Wall(f"w{number:03d}", segment, WALL) for number, segment in enumerate(segments))
@@ -115,13 +116,16 @@ def _loose_ends(lines: Sequence[LineString], reach: float = LOOSE_END) -> list[S
     return pieces
 
 
-def _rooms(lines: Sequence[BaseGeometry], level: RmfLevel, remarks: list[Remark]) -> tuple[PlanRoom, ...]:
-    """Find the faces between walls and doors, named after the waypoints in them."""
+def _rooms(
+    lines: Sequence[BaseGeometry], level: RmfLevel, remarks: list[Remark]
+) -> tuple[tuple[PlanRoom, ...], list[float]]:
+    """Find the faces between walls and doors, named after the waypoints in them, and the areas of all faces."""
     # On a grid of 1 cm, so that feet of loose ends and edges of floors lie on their wall.
     noded = shapely.union_all(np.array(lines, dtype=object), grid_size=0.01)
     faces = [f for f in shapely.get_parts(shapely.polygonize([noded])) if isinstance(f, Polygon)]
     shapes = [f for g in faces for f in shapely.get_parts(g) if isinstance(f, Polygon)]
-    named = [(shapely.Point(v), name) for v, name in zip(level.vertices, level.names, strict=True) if name]
+    places = zip(level.vertices, level.names, strict=True)
+    named = [(shapely.Point(place), name) for place, name in places if name and place is not None]
     rooms: list[PlanRoom] = []
     outside = 0
     for face in sorted(shapes, key=lambda f: (round(f.bounds[0], 2), round(f.bounds[1], 2), f.area)):
@@ -135,7 +139,7 @@ def _rooms(lines: Sequence[BaseGeometry], level: RmfLevel, remarks: list[Remark]
     if outside:
         why = "no floor under them"
         remarks.append(Remark(action="dropped", what="areas between walls", why=why, count=outside))
-    return tuple(rooms)
+    return tuple(rooms), [face.area for face in shapes]
 
 
 def _doors(level: RmfLevel, rooms: Sequence[PlanRoom], remarks: list[Remark]) -> list[PlanDoor]:

@@ -19,6 +19,8 @@ from closedrooms.worlds.plan import DoorKind
 WHAT = "an RMF building (building.yaml)"
 # A door shorter than this is a mistake [m].
 SHORTEST_DOOR = 0.4
+# Measurements of one level that are this share of each other apart do not agree: people read a plan to a few percent.
+DISAGREE = 0.1
 KINDS: dict[str, DoorKind] = {
     "hinged": "hinged", "double_hinged": "double", "sliding": "sliding", "double_sliding": "sliding",
     "double_telescope": "sliding", "single_telescope": "sliding", "telescope": "sliding",
@@ -47,7 +49,7 @@ class RmfLevel:
 
     Attributes:
         name: Of the level.
-        vertices: All of its vertices [m].
+        vertices: All of its vertices [m]; ``None`` for one that is no place.
         names: The name of each vertex (a waypoint), empty without one.
         walls: Centre lines of its walls, each once [m].
         doors: Those that can be doors.
@@ -56,7 +58,7 @@ class RmfLevel:
     """
 
     name: str
-    vertices: tuple[Point, ...]
+    vertices: tuple[Point | None, ...]
     names: tuple[str, ...]
     walls: tuple[Segment, ...]
     doors: tuple[RmfDoor, ...]
@@ -81,15 +83,21 @@ def read_level(path: Path, level: str | None, remarks: list[Remark]) -> RmfLevel
     data = parse_yaml(path, what=WHAT)
     system = _coordinate_system(data, path)
     name, fields = _level_fields(data, level, path)
-    metres = (1.0, 1.0) if system == "cartesian_meters" else _pixel(data, fields, path)
+    metres = (1.0, 1.0) if system == "cartesian_meters" else _pixel(data, fields, path, remarks)
     rows = _rows(fields, "vertices", path)
-    vertices = [_vertex(row, number, metres, path) for number, row in enumerate(rows)]
-    names = [str(row[3]).strip() if len(row) > 3 and row[3] else "" for row in rows]
+    vertices = [_vertex(row, metres) for row in rows]
+    bad = tuple(f"vertices[{number}]" for number, vertex in enumerate(vertices) if vertex is None)
+    if bad:
+        why = "no [x, y, z, name]; what stands on them is left out"
+        remarks.append(Remark(action="dropped", what="vertices", why=why, names=bad, count=len(bad)))
+    names = [str(row[3]).strip() if isinstance(row, list) and len(row) > 3 and row[3] else "" for row in rows]
     walls = []
-    for row in _rows(fields, "walls", path):
+    for number, row in enumerate(_rows(fields, "walls", path)):
         segment = _segment(row, vertices)
         if segment is None:
-            raise InvalidInputError(f"wall {str(row)[:60]}", expected="numbers of two vertices", where=path)
+            why = "without two vertices of the level"
+            remarks.append(Remark(action="dropped", what="walls", why=why, names=(f"walls[{number}]",), loss=True))
+            continue
         walls.append(segment)
     doors = []
     listed = _rows(fields, "doors", path)
@@ -142,19 +150,26 @@ def _coordinate_system(data: dict[str, Any], path: Path) -> str:
     return str(system)
 
 
-def _pixel(data: dict[str, Any], fields: dict[str, Any], path: Path) -> tuple[float, float]:
+def _pixel(data: dict[str, Any], fields: dict[str, Any], path: Path, remarks: list[Remark]) -> tuple[float, float]:
     """Read metres per pixel to the right and, since rows of a picture go down, per pixel of y."""
-    scale = _scale(data, fields, path)
+    scale = _scale(data, fields, path, remarks)
     return (scale, -scale)
 
 
-def _scale(data: dict[str, Any], fields: dict[str, Any], path: Path) -> float:
+def _scale(data: dict[str, Any], fields: dict[str, Any], path: Path, remarks: list[Remark]) -> float:
     """Read metres per pixel: the mean of the level's measurements, else of another level's."""
-    for level in [fields, *(f for f in data["levels"].values() if isinstance(f, dict))]:
+    for name, level in [("", fields), *((n, f) for n, f in data["levels"].items() if isinstance(f, dict))]:
         values = [_measured(row, _rows(level, "vertices", path)) for row in _rows(level, "measurements", path)]
         usable = [value for value in values if value is not None]
-        if usable:
-            return sum(usable) / len(usable)
+        if not usable:
+            continue
+        if level is not fields:
+            why = f"the level has no measurements, those of level {str(name)[:40]} are taken"
+            remarks.append(Remark(action="guessed", what="scale", why=why))
+        if max(usable) > (1.0 + DISAGREE) * min(usable):
+            why = f"measurements say {min(usable):.4g} to {max(usable):.4g} m a pixel, their mean is taken"
+            remarks.append(Remark(action="guessed", what="scale", why=why))
+        return sum(usable) / len(usable)
     raise InvalidInputError("a building without measurements", expected="a measured distance for scale", where=path)
 
 
@@ -167,23 +182,23 @@ def _measured(row: Any, vertices: list[Any]) -> float | None:
     return value if math.isfinite(value) and value > 0.0 else None
 
 
-def _vertex(row: Any, number: int, metres: tuple[float, float], path: Path) -> Point:
+def _vertex(row: Any, metres: tuple[float, float]) -> Point | None:
+    """Read where a vertex lies; ``None`` for one that is no place: what stands on it is left out."""
     try:
         x, y = float(row[0]) * metres[0], float(row[1]) * metres[1]
     except (IndexError, KeyError, TypeError, ValueError, OverflowError):
-        x = y = math.nan
-    if not (math.isfinite(x) and math.isfinite(y)):
-        raise InvalidInputError(f"vertex {number} {str(row)[:60]}", expected="[x, y, z, name]", where=path)
-    return (round(x, 4), round(y, 4))
+        return None
+    return (round(x, 4), round(y, 4)) if math.isfinite(x) and math.isfinite(y) else None
 
 
-def _segment(row: Any, vertices: Sequence[Point]) -> Segment | None:
+def _segment(row: Any, vertices: Sequence[Point | None]) -> Segment | None:
     """Look up the two vertices whose numbers a row begins with."""
     try:
         first, second = int(row[0]), int(row[1])
-        return (vertices[first], vertices[second]) if min(first, second) >= 0 else None
+        start, end = vertices[first], vertices[second]
     except (IndexError, KeyError, TypeError, ValueError, OverflowError):
         return None
+    return None if start is None or end is None or min(first, second) < 0 else (start, end)
 
 
 def _parameter(row: Any, key: str) -> str:
@@ -194,7 +209,7 @@ def _parameter(row: Any, key: str) -> str:
         return ""
 
 
-def _door(row: Any, number: int, vertices: Sequence[Point], remarks: list[Remark]) -> RmfDoor | None:
+def _door(row: Any, number: int, vertices: Sequence[Point | None], remarks: list[Remark]) -> RmfDoor | None:
     """Read one door; what cannot be one is named in ``remarks``."""
     name = _parameter(row, "name") or f"doors[{number}]"
     segment = _segment(row, vertices)
@@ -210,13 +225,13 @@ def _door(row: Any, number: int, vertices: Sequence[Point], remarks: list[Remark
 
 
 def _floor(
-    fields: dict[str, Any], vertices: Sequence[Point], remarks: list[Remark], path: Path
+    fields: dict[str, Any], vertices: Sequence[Point | None], remarks: list[Remark], path: Path
 ) -> Polygon | MultiPolygon:
     areas = []
     for number, row in enumerate(_rows(fields, "floors", path)):
         try:
             ring = [vertices[int(index)] for index in row["vertices"]]
-            areas.append(shapely.make_valid(Polygon(ring)))
+            areas.append(shapely.make_valid(Polygon([corner for corner in ring if corner is not None])))
         except (IndexError, KeyError, TypeError, ValueError, OverflowError):
             why = "without an outline"
             remarks.append(Remark(action="dropped", what="floors", why=why, names=(f"floors[{number}]",), loss=True))

@@ -11,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
+from closedrooms.worlds.connectivity import connected_parts
 from closedrooms.worlds.geometry import WallAxes, wall_area
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
 from closedrooms.worlds.validation import passage_faults, validate
@@ -66,6 +67,7 @@ def settle(plan: FloorPlan, remarks: Iterable[Remark], source: Source, path: Pat
     said = [*remarks, *bad]
     said += _missing(kept, source, said)
     said += _lost_walls(kept, source)
+    said += _unreached(kept)
     said += odd
     return replace(kept, remarks=tuple(merged(said)))
 
@@ -129,6 +131,18 @@ def _lost_walls(plan: FloorPlan, source: Source) -> list[Remark]:
         for where, length in lost
         if length > NOTICED
     ]
+
+
+def _unreached(plan: FloorPlan) -> list[Remark]:
+    """Rooms that no door joins to the largest part of the building."""
+    area = {room.id: room.polygon.area for room in plan.rooms}
+    parts = connected_parts(list(area), [passage.rooms for passage in plan.passages])
+    parts.sort(key=lambda part: (-sum(area[room] for room in sorted(part)), min(part)))
+    apart = tuple(room for part in parts[1:] for room in sorted(part))
+    if not apart:
+        return []
+    why = "no door of the file joins them to the rest, a robot cannot get there"
+    return [Remark(action="dropped", what="ways into rooms", why=why, names=apart, count=len(apart))]
 
 
 def _odd_scale(plan: FloorPlan, widths: Sequence[float]) -> list[Remark]:

@@ -118,7 +118,8 @@ def picture_of(folder: Path, image: str) -> tuple[OccupancyGrid, list[str]]:
     [
         "maps/m.png", "~/m.png", "~nobody-here/m.png", "../maps/m.png", "../../../m.png", "./m.png", "/m.png",
         "file:///home/me/m.png", "file://m.png/m.png", "package://my_maps/maps/m.png", "C:\\\\ws\\\\m.png",
-        "C:\\ws\\m.png", "maps\\m.png", "'maps/m.png'", '"/home/me/m.png"', "FILE:///m.png", "//server/share/m.png",
+        "C:\\ws\\m.png", "maps\\m.png", "file:///my%20maps/m.png", "file:maps/m.png",
+        "'maps/m.png'", '"/home/me/m.png"', "FILE:///m.png", "//server/share/m.png",
     ],
 )  # fmt: skip
 def test_a_picture_is_found_beside_the_yaml_in_whatever_form_it_is_named(tmp_path: Path, image: str) -> None:
@@ -277,3 +278,9 @@ def test_a_raw_map_keeps_every_value(tmp_path: Path) -> None:
     read = read_map(tmp_path / "probability.yaml")
     assert np.array_equal(read.cells, cells)
     assert read.frame == grid.frame
+
+
+def test_addresses_of_files_are_decoded(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "a b.png"), np.zeros((1, 1), dtype=np.uint8))
+    for image in ("file:///home/me/a%20b.png", "file:a%20b.png", "file://a%20b.png", "a b.png"):
+        assert picture_of(tmp_path, image)[0].occupied.all(), image

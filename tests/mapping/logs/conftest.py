@@ -64,13 +64,14 @@ class BagMaker:
         frame: str = "laser",
         start: float = START,
         step: float = STEP,
+        end: float | None = None,
         limits: tuple[float, float] = (0.1, 10.0),
         topic: str = "/scan",
         recorded: float | None = None,
     ) -> "BagMaker":
         """One sweep."""
         values = ranges.astype(np.float32)
-        end = start + step * (len(values) - 1)
+        end = start + step * (len(values) - 1) if end is None else end
         empty = np.empty(0, dtype=np.float32)
         message = self._make(
             "sensor_msgs/msg/LaserScan", self._header(stamp, frame), start, end, step, 0.0, 0.1, *limits, values, empty

@@ -14,7 +14,8 @@ from closedrooms.mapping.logs import RecordedRun, read_run
 rosbags = pytest.importorskip("rosbags", reason="the optional extra 'bags' is not installed")
 
 RANGES = np.linspace(1.0, 5.0, 180)
-ANGLES = -1.5 + 0.0175 * np.arange(180)
+START, STEP = -1.5, 0.0175
+ANGLES = START + STEP * np.arange(180)
 # The sweep of every bag here, as a lidar in the middle of the robot sees it.
 POINTS = np.column_stack((RANGES * np.cos(ANGLES), RANGES * np.sin(ANGLES)))
 Bags = Callable[[], Any]
@@ -401,3 +402,54 @@ def test_plain_scans_go_before_echoes_of_the_same_lidar(new_bag: Bags) -> None:
     assert len(run.scans) == 11
     assert ("dropped", "topics of scans") in told(run)
     assert len(read_run(path, scan_topic="/echoes").scans) == 1
+
+
+def test_an_odometry_that_stands_still_gives_way_to_transforms_that_move(any_bag: Any) -> None:
+    any_bag.transform("base_link", "laser")
+    for i in range(11):
+        any_bag.odometry(100.0 + 0.1 * i, 0.0)
+        any_bag.transform("odom", "base_link", (0.05 * i, 0.0, 0.0), topic="/tf", stamp=100.0 + 0.1 * i)
+    path = any_bag.drive(odometry=False).write()
+    run = read_run(path)
+    assert run.odometry[:, 0] == pytest.approx(0.05 * np.arange(11), abs=1e-6)
+    assert [remark.why for remark in run.remarks if remark.what == "odometry"] == [
+        "nav_msgs/Odometry never changes; taken from the transforms odom to base_link"
+    ]
+    assert not read_run(path, odometry_topic="/odom").has_odometry
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "step", "repair"),
+    [
+        (START, START + 179 * STEP, 0.0, "from the first and the last angle"),
+        (START, START + 179 * STEP, 180.0, "from the first and the last angle"),
+        (math.degrees(START), math.degrees(START + 179 * STEP), math.degrees(STEP), "in degrees"),
+        (math.degrees(START), math.degrees(START + 180 * STEP), math.degrees(STEP), "in degrees"),
+    ],
+)
+def test_angles_that_make_no_sense_are_taken_from_those_that_do(
+    new_bag: Bags, start: float, end: float, step: float, repair: str
+) -> None:
+    bag = new_bag().transform("base_link", "laser").drive(scans=False)
+    for i in range(3):
+        bag.scan(100.0 + 0.1 * i, start=start, step=step, end=end)
+    run = read_run(bag.write())
+    assert points(run) == pytest.approx(POINTS, abs=1e-3)
+    (remark,) = run.remarks
+    assert (remark.action, remark.what, remark.count) == ("repaired", "angles of scans", 3)
+    assert repair in remark.why
+
+
+def test_scans_without_any_angle_are_refused(new_bag: Bags) -> None:
+    bag = new_bag().transform("base_link", "laser").drive(scans=False).scan(100.0, step=0.0, end=START)
+    with pytest.raises(InvalidInputError, match="no scan that can be used"):
+        read_run(bag.write())
+
+
+def test_stamps_that_are_missing_now_and_then_are_said(new_bag: Bags) -> None:
+    bag = new_bag().transform("base_link", "laser").drive(scans=False)
+    for i in range(9):
+        bag.scan(0.0 if i % 3 == 1 else 100.0 + 0.1 * i, recorded=100.0 + 0.1 * i)
+    run = read_run(bag.write())
+    assert [scan.stamp for scan in run.scans] == pytest.approx(100.0 + 0.1 * np.arange(9), abs=1e-6)
+    assert [(remark.action, remark.what, remark.count) for remark in run.remarks] == [("repaired", "stamps", 3)]

@@ -10,6 +10,7 @@ from shapely.geometry import Polygon, box
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
+from closedrooms.predictor.best import shared_rooms
 from closedrooms.predictor.best.method import predict_best
 from closedrooms.predictor.config import BestConfig
 from closedrooms.predictor.prediction import Prediction, WeighedTrace
@@ -86,7 +87,8 @@ def test_parts_three_closed_rooms_in_a_row_at_the_middle_between_their_doors() -
         assert _iou(room.polygon, _truth(room.doors[0])) > 0.8, room.doors
 
 
-def test_two_doors_at_the_ends_of_a_gap_share_its_room() -> None:
+def test_two_doors_at_the_ends_of_a_gap_share_its_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shared_rooms, "SHARED", 0.1)
     grid, doors = _building({"d2a"})
     x, y = doors[0].midpoint
     two = [ClosedDoor("left", (x - 1.5, y)), ClosedDoor("right", (x + 1.5, y))]
@@ -241,7 +243,8 @@ def test_the_terms_of_a_trace_sum_up_to_the_scores() -> None:
         assert any(terms[0] for name, terms in room.terms.items() if name.startswith("neighbours"))
 
 
-def test_a_trace_of_a_room_with_two_doors_weighs_one_room() -> None:
+def test_a_trace_of_a_room_with_two_doors_weighs_one_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shared_rooms, "SHARED", 0.1)
     grid, doors = _building({"d2a"})
     (x, y), *_ = (door.midpoint for door in doors)
     pair = [ClosedDoor("left", (x - 1.5, y)), ClosedDoor("right", (x + 1.5, y))]

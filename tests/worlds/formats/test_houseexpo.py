@@ -69,3 +69,11 @@ def test_a_box_outside_costs_that_room_and_nothing_inside_is_refused(tmp_path: P
     assert remark.names == ("bath",)
     with pytest.raises(InvalidInputError, match=r"a plan without rooms \(1 with less than"):
         read(tmp_path, SQUARE, Bath=[[20, 0, 30, 8]])
+
+
+def test_a_room_whose_box_lies_in_a_smaller_one_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "home.json"
+    boxes = {"Bed": [[0, 0, 4, 4]], "Bath": [[0, 0, 4, 4.5]], "Hall": [[4, 0, 8, 4]]}
+    path.write_text(json.dumps({"verts": [[0, 0], [8, 0], [8, 4], [0, 4]], "room_category": boxes}))
+    (remark,) = [remark for remark in read_houseexpo(path).remarks if remark.loss]
+    assert (remark.what, remark.names, remark.why) == ("rooms", ("bath",), "their boxes lie in those of smaller rooms")

@@ -235,12 +235,12 @@ YAML_FAULTS: list[tuple[str, dict[str, Any], str]] = [
             "coordinate_system": "cartesian_meters",
             "levels": {"L1": {"vertices": [[0, 0, 0], [1, 0, 0]], "walls": [[0, 7, {}]]}},
         },
-        r"wall \[0, 7, \{\}\]; expected numbers of two vertices",
+        r"no walls on level L1; dropped 1 walls \(walls\[0\]\): without two vertices",
     ),
     (
         "rmf_small.building.yaml",
         {"coordinate_system": "cartesian_meters", "levels": {"L1": {"vertices": [["x", 0, 0]]}}},
-        "vertex 0",
+        r"no walls on level L1; dropped 1 vertices \(vertices\[0\]\)",
     ),
 ]
 

@@ -91,7 +91,7 @@ def test_a_bad_door_costs_that_door_and_is_named(
     path = tmp_path / "plan.json"
     path.write_text(json.dumps(data))
     plan = read_plan(path)
-    (remark,) = plan.remarks
+    (remark,) = (said for said in plan.remarks if said.what == "doors")
     assert len(plan.doors) == 2
     assert (remark.action, remark.what, remark.names, remark.loss) == (
         "dropped",

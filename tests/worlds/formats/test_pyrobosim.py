@@ -43,7 +43,9 @@ def room(name: str, width: float, height: float, **fields: Any) -> dict[str, Any
         ([5, 1], (4, -1, 6, 3)),
         ([5, 1, 9], (4, -1, 6, 3)),
         ([5, 1, 0, QUARTER], (3, 0, 7, 2)),
+        ([5, 1, 0, 0, 0, QUARTER], (3, 0, 7, 2)),
         ([5, 1, 0, math.cos(QUARTER / 2), 0, 0, math.sin(QUARTER / 2)], (3, 0, 7, 2)),
+        ({"position": {"x": 5, "y": 1}, "relative_to": "world"}, (4, -1, 6, 3)),
         ({"position": {"x": 5, "y": 1}}, (4, -1, 6, 3)),
         ({"position": {"y": 1}}, (-1, -1, 1, 3)),
         ({"position": {"x": 5, "y": 1}, "rotation_eul": {"yaw": QUARTER}}, (3, 0, 7, 2)),
@@ -149,3 +151,24 @@ def test_rooms_without_a_name_are_counted(tmp_path: Path) -> None:
     plan = read(tmp_path, rooms, [{"room_start": "room_0", "room_end": "room_1", "width": 0.9}])
     assert [made.label for made in plan.rooms] == ["room_0", "room_1"]
     assert len(plan.doors) == 1
+
+
+@pytest.mark.parametrize(
+    ("footprint", "bounds"),
+    [
+        ([[0, 0], [4, 0], [4, 3], [0, 3]], (0, 0, 4, 3)),
+        ({"type": "box", "dims": [2, 4], "offset": [5, 1]}, (4, -1, 6, 3)),
+        ({"type": "box", "dims": [2, 4], "offset": [5, 1, QUARTER]}, (3, 0, 7, 2)),
+    ],
+)
+def test_a_footprint_may_be_its_corners_and_its_offset_has_a_yaw(
+    tmp_path: Path, footprint: object, bounds: tuple[float, ...]
+) -> None:
+    assert floor_of(read(tmp_path, [{"name": "a", "footprint": footprint}], []), "a") == pytest.approx(bounds, abs=1e-3)
+
+
+def test_hallways_of_pyrobosim_before_2_0_say_from_and_to(tmp_path: Path) -> None:
+    rooms = [room("a", 4.0, 4.0), room("b", 4.0, 4.0, pose=[5.0, 0.0])]
+    plan = read(tmp_path, rooms, [{"from": "a", "to": "b", "width": 0.9}])
+    assert len(plan.doors) == 1
+    assert plan.remarks == ()

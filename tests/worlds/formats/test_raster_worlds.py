@@ -186,3 +186,15 @@ def test_a_wall_taken_away_from_the_plan_is_noticed(tmp_path: Path) -> None:
     thin = min(plan.walls, key=lambda wall: abs(wall.segment[0][0] - centre(grid.frame, 3, 30)[0]))
     with pytest.raises(AssertionError):
         check_cells(replace(plan, walls=tuple(wall for wall in plan.walls if wall is not thin)), grid)
+
+
+@pytest.mark.parametrize("wide", [14, 15, 18, 19])
+def test_a_door_given_as_a_point_takes_no_cell_of_its_jambs(tmp_path: Path, wide: int) -> None:
+    cells = hall()
+    cells[3:-3, 40] = OCCUPIED
+    cells[20 : 20 + wide, 40] = FREE
+    x, y = centre(GridFrame(CELL, -1.35, 2.4, *cells.shape), 20, 40)
+    doors = [ClosedDoor("d", (x, y - CELL / 2 + wide * CELL / 2), None, None)]
+    plan, _ = plan_of(cells, tmp_path, doors)
+    assert plan.doors[0].width == pytest.approx(wide * CELL, abs=CELL / 2)
+    assert not [remark for remark in plan.remarks if remark.loss]

@@ -124,3 +124,44 @@ def test_plans_of_one_name_get_names_of_their_own(small: FloorPlan) -> None:
     assert distinct_names([small, small], ["/a/x/p.json", "/b/x/p.json"]) == ["a-x-small", "b-x-small"]
     assert distinct_names([small, small], ["/a/p.json", "/a/p.yaml"]) == ["small", "small-2"]
     assert distinct_names([small], ["/a/p.json"]) == ["small"]
+
+
+def test_a_bad_wall_or_vertex_costs_what_stands_on_it_and_is_named(tmp_path: Path) -> None:
+    data = building()
+    level = data["levels"]["L1"]
+    level["walls"] += [[0, 99, {}], 7]
+    level["vertices"] += [["x", 0, 0, "moon"], None]
+    level["walls"].append([0, len(level["vertices"]) - 2, {}])
+    plan = read(tmp_path, data)
+    assert {room.label for room in plan.rooms} == {"low", "high"}
+    vertices, remark = plan.remarks
+    assert vertices.names == ("vertices[10]", "vertices[11]")
+    assert remark.loss
+    assert (remark.what, remark.count, remark.names) == ("walls", 3, ("walls[8]", "walls[9]", "walls[10]"))
+
+
+def test_a_scale_that_makes_no_rooms_is_named_in_the_refusal(tmp_path: Path) -> None:
+    data = building(coordinate_system="reference_image")
+    data["levels"]["L1"]["measurements"] = [[0, 1, {"distance": [3, 0.5]}]]
+    with pytest.raises(InvalidInputError, match=r"scale: it looks wrong.*all lengths times \d+ would fit.*level L1"):
+        read(tmp_path, data)
+
+
+def test_measurements_that_disagree_or_stand_on_another_level_are_said(tmp_path: Path) -> None:
+    data = building(coordinate_system="reference_image")
+    data["levels"]["L1"]["measurements"] += [[2, 4, {"distance": [3, 6.0]}]]
+    assert ["measurements say 1 to 1.2 m a pixel" in remark.why for remark in read(tmp_path, data).remarks] == [True]
+    other = building()["levels"]["L1"]
+    del data["levels"]["L1"]["measurements"]
+    data["levels"]["up"] = other
+    (remark,) = read(tmp_path, data, "L1").remarks
+    assert (remark.action, remark.what) == ("guessed", "scale")
+    assert "of level up" in remark.why
+
+
+def test_rooms_that_no_door_leads_to_are_named(tmp_path: Path) -> None:
+    data = building()
+    data["levels"]["L1"]["walls"].append([6, 7, {}])
+    data["levels"]["L1"]["doors"] = []
+    (remark,) = read(tmp_path, data).remarks
+    assert (remark.action, remark.what, remark.names) == ("dropped", "ways into rooms", ("r00",))
