@@ -39,6 +39,8 @@ COLUMNS: tuple[tuple[str, dict[str, str]], ...] = (
 def draw_curves(path: Path, results: Sequence[LevelResult], found: Sequence[Onset]) -> None:
     """Draw a row a factor: mapping error, IoU with more and more stages repaired, coverage error, against the levels.
 
+    What was not measured, as the coverage error without tours, has no column.
+
     Args:
         path: The PNG.
         results: Of every level.
@@ -48,13 +50,15 @@ def draw_curves(path: Path, results: Sequence[LevelResult], found: Sequence[Onse
     from matplotlib.figure import Figure
 
     factors = list(dict.fromkeys(result.factor for result in results))
-    figure = Figure(figsize=(15, 3.1 * len(factors)), layout="constrained")
+    measured = {name for result in results for name, mean in result.means.items() if mean is not None}
+    columns = [(label, measures) for label, measures in COLUMNS if measured & measures.keys()]
+    figure = Figure(figsize=(5 * len(columns), 3.1 * len(factors)), layout="constrained")
     FigureCanvasAgg(figure)
-    grid = figure.subplots(len(factors), len(COLUMNS), squeeze=False)
+    grid = figure.subplots(len(factors), len(columns), squeeze=False)
     onset = {entry.factor: entry.level for entry in found}
     for line, factor in zip(grid, factors, strict=True):
         own = sorted((result for result in results if result.factor == factor), key=lambda result: result.level)
-        for axes, (label, measures) in zip(line, COLUMNS, strict=True):
+        for axes, (label, measures) in zip(line, columns, strict=True):
             for number, (name, title) in enumerate(measures.items()):
                 _curve(axes, own, name, title, ROOM_COLOURS[number])
             if onset.get(factor) is not None:

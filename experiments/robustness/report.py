@@ -59,7 +59,7 @@ def write_report(config: RobustnessConfig, rows: Sequence[Row], failures: Mappin
             sections.append(Section(f"Maps of {world}", text, picture, files=["trials.csv"]))
     if failures:
         sections.append(Section("What failed", tables=[Table([["world", "why"], *failures.items()])]))
-    title = f"closedrooms robustness: {len(worlds)} worlds"
+    title = f"closedrooms robustness: {len(worlds)} world{'s' if len(worlds) != 1 else ''}"
     write_page(Path(folder / "report.html"), title, sections)
     return found
 

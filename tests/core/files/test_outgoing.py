@@ -25,7 +25,7 @@ def test_an_output_folder_appears_whole_and_lists_its_files(tmp_path: Path) -> N
         assert not (tmp_path / "out").exists()
     manifest = json.loads((tmp_path / "out" / "run.json").read_text())
     assert manifest.pop("sha256").keys() == {"a.txt", "run.json"}
-    assert manifest == {"seed": 3, "program": "closedrooms", "files": ["a.txt"]}
+    assert manifest == {"seed": 3, "program": "closedrooms", "schema": 1, "files": ["a.txt"]}
     assert is_ours(tmp_path / "out")
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 

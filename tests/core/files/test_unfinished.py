@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from closedrooms.core.files.outgoing import unfinished as unfinished_module
 from closedrooms.core.files.unfinished import (
     ABANDONED,
     clear_files,
@@ -97,6 +96,6 @@ def test_files_of_other_people_and_other_names_are_kept(tmp_path: Path, monkeypa
     clear_folders(tmp_path / "out")
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
     (tmp_path / ".out.0123abcd.part").mkdir()
-    monkeypatch.setattr(unfinished_module.os, "getuid", lambda: os.geteuid() + 1)
+    monkeypatch.setattr(os, "getuid", lambda: os.geteuid() + 1)
     clear_folders(tmp_path / "out")
     assert (tmp_path / ".out.0123abcd.part").is_dir()
