@@ -38,7 +38,7 @@ def corridor(seed: int) -> tuple[OccupancyGrid, list[ClosedDoor]]:
             ends = ((at * CELL, y), ((at + 18) * CELL, y))
             doors.append(ClosedDoor(f"d{number}{wall}", ((at + 9) * CELL, y), ends, 18 * CELL))
     for _ in range(6):
-        r, c, size = rng.integers((82, 12, 2), (114, 280, 6))
+        r, c, size = rng.integers((94, 12, 4), (102, 280, 9))
         cells[r : r + size, c : c + size] = OCCUPIED
     return OccupancyGrid(GridFrame(CELL, 0.0, 0.0, *cells.shape), cells), doors
 
