@@ -225,7 +225,7 @@ def _simulated(
         log, mapper = RunLog(sim, Silent(), keep_scans=config.keep_scans), Mapper(config.mapper)
         survey = survey_building(log, mapper, config.navigation, recorder=recorder)
         scans = log.recorded() if config.keep_scans else None
-    about = {
+    about: dict[str, Any] = {
         "status": survey.exploration.status,
         "simulated_s": round(survey.exploration.seconds, 3),
         "scans": survey.exploration.scans,
