@@ -25,7 +25,7 @@ from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.relocalisation import relocalise
 from closedrooms.mapping.matching.scan_matcher import ADVANTAGE, Match, match_scan
 from closedrooms.mapping.motion import UncertainMotion
-from closedrooms.mapping.motion_prediction import MotionPrediction
+from closedrooms.mapping.motion_prediction import MotionPrediction, PredictedStep
 from closedrooms.mapping.scan_preparation import PreparedScan
 from closedrooms.mapping.sweep_motion import SweepMotion
 from closedrooms.mapping.visibility import conflict
@@ -120,9 +120,9 @@ class Mapper:
             return clean(scan, max_range=max_range, motion=motion) if made is None else made
 
         before = self._pose
-        alternative = self._predict(odometry, scan.stamp)
+        step = self._predict(odometry, scan.stamp)
         if self.keyframes:
-            self._match(points, beams, scan.stamp, alternative)
+            self._match(points, beams, scan.stamp, before, step)
         self._prediction.moved(before.inverse() @ self._pose)
         if self._wants_keyframe():
             self._insert(Keyframe(len(self.keyframes), scan.stamp, self._pose, beams(), points, self._travelled))
@@ -144,10 +144,9 @@ class Mapper:
         seconds = scan.stamp - self._stamps[-1]
         return SweepMotion.between(self._last_odometry, odometry, seconds) if seconds > 0.0 else None
 
-    def _predict(self, odometry: Pose2 | None, stamp: float) -> Pose2 | None:
-        """Move the pose as the odometry says; the pose that it may mean instead, ``None`` as a rule."""
+    def _predict(self, odometry: Pose2 | None, stamp: float) -> PredictedStep:
+        """Move the pose as the odometry says, and return the step."""
         step = self._prediction.step(odometry, stamp)
-        alternative = None if step.alternative is None else self._pose @ step.alternative
         self._pose = self._pose @ step.motion
         if step.unmeasured is None:
             distance = math.hypot(step.motion.x, step.motion.y)
@@ -155,17 +154,22 @@ class Mapper:
             self._motion = self._motion.then(distance, abs(step.motion.theta))
         else:
             self._motion = self._motion.without_odometry(*step.unmeasured)
-        return alternative
+        return step
 
-    def _match(self, points: FloatArray, beams: Callable[[], Beams], stamp: float, alternative: Pose2 | None) -> None:
+    def _match(
+        self, points: FloatArray, beams: Callable[[], Beams], stamp: float, before: Pose2, step: PredictedStep
+    ) -> None:
         if self._motion.still and not self._moved_in_silence(points):
             return
         if self._motion.unmeasured is not None:
             self._measured = False
         match = self._match_from(self._pose, points)
-        other = None if alternative is None else self._match_from(alternative, points)
+        other = None if step.alternative is None else self._match_from(before @ step.alternative, points)
         if other is not None and (match is None or other.score > match.score + ADVANTAGE):
             match = other
+            if step.leap:
+                self._travelled -= math.hypot(step.motion.x, step.motion.y) / 2.0
+                self._events.note(Event.LEAP, stamp)
         if len(points) < self._config.matcher.min_points:
             self._events.note(Event.BLIND, stamp)
         elif self._config.recovery.enabled and self._contradicts(match, beams):

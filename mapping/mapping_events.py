@@ -11,6 +11,7 @@ class Event(Enum):
 
     GAP = ("guessed", "motions over gaps without scans", "no scan for much longer than usual while the robot moved")
     JUMP = ("repaired", "jumps of the odometry", "no robot moves so fast: bridged by scan matching")
+    LEAP = ("repaired", "sudden leaps of the odometry", "longer than any step before: half of it fits the scans better")
     SILENT = ("repaired", "steps without odometry", "it stood still or was missing while the scans moved")
     BLIND = ("guessed", "poses of scans with too few echoes", "odometry alone")
     RECOVERED = ("repaired", "failed matches", "odometry was wrong: the pose was found again in a wider window")

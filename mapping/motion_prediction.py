@@ -21,6 +21,12 @@ GAP_MOTION = (0.5, 0.5)
 """Motion over a gap ([m], [rad]) below which nothing was missed."""
 TIME_MEMORY = 0.05
 """Weight of the newest time between scans in the usual one."""
+SUDDEN = 1.5
+"""Times the longest of the last steps from which one is too long to be believed at once."""
+LONG_STEP = 0.6
+"""Step [m] below which the window of the matcher holds one that was counted twice."""
+LONGEST_FADING = 0.95
+"""Share of the longest of the last steps that a robot is still thought capable of one step later."""
 UNKNOWN_STEP = (0.1, 0.1)
 """Standard deviation ([m], [rad]) of a step that nothing measured, besides the size of the one before."""
 
@@ -31,13 +37,16 @@ class PredictedStep:
 
     Attributes:
         motion: ``before_T_now``.
-        alternative: Another motion that may be meant: an odometry that stood still may catch up, or not.
+        alternative: Another motion that may be meant: an odometry that stood still may catch up, or not, and one that
+            makes a sudden leap may have counted a step twice.
+        leap: It is such a leap.
         unmeasured: How far it may be off, distance [m] and turn [rad], where no odometry measured it; else ``None``.
     """
 
     motion: Pose2
     unmeasured: tuple[float, float] | None = None
     alternative: Pose2 | None = None
+    leap: bool = False
 
 
 class MotionPrediction:
@@ -53,6 +62,7 @@ class MotionPrediction:
         self._stamp: float | None = None
         self._usual_time = 0.0
         self._last = Pose2()
+        self._longest = 0.0
         self._silent = False
         self._unreported = Pose2()
 
@@ -104,6 +114,10 @@ class MotionPrediction:
             self._events.note(Event.GAP, stamp)
         if resumed:
             return PredictedStep(motion, self.possible, unreported.inverse() @ motion)
+        if distance > max(LONG_STEP, SUDDEN * self._longest) and self._longest > 0.0:
+            return PredictedStep(
+                motion, alternative=Pose2(motion.x / 2.0, motion.y / 2.0, motion.theta / 2.0), leap=True
+            )
         return PredictedStep(motion)
 
     def _without_change(self, stamp: float) -> PredictedStep:
@@ -120,5 +134,6 @@ class MotionPrediction:
     def moved(self, motion: Pose2) -> None:
         """Remember the step as it was estimated."""
         self._last = motion
+        self._longest = max(math.hypot(motion.x, motion.y), LONGEST_FADING * self._longest)
         if self._silent:
             self._unreported = self._unreported @ motion

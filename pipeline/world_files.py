@@ -18,10 +18,7 @@ MAP_RESOLUTION = 0.05
 
 
 def list_worlds(*, verbose: bool = False) -> list[str]:
-<<<<<<< HEAD
-    """List the bundled worlds, a line each, the name first; with ``verbose`` more lines on each."""
-=======
-    """Return one line a bundled world, its name first; with ``verbose`` more lines on each.
+    """List the bundled worlds, a line each; the name comes first; with ``verbose`` more lines on each.
 
     The lines stand in a file beside the plans, which a test compares with :func:`describe_bundled`: to read and check
     twenty plans takes longer than most commands.
@@ -39,7 +36,6 @@ def list_worlds(*, verbose: bool = False) -> list[str]:
 
 def describe_bundled() -> list[str]:
     """Work out the lines of :func:`list_worlds` from the plans."""
->>>>>>> large
     import shapely
 
     from closedrooms.worlds.closing import closable_rooms
@@ -59,13 +55,8 @@ def describe_bundled() -> list[str]:
     return lines
 
 
-<<<<<<< HEAD
-def _details(plan: FloorPlan) -> list[str]:
-    """Describe what a plan holds beside its figures."""
-=======
 def _details(plan: "FloorPlan") -> list[str]:
-    """What a plan holds beside its figures."""
->>>>>>> large
+    """Describe what a plan holds beside its figures."""
     from collections import Counter
 
     from closedrooms.worlds.closing import closable_rooms
@@ -77,13 +68,8 @@ def _details(plan: "FloorPlan") -> list[str]:
     return [f"    {area:.0f} m2 of floor{furniture}: {kinds}", f"    can be closed: {', '.join(doors) or 'none'}"]
 
 
-<<<<<<< HEAD
-def describe_world(plan: FloorPlan) -> list[str]:
-    """Describe a plan in words: its rooms with area and doors, its doors with place, width and rooms."""
-=======
 def describe_world(plan: "FloorPlan") -> list[str]:
-    """Return a plan in words: its rooms with area and doors, its doors with place, width and rooms."""
->>>>>>> large
+    """Describe a plan in words: its rooms with area and doors, its doors with place, width and rooms."""
     from closedrooms.worlds.closing import closable_rooms
 
     closable = closable_rooms(plan)
@@ -176,13 +162,8 @@ def map_stem(path: Path) -> Path:
     return path.with_suffix("") if path.suffix in {".yaml", ".yml", ".png", ".pgm"} else path
 
 
-<<<<<<< HEAD
-def exporters() -> dict[str, Callable[[Path, FloorPlan], None]]:
-    """List the writers of floor plans by the name of their format."""
-=======
 def exporters() -> dict[str, Callable[[Path, "FloorPlan"], None]]:
-    """Writers of floor plans by the name of their format."""
->>>>>>> large
+    """List the writers of floor plans by the name of their format."""
     from closedrooms.worlds.formats.mesh import write_obj, write_urdf
     from closedrooms.worlds.formats.native import write_plan
     from closedrooms.worlds.formats.sdf import write_sdf

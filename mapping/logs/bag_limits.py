@@ -43,7 +43,7 @@ def limited(path: Path) -> Iterator[None]:
 
 def _limit_chunks(path: Path) -> None:
     """Put decompressors with a bound in the place of those of rosbags."""
-    from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+    from lz4.frame import LZ4FrameDecompressor
     from rosbags.rosbag1 import reader as ros1
     from rosbags.rosbag2 import reader as ros2
     from rosbags.rosbag2 import storage_mcap as mcap

@@ -130,3 +130,46 @@ def test_gaps_and_blind_scans_are_told_with_their_times(office: Any) -> None:
         )
     assert told(mapper) == {"motions over gaps without scans": 1, "poses of scans with too few echoes": 1}
     assert mapper.events[1].names == ("1.00 s",)
+
+
+def slowly(drive: Any, odometry: FloatArray, kept: Any = None) -> Mapper:
+    """Map a drive whose scans are a metre and two seconds apart."""
+    mapper = Mapper()
+    for i in range(len(drive.scans)) if kept is None else kept:
+        scan = drive.scans[i]
+        mapper.process(
+            LaserScan(scan.ranges, scan.angle_min, scan.angle_increment, 20.0, 0.05, 20.0 * scan.stamp),
+            Pose2(*odometry[i]),
+        )
+    mapper.finish()
+    return mapper
+
+
+@pytest.fixture
+def corridor(segment_world: Any) -> Any:
+    """A corridor 60 m long and 2 m wide, with jambs of doors 0.3 m deep at odd distances."""
+    below = (2.5, 4.1, 7.0, 9.6, 11.2, 14.9, 16.0, 19.3, 22.2, 23.1, 26.7, 29.0, 31.5, 34.4)
+    above = (3.3, 8.2, 12.5, 17.1, 20.4, 25.0, 28.3, 33.0)
+    walls = [(0.0, 0.0, 60.0, 0.0), (60.0, 0.0, 60.0, 2.0), (60.0, 2.0, 0.0, 2.0), (0.0, 2.0, 0.0, 0.0)]
+    return segment_world([*walls, *((x, 0.0, x, 0.3) for x in below), *((x, 2.0, x, 1.75) for x in above)])
+
+
+def test_a_step_that_counts_twice_along_a_corridor_is_halved_where_the_scans_say_so(
+    corridor: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drive = corridor.drive([(1.0, 1.0), (34.0, 1.0)], seed=1, step=1.0, **NOISE | {"beams": 180})
+    odometry = changed(drive.odometry, {9: 2, 18: 2, 26: 2})
+    mapper = slowly(drive, odometry)
+    assert error(mapper, drive) < 0.05
+    assert told(mapper) == {"sudden leaps of the odometry": 3}
+    assert mapper.keyframes[-1].travelled == pytest.approx(32.0, abs=0.4)
+    monkeypatch.setattr("closedrooms.mapping.motion_prediction.SUDDEN", 1e9)
+    assert error(slowly(drive, odometry), drive) > 0.5
+
+
+def test_a_long_step_that_was_driven_is_not_halved(corridor: Any) -> None:
+    drive = corridor.drive([(1.0, 1.0), (34.0, 1.0)], seed=2, step=1.0, **NOISE | {"beams": 180})
+    kept = [i for i in range(len(drive.scans)) if i not in (9, 18, 26)]
+    mapper = slowly(drive, drive.odometry, kept)
+    assert "sudden leaps of the odometry" not in told(mapper)
+    assert ate(mapper.trajectory()[1], drive.truth[kept])[0] < 0.05
