@@ -2,6 +2,6 @@
 
 - ``scene``: the map along its walls, the doors' poses (``door_pose``, ``door_frame``), in cells of the ``lattice``.
 - ``hypotheses``: rectangles (``candidates``) scored by ``features`` of the ``evidence``.
-- ``selection``: all rooms together, by ``pair_features``; ``shared_rooms`` of two doors.
+- ``selection``: all rooms together, by ``pair_features``; ``shared_rooms`` of several doors.
 - ``room_shape``: from rectangles to rooms.
 """

@@ -23,8 +23,9 @@ MAX_WINDOW = 5_000_000
 # for the likelihood of the rectangles near the true rooms, then set with the best of three on ``choose`` in view.
 VAGUE = 3.0
 
-# The doors of a room, by their indices, ascending.
+# The doors of a room, by their indices, ascending; rectangles with their scores and what was measured of them.
 Doors = tuple[int, ...]
+Scored = tuple[IntArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,9 +104,6 @@ def propose_rectangles(scene: Scene) -> Proposals:
             found.setdefault(doors, []).append(placed)
     alone = [found.pop((i,))[0] for i in range(len(poses))]
     return Proposals(alone, found)
-
-
-Scored = tuple[IntArray, FloatArray, FloatArray]
 
 
 def _propose_all(
