@@ -29,7 +29,7 @@ from closedrooms.experiments.stores import open_store, read_file
 COMMAND = [sys.executable, "-c", "import sys; from closedrooms.cli.commands import main; sys.exit(main())"]
 QUICK = ["--sim.lidar.beams", "180", "--repetitions", "2", "--max-closed", "2", "--seed", "5"]
 # Two samples a shard or so.
-SHARDS = ["--format", "shards", "--shard-mb", "0.008", *QUICK]
+SHARDS = ["--format", "shards", "--shard-mb", "0.004", *QUICK]
 
 
 @pytest.fixture(scope="module")
