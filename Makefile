@@ -8,7 +8,9 @@ PAPER ?= paper
 
 FUZZ ?= 600
 
-.PHONY: run test test-slow fuzz mutants lint format paper paper-quick clean
+MODEL ?= model
+
+.PHONY: run test test-slow fuzz mutants model lint format paper paper-quick clean
 
 run: $(VENV)/.ready  ## The main job on a bundled world; writes runs/<world>-0
 	$(BIN)/closedrooms run $(ARGS)
@@ -33,6 +35,11 @@ paper: $(VENV)/.ready  ## The paper's protocol in full: 3,885 maps, every method
 paper-quick: $(VENV)/.ready  ## A tenth of it, in minutes: two orders of closing, up to eleven closed doors
 	$(BIN)/closedrooms dataset all --repetitions 2 --max-closed 11 --out $(PAPER)-quick/dataset
 	$(BIN)/closedrooms evaluate $(PAPER)-quick/dataset --out $(PAPER)-quick/evaluation
+
+model: $(VENV)/.ready  ## Train the network of the method `learned`, on drawn maps of the floor plans in PLANS; writes $(MODEL)/
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[train]'
+	$(BIN)/python benchmarks/drawn_maps.py "$(PLANS)" --use fit --maps 6 --generated 40 --bundled --out $(MODEL)/fit
+	$(BIN)/closedrooms train $(MODEL)/fit --out $(MODEL)/trained --threads 1
 
 lint: $(VENV)/.ready  ## Style and types
 	$(BIN)/ruff format --check .

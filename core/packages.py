@@ -19,6 +19,9 @@ BROUGHT_BY = {
     "gtsam": "'closedrooms[slam]'",
     "rosbags": "'closedrooms[bags]'",
     "nicegui": "'closedrooms[web]'",
+    "torch": "'closedrooms[train]'",
+    "onnx": "'closedrooms[train]'",
+    "onnxscript": "'closedrooms[train]'",
 }
 
 

@@ -41,6 +41,7 @@ def loaded(folder: Path, *words: str) -> set[str]:
     [
         (["worlds", "list"], LINE | {"numpy", "shapely"}),
         (["predict", "map.yaml", "--doors", "doors.geojson", "--out", "p"], MAPS),
+        (["predict", "map.yaml", "--doors", "doors.geojson", "--method", "learned", "--out", "l"], MAPS),
         (["cover", "map.yaml", "--doors", "doors.geojson", "--out", "c"], TOURS | {"ortools"}),
         (["doors", "map.yaml", "--out", "d.geojson"], MAPS),
     ],
