@@ -8,7 +8,9 @@ PAPER ?= paper
 
 FUZZ ?= 600
 
-.PHONY: run test test-slow fuzz mutants lint format paper paper-quick docs clean
+MODEL ?= model
+
+.PHONY: run test test-slow fuzz mutants model lint format paper paper-quick docs clean
 
 run: $(VENV)/.ready  ## The main job on a bundled world; writes runs/<world>-0
 	$(BIN)/closedrooms run $(ARGS)
@@ -38,6 +40,11 @@ docs: $(VENV)/.ready  ## The site, into docs/_build/html; warnings are errors, a
 	$(BIN)/python docs/render_results.py
 	$(BIN)/sphinx-build -W --keep-going -q -b html -d docs/_build/doctrees docs docs/_build/html
 	$(BIN)/python docs/check_offline.py docs/_build/html
+
+model: $(VENV)/.ready  ## Train the network of the method `learned`, on drawn maps of the floor plans in PLANS; writes $(MODEL)/
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[train]'
+	$(BIN)/python benchmarks/drawn_maps.py "$(PLANS)" --use fit --maps 6 --generated 40 --bundled --out $(MODEL)/fit
+	$(BIN)/closedrooms train $(MODEL)/fit --out $(MODEL)/trained --threads 1
 
 lint: $(VENV)/.ready  ## Style and types
 	$(BIN)/ruff format --check .

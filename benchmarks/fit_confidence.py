@@ -1,10 +1,12 @@
 """Find the numbers of ``predictor/confidence/calibration.json`` on samples of the use ``fit``, method by method.
 
-    python benchmarks/fit_confidence.py FIT [FIT ...] [--methods best paper ...] [--every 1]
+    python benchmarks/fit_confidence.py FIT [FIT ...] [--methods best paper ...] [--every 1] [--held-out MODEL]
 
 FIT are folders of samples, as ``drawn_maps.py`` writes them; a building of another use is refused. The curve of
 confidence is fitted on what other buildings gave (five folds over groups of buildings), so that a regression that knows
-its own buildings too well does not pass for sure; the curve of cells is fitted on the buildings themselves.
+its own buildings too well does not pass for sure; the curve of cells is fitted on the buildings themselves. For the
+method ``learned`` MODEL, the folder that ``closedrooms train`` wrote, names the buildings that its network has not
+learned from: only those are looked at.
 """
 
 import argparse
@@ -29,7 +31,7 @@ from closedrooms.experiments.evaluation.listing import find_samples
 from closedrooms.experiments.evaluation.sample_evaluation import Starts
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
 from closedrooms.experiments.evaluation.sureness import cells_asked
-from closedrooms.experiments.training.buildings import read_groups, use_of
+from closedrooms.experiments.training.buildings import group_of, use_of
 from closedrooms.pipeline.reporting.scores import polygon_iou
 from closedrooms.predictor.confidence.belief import Belief
 from closedrooms.predictor.confidence.calibration import FILE
@@ -55,13 +57,6 @@ class Collected:
     nearest: list[tuple[float, bool]] = field(default_factory=list)
     cells: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
     variants: dict[str, list[FloatArray]] = field(default_factory=lambda: defaultdict(list))
-
-
-def group_of(building: str) -> str:
-    for group in read_groups():
-        if building in group.buildings:
-            return group.buildings[0]
-    return building
 
 
 def learn_variants(collected: Collected, sample: Sample, prediction: Prediction) -> None:
@@ -162,11 +157,15 @@ def fit(collected: Collected, variants: dict[str, FloatArray]) -> dict[str, Any]
     }
 
 
-def predictions(folders: list[Path], method: str, every: int) -> Iterator[tuple[Sample, Prediction]]:
+def predictions(
+    folders: list[Path], method: str, every: int, held_out: set[str] | None
+) -> Iterator[tuple[Sample, Prediction]]:
     """Samples with the raw prediction of a method."""
     chosen = find_method(method)
     for path in find_samples(folders)[::every]:
         sample = read_sample(path)
+        if held_out is not None and group_of(sample.world) not in held_out:
+            continue
         if use_of(sample.world) != "fit":
             sys.exit(f"{sample.world} is not of the use fit")
         config = chosen.config()
@@ -174,12 +173,14 @@ def predictions(folders: list[Path], method: str, every: int) -> Iterator[tuple[
         yield sample, chosen.predict(sample.observed, sample.doors, config, **shared)
 
 
-def collect(folders: list[Path], method: str, every: int) -> tuple[Collected, dict[str, FloatArray]]:
+def collect(
+    folders: list[Path], method: str, every: int, held_out: set[str] | None
+) -> tuple[Collected, dict[str, FloatArray]]:
     """Go through the samples: every third tells how often each variant is right, the others how sure to be then."""
     collected = Collected()
     waiting: list[tuple[Sample, Prediction]] = []
     variants: dict[str, FloatArray] = {}
-    for number, (sample, prediction) in enumerate(predictions(folders, method, every)):
+    for number, (sample, prediction) in enumerate(predictions(folders, method, every, held_out)):
         if prediction.beliefs or not prediction.rooms:
             learn_rooms(collected, sample, prediction, list(prediction.beliefs))
             learn_cells(collected, sample, list(prediction.beliefs))
@@ -206,9 +207,13 @@ def main() -> None:
     parser.add_argument("fit", type=Path, nargs="+")
     parser.add_argument("--methods", nargs="+", default=list(METHODS))
     parser.add_argument("--every", type=int, default=1)
+    parser.add_argument("--held-out", type=Path)
     args = parser.parse_args()
+    held_out = None
+    if args.held_out is not None:
+        held_out = set(json.loads((args.held_out / "run.json").read_text())["buildings"]["held_out"])
     for method in args.methods:
-        collected, variants = collect(args.fit, method, args.every)
+        collected, variants = collect(args.fit, method, args.every, held_out)
         own = fit(collected, variants)
         numbers = json.loads(FILE.read_text())["methods"] if FILE.is_file() else {}
         write_json(FILE, {"features": list(NAMES), "methods": numbers | {method: own}})

@@ -112,6 +112,13 @@ COMMANDS = (
         "experiments.robustness.sweep:robustness",
         needs=(*SIMULATION, *TOURS, *TABLES),
     ),
+    Command(
+        "train",
+        "Train the network of the method learned on the rooms of datasets.",
+        "experiments.training.config:TrainConfig",
+        "experiments.training.train:train",
+        needs=("torch", "onnx", "onnxscript", "matplotlib"),
+    ),
 )
 GROUPS = {"worlds": "List, show, generate and convert floor plans."}
 ABOUT = """Predicts the layout of rooms behind closed doors and completes a robot's map with them.

@@ -5,6 +5,7 @@ Imports nothing heavy.
 
 import math
 from dataclasses import dataclass, field, fields
+from pathlib import Path
 from typing import Literal
 
 from closedrooms.core.errors import InvalidInputError
@@ -238,6 +239,21 @@ class BestConfig(MethodConfig):
             raise InvalidInputError(
                 f"largest_side {self.largest_side}", expected=f"at least smallest_side {self.smallest_side}"
             )
+
+
+@dataclass(frozen=True, kw_only=True)
+class LearnedConfig(BestConfig):
+    """The rectangles of ``best``, rated by a trained network too."""
+
+    model: Path | None = None
+    """Folder that ``closedrooms train`` wrote, or an ONNX file; the model that comes with closedrooms if not given."""
+
+    rated: int = 300
+    """Rectangles a door that the network rates; ``shortlist`` of them are kept for the joint choice."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_numbers(self, ("rated",))
 
 
 def _check_numbers(config: object, positive: tuple[str, ...]) -> None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.nearest import nearest
-from closedrooms.predictor.config import BestConfig, FacesConfig, PaperConfig, RoseConfig
+from closedrooms.predictor.config import BestConfig, FacesConfig, LearnedConfig, PaperConfig, RoseConfig
 
 if TYPE_CHECKING:
     from closedrooms.core.door import ClosedDoor
@@ -103,6 +103,12 @@ _OURS = (
         "rectangles between wall faces, chosen jointly by their evidence",
         BestConfig,
         "closedrooms.predictor.best.method:predict_best",
+    ),
+    Method(
+        "learned",
+        "the same rectangles, rated by a network that was trained on true rooms too",
+        LearnedConfig,
+        "closedrooms.predictor.learned.method:predict_learned",
     ),
     Method(
         "line-of-sight",

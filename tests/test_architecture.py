@@ -68,6 +68,17 @@ def test_only_the_recording_imports_rerun() -> None:
     assert {path.parent.relative_to(ROOT).as_posix() for path in users} == {"visualization/rerun"}
 
 
+def test_only_training_imports_torch() -> None:
+    heavy = {"torch", "onnx", "onnxscript"}
+    users = {
+        path.parent.relative_to(ROOT).as_posix()
+        for folder in MAY_IMPORT
+        for path in (ROOT / folder).rglob("*.py")
+        if {name.split(".")[0] for name in imported(path)} & heavy
+    }
+    assert users == {"experiments/training"}
+
+
 def modules() -> dict[str, Path]:
     """Every module of the house by its full name."""
     named = {}

@@ -20,6 +20,9 @@ BROUGHT_BY = {
     "rosbags": "'closedrooms[bags]'",
     "nicegui": "'closedrooms[web]'",
     "fsspec": "'closedrooms[s3]'",
+    "torch": "'closedrooms[train]'",
+    "onnx": "'closedrooms[train]'",
+    "onnxscript": "'closedrooms[train]'",
 }
 
 

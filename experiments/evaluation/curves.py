@@ -91,7 +91,7 @@ def _draw(path: Path, panels: Sequence[tuple[str, list[tuple[str, Series]]]], la
         for number, (name, (doors, means, spread)) in enumerate(drawn):
             axes.errorbar(
                 np.array(doors) + (number - (len(drawn) - 1) / 2) * 0.09, means, spread,
-                label=LABELS.get(name, name), color=[v / 255 for v in COLOURS[name]],
+                label=LABELS.get(name, name), color=_colour_of(name, number),
                 marker="o", markersize=3.5, elinewidth=0.8, capsize=2,
             )  # fmt: skip
         axes.set(title=title, xlabel="closed doors")
@@ -128,10 +128,9 @@ def draw_reliability(path: Path, rows: Sequence[Row], methods: Sequence[str]) ->
     axes.plot([0.0, 1.0], [0.0, 1.0], color="0.6", linewidth=0.8, linestyle="--", label="as sure as right")
     for number, method in enumerate(methods):
         own = [row for row in rows if row["method"] == method]
-        colour = COLOURS.get(method, ROOM_COLOURS[(len(COLOURS) + number) % len(ROOM_COLOURS)])
         axes.plot(
             [row["confidence"] for row in own], [row["iou"] for row in own],
-            label=LABELS.get(method, method), color=[v / 255 for v in colour], marker="o", markersize=3.5,
+            label=LABELS.get(method, method), color=_colour_of(method, number), marker="o", markersize=3.5,
         )  # fmt: skip
     axes.set(xlabel="confidence (expected IoU)", ylabel="mean IoU", xlim=(0.0, 1.0), ylim=(0.0, 1.0))
     axes.legend(fontsize=8)
@@ -209,3 +208,9 @@ def save_figure(figure: Any, path: Path) -> None:
     data = io.BytesIO()
     figure.savefig(data, format="png", dpi=110, metadata={"Software": None})
     write_bytes(path, data.getvalue())
+
+
+def _colour_of(name: str, number: int) -> list[float]:
+    """Return the colour of a method or estimate, 0 to 1; for one without its own by its place in the figure."""
+    colour = COLOURS.get(name, ROOM_COLOURS[(len(COLOURS) + number) % len(ROOM_COLOURS)])
+    return [value / 255 for value in colour]

@@ -184,6 +184,7 @@ def _code() -> str:
     files = [
         *(root / "predictor").rglob("*.py"),
         *(root / "predictor").rglob("*.json"),
+        *(root / "predictor").rglob("*.onnx"),
         *(root / "core").rglob("*.py"),
         root / "pipeline" / "reporting" / "scores.py",
     ]

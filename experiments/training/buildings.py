@@ -93,3 +93,14 @@ def note_report(rows: list[dict[str, str]], path: Path = LEDGER) -> None:
     writer.writerows(rows)
     before = read_bytes(path, what="the ledger") if path.is_file() else b""
     write_bytes(path, before + text.getvalue().encode())
+
+
+def group_of(building: str) -> str:
+    """Return the name of the group that a building stands in: itself where it stands in none."""
+    return next((group.buildings[0] for group in read_groups() if building in group.buildings), building)
+
+
+def may_train(building: str) -> bool:
+    """Tell whether a building may be learned from: it is of the use ``fit``, or nobody has sorted it."""
+    known = GENERATED.fullmatch(building) or any(building in group.buildings for group in read_groups())
+    return not known or use_of(building) == "fit"

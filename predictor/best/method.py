@@ -5,14 +5,14 @@ other side, walls that continue, the middle between doors, and the sizes of obse
 sides is scored by its evidence; the rectangles of all doors are then chosen together.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.best.belief import believe
-from closedrooms.predictor.best.hypotheses import propose_rectangles
+from closedrooms.predictor.best.hypotheses import Proposals, propose_rectangles
 from closedrooms.predictor.best.room_shape import trace_rooms
-from closedrooms.predictor.best.scene import prepare
+from closedrooms.predictor.best.scene import Scene, prepare
 from closedrooms.predictor.best.selection import select_jointly
 from closedrooms.predictor.best.trace import trace_of
 from closedrooms.predictor.config import BestConfig
@@ -21,13 +21,20 @@ from closedrooms.predictor.prediction import Prediction
 from closedrooms.predictor.structure.doorways import find_doorways
 
 
-def predict_best(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: BestConfig) -> Prediction:
+def predict_best(
+    grid: OccupancyGrid,
+    doors: Sequence[ClosedDoor],
+    config: BestConfig,
+    *,
+    rate: Callable[[Scene, Proposals], Proposals] | None = None,
+) -> Prediction:
     """Predict the rooms behind closed doors as well as we can.
 
     Args:
         grid: The map, of any resolution and size.
         doors: Closed doors in the frame of the map.
         config: Settings.
+        rate: Rates the proposed rectangles anew before some are chosen (method ``learned``).
 
     Returns:
         The completed map on the lattice of the input, rooms in the order of the doors, failures by door id.
@@ -37,6 +44,8 @@ def predict_best(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: BestC
     """
     scene = prepare(grid, doors, config)
     hypotheses = propose_rectangles(scene)
+    if rate is not None:
+        hypotheses = rate(scene, hypotheses)
     chosen = select_jointly(scene, hypotheses)
     facing = [pose.facing for pose in scene.poses]
     openings = find_doorways(scene.grid, facing, width=config.door_width)

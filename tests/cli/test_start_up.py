@@ -58,6 +58,7 @@ def loaded(folder: Path, *words: str) -> set[str]:
             ["evaluate", ".", "--methods", "best", "--no-tours", "--workers", "1", "--out", "../e"],
             MAPS | TABLES | LEARN | {"networkx", "lazy_loader"},
         ),
+        (["predict", "map.yaml", "--doors", "doors.geojson", "--method", "learned", "--out", "l"], MAPS),
         (["cover", "map.yaml", "--doors", "doors.geojson", "--out", "c"], TOURS | {"ortools"}),
         (["doors", "map.yaml", "--out", "d.geojson"], MAPS),
     ],

@@ -15,7 +15,7 @@ from closedrooms.core.room import Room
 from closedrooms.predictor.disjoint_rooms import NO_ROOM, part_rooms
 from closedrooms.predictor.methods import METHODS, predict
 
-DISJOINT = [name for name in ("paper", "rose", "best") if METHODS[name].disjoint]
+DISJOINT = [name for name in ("paper", "rose", "best", "learned") if METHODS[name].disjoint]
 # What rounding may leave [m2].
 ROUNDING = 1e-6
 PLACES = st.integers(0, 60).map(lambda tenth: tenth / 10)

@@ -12,10 +12,11 @@ from closedrooms.predictor.confidence.room_features import NAMES, measure_rooms
 from closedrooms.predictor.confidence.variants import FACTORS, SAME, RoomVariants
 from closedrooms.predictor.config import FacesConfig
 from closedrooms.predictor.inpainting import withdraw_unsure
+from closedrooms.predictor.learned.ratings import WORDS
 from closedrooms.predictor.methods import METHODS, Method, predict
 from closedrooms.predictor.prediction import free_probability
 
-OURS = ("paper", "rose", "best", "line-of-sight", "geometric")
+OURS = ("paper", "rose", "best", "learned", "line-of-sight", "geometric")
 
 
 @pytest.fixture(scope="module")
@@ -91,9 +92,9 @@ def test_a_method_of_another_package_is_judged_too(scene):
 
 def test_shipped_numbers_fit_what_is_measured():
     calibrations = read_calibrations()
-    assert {"paper", "best"} <= set(calibrations) <= set(METHODS)
+    assert {"paper", "best", "learned"} <= set(calibrations) <= set(METHODS)
     for method, numbers in calibrations.items():
-        evidence = 4 + len(FEATURES) if method == "best" else 0
+        evidence = {"best": 4 + len(FEATURES), "learned": 4 + len(WORDS)}.get(method, 0)
         assert numbers.mean.shape == numbers.weights.shape == (len(NAMES) + evidence,)
         for curve in (numbers.confidence, numbers.cells, numbers.nearest):
             assert (np.diff(curve.x) >= 0).all()
