@@ -1,6 +1,9 @@
 """Ground-truth datasets, evaluation, robustness and training, and the workers that they share.
 
 ``dataset.dataset.dataset`` and ``robustness.sweep.robustness`` are named like their packages and so stand there.
+
+- Work: ``workers`` (local processes or a Dask cluster), ``scheduler_address`` (of the cluster).
+- Files: ``places`` (a folder or an address, as typed), ``stores`` (reading and writing files at either).
 """
 
 from typing import TYPE_CHECKING

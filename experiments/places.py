@@ -21,7 +21,7 @@ class Url(str):
 
     @property
     def name(self) -> str:
-        """Its last part."""
+        """Last part of the address."""
         return self.rpartition("/")[2]
 
 

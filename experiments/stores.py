@@ -22,16 +22,16 @@ WHAT = "a file of a dataset"
 
 
 class Store(Protocol):
-    """Where files are kept; names have ``/`` between their parts and are relative to the dataset."""
+    """Place where files are kept; names have ``/`` between their parts and are relative to the dataset."""
 
     def where(self, name: str) -> str:
-        """Return what a file is called in messages."""
+        """Name a file as messages do."""
 
     def names(self) -> set[str]:
-        """Return what stands at the root, files and folders."""
+        """List what stands at the root, files and folders."""
 
     def sizes(self, folder: str) -> dict[str, int]:
-        """Return the files of one folder with their bytes; none where there is no such folder."""
+        """List the files of one folder with their bytes; none where there is no such folder."""
 
     def opened(self, name: str) -> contextlib.AbstractContextManager[Any]:
         """Open a file for reading bytes at any place; an :class:`InvalidInputError` where it cannot be read."""
@@ -47,7 +47,7 @@ class Store(Protocol):
 
 
 def open_store(place: Path | Url) -> Store:
-    """Return the files at a place.
+    """Open the files at a place.
 
     Raises:
         InvalidInputError: An address that fsspec cannot read.
@@ -63,7 +63,7 @@ class Folder:
         self._root = root
 
     def where(self, name: str) -> str:
-        """Return its path."""
+        """Name a file by its path."""
         return str(self._root / name)
 
     def names(self) -> set[str]:
@@ -137,7 +137,7 @@ class Remote:
         self._root, self._url = str(self._root).rstrip("/"), url
 
     def where(self, name: str) -> str:
-        """Return its address."""
+        """Name a file by its address."""
         return f"{self._url}/{name}"
 
     def names(self) -> set[str]:
@@ -149,7 +149,7 @@ class Remote:
         return {f"{folder}/{name}": int(size) for name, size in self._list(folder) if size is not None}
 
     def _list(self, folder: str) -> list[tuple[str, int | None]]:
-        """Names in a folder with their bytes, ``None`` for folders."""
+        """List the names in a folder with their bytes, ``None`` for folders."""
         with _reading(self.where(folder)):
             self._files.invalidate_cache()
             try:
@@ -218,7 +218,7 @@ def write_file(store: Store, name: str, content: bytes) -> None:
 
 
 def file_digest(store: Store, name: str) -> str:
-    """Hexadecimal SHA-256 of a file.
+    """Hash a file: hexadecimal SHA-256.
 
     Raises:
         InvalidInputError: It cannot be read.
@@ -231,7 +231,7 @@ def file_digest(store: Store, name: str) -> str:
 
 
 class Summed:
-    """What is written into a file, with its bytes counted and its SHA-256."""
+    """File to write into, whose bytes are counted and hashed by SHA-256."""
 
     closed = False
 
@@ -239,20 +239,20 @@ class Summed:
         self._file, self._sum, self.size = file, hashlib.sha256(), 0
 
     def write(self, data: Any) -> int:
-        """Write."""
+        """Write some bytes, and count and hash them."""
         self._sum.update(data)
         self.size += len(data)
         return self._file.write(data)
 
     def flush(self) -> None:
-        """Flush."""
+        """Flush the file."""
         self._file.flush()
 
     def close(self) -> None:
         """Leave the file open: it is its owner's."""
 
     def tell(self) -> int:
-        """Say how many bytes were written."""
+        """Count the bytes that were written."""
         return self.size
 
     @property

@@ -42,14 +42,14 @@ AHEAD = 2
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """In place of an outcome: every worker that was given the job died of it."""
+    """Stand-in for an outcome: every worker that was given the job died of it."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class Crew(Generic[Job, Outcome]):
-    """Who does the work.
+    """Workers who do the work, local or on a cluster.
 
     Attributes:
         workers: Local processes; 1 works in this process.
@@ -64,7 +64,7 @@ class Crew(Generic[Job, Outcome]):
     by: str = "closedrooms"
 
     def do(self, function: Callable[[Job], Outcome], jobs: Iterable[Job]) -> Iterator[tuple[Job, Outcome | Lost]]:
-        """Outcomes as they come, in no certain order.
+        """Yield outcomes as they come, in no certain order.
 
         Jobs are taken one after the other, no more of them ahead than the workers can begin: a million cost no more
         memory than a hundred, and neighbours, which share a building, are worked on at one time.
@@ -132,7 +132,7 @@ class Crew(Generic[Job, Outcome]):
 
 @contextlib.contextmanager
 def hire(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Local worker processes: no part in Ctrl-C, no modules from the current directory, no life after the parent's.
+    """Start local workers: no part in Ctrl-C, no modules from the current directory, no life after the parent's.
 
     On any error in the block, Ctrl-C included, they are told to clear away what they have under way, and ended.
     """
@@ -201,7 +201,7 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def one_thread() -> None:
-    """Begin a worker: workers share the processors, and a library's own threads would only get in each other's way.
+    """Limit a worker to one thread: workers share the processors, and a library's own threads would get in the way.
 
     Holds for OpenCV and BLAS, those that are loaded and those that will be.
     """
@@ -247,14 +247,14 @@ def _begin(parent: int) -> None:
 
 
 class _Dismissal(Stop):
-    """Ends a worker: multiprocessing tells any other exception in a traceback."""
+    """End of a worker: multiprocessing tells any other exception in a traceback."""
 
     error = SystemExit
 
 
 @contextlib.contextmanager
 def _cluster(address: str) -> Iterator["Client"]:
-    """A client of a Dask cluster."""
+    """Connect to a Dask cluster."""
     require("distributed", by="--scheduler")
     from distributed import Client
 

@@ -62,7 +62,7 @@ def _check_size(
 
 
 def _array(content: bytes, name: str, path: Path, what: str) -> np.ndarray[Any, Any]:
-    """One array from its bytes (NumPy enhancement proposal 1)."""
+    """Build one array from its bytes (NumPy enhancement proposal 1)."""
     stream = io.BytesIO(content)
     version = np.lib.format.read_magic(stream)
     read_head = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
@@ -84,7 +84,7 @@ class TruncatedError(InvalidInputError):
 
 
 def log_lines(path: Path, *, gzipped: bool, what: str, longest: int, max_bytes: int = MAX_UNPACKED) -> Iterator[bytes]:
-    """Return the lines of a text log, unpacked on the way.
+    """Read the lines of a text log and unpack them on the way.
 
     Args:
         path: The file.

@@ -91,7 +91,7 @@ def read_features(
 
 
 def _features(data: Any) -> list[Any] | None:
-    """The features that parsed GeoJSON holds, ``None`` when it is none."""
+    """Find the features that parsed GeoJSON holds, ``None`` when it is none."""
     kind = data.get("type") if isinstance(data, dict) else None
     if kind == "FeatureCollection" and isinstance(data.get("features"), list):
         return list(data["features"])
@@ -192,14 +192,14 @@ def read_doors(path: Path, *, remarks: list[Remark] | None = None) -> list[Close
 
 
 def _parts(geometry: BaseGeometry) -> list[BaseGeometry]:
-    """The parts of a Multi geometry; pieces of one line are one."""
+    """Split a Multi geometry into its parts; pieces of one line are one."""
     if isinstance(geometry, MultiLineString):
         geometry = shapely.line_merge(geometry)
     return list(shapely.get_parts(geometry)) if isinstance(geometry, MultiLineString | MultiPoint) else [geometry]
 
 
 def _door_names(features: Sequence[Feature], path: Path, remarks: list[Remark]) -> list[str]:
-    """Names of doors: as given, numbered where none is given or several parts share one."""
+    """Name doors: as given, numbered where no name is given or several parts share one."""
     given = [_given_name(number, properties.get("id"), path) for number, (_, properties) in enumerate(features)]
     taken = {name for name in given if name is not None}
     names: list[str] = []
@@ -283,7 +283,7 @@ def write_rooms(path: Path, rooms: Sequence[Room]) -> None:
 
 
 def read_rooms(path: Path, *, remarks: list[Remark] | None = None) -> list[Room]:
-    """Read rooms; invalid polygons are repaired by ``shapely.make_valid``.
+    """Read rooms and repair invalid polygons by ``shapely.make_valid``.
 
     Args:
         path: The file.
@@ -334,7 +334,7 @@ def _share(number: int, value: Any, name: str, path: Path) -> float | None:
 
 
 def _alternatives(number: int, given: Any, path: Path) -> tuple[Alternative, ...]:
-    """The other shapes that a room may have.
+    """Read the other shapes that a room may have.
 
     Raises:
         InvalidInputError: Something else.
@@ -353,7 +353,7 @@ def _alternatives(number: int, given: Any, path: Path) -> tuple[Alternative, ...
 
 
 def _repaired(geometry: BaseGeometry) -> BaseGeometry:
-    """The areas of an invalid polygon made valid."""
+    """Make an invalid polygon valid and keep its areas."""
     valid = shapely.get_parts(shapely.make_valid(geometry))
     parts = [p for g in valid for p in shapely.get_parts(g) if isinstance(p, Polygon)]
     return parts[0] if len(parts) == 1 else MultiPolygon(parts)

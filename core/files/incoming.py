@@ -64,7 +64,7 @@ def reading(path: Path | str, what: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def opened(path: Path, what: str) -> Iterator[io.BufferedReader]:
-    """Return a regular file, open for reading bytes; never waits.
+    """Open a regular file for reading bytes, without ever waiting for it.
 
     Args:
         path: The file; symbolic links are followed.
@@ -92,7 +92,7 @@ def opened(path: Path, what: str) -> Iterator[io.BufferedReader]:
 
 
 def check_regular(path: Path, what: str) -> None:
-    """Make sure that a library which opens files by itself is given a regular one.
+    """Check that a library which opens files by itself is given a regular one.
 
     Raises:
         InvalidInputError: See :func:`opened`.
@@ -102,7 +102,7 @@ def check_regular(path: Path, what: str) -> None:
 
 
 def is_file(path: Path) -> bool:
-    """Tell whether there is such a regular file; none has a name that the system refuses."""
+    """Check whether a regular file of this name exists; none has a name that the system refuses."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -110,7 +110,7 @@ def is_file(path: Path) -> bool:
 
 
 def is_there(path: Path) -> bool:
-    """Tell whether there is anything of this name; nothing has a name that the system refuses."""
+    """Check whether anything of this name exists; nothing has a name that the system refuses."""
     try:
         return path.exists()
     except (OSError, ValueError):
@@ -118,7 +118,7 @@ def is_there(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Tell whether there is such a folder; none has a name that the system refuses."""
+    """Check whether a folder of this name exists; none has a name that the system refuses."""
     try:
         return path.is_dir()
     except (OSError, ValueError):
@@ -126,7 +126,7 @@ def is_folder(path: Path) -> bool:
 
 
 def read_head(path: Path, *, what: str, size: int) -> bytes:
-    """At most the first ``size`` bytes of a file, enough to tell its format.
+    """Read at most the first ``size`` bytes of a file, enough to tell its format.
 
     Raises:
         InvalidInputError: See :func:`opened`.
@@ -208,7 +208,7 @@ def _parsed(text: str, path: Path | str, what: str) -> Any:
 
 
 def check_depth(value: Any, path: Path | str, what: str) -> None:
-    """Make sure that lists and dictionaries are not nested deeper than :data:`MAX_DEPTH`.
+    """Check that lists and dictionaries are not nested deeper than :data:`MAX_DEPTH`.
 
     Raises:
         InvalidInputError: They are.

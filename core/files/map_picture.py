@@ -25,7 +25,7 @@ SCHEME = re.compile(r"(?i)(file|package|model|https?)://")
 
 
 def picture_path(image: str, path: Path, *, allow_outside: bool = False) -> tuple[Path, bool]:
-    """Return the picture that a map's YAML names, in any form that people write.
+    """Find the picture that a map's YAML names, in any form that people write.
 
     Sub-folders, ``~``, ``..``, ``file://``, ``package://`` and backslashes are understood. What the path leads to is
     opened when it lies in the YAML's folder; otherwise the file of the same name beside the YAML is taken.
@@ -61,7 +61,7 @@ def picture_path(image: str, path: Path, *, allow_outside: bool = False) -> tupl
 
 
 def _named(image: str) -> Path:
-    """The path that ``image`` means; of a package only the part below it can be known."""
+    """Find the path that ``image`` means; of a package only the part below it can be known."""
     text = image.strip().replace("\\", "/")
     text = re.sub("/{2,}", "/", text) if not SCHEME.match(text) else text
     scheme = SCHEME.match(text)
@@ -82,7 +82,7 @@ def _named(image: str) -> Path:
 
 
 def _lies_in(path: Path, folder: Path) -> bool:
-    """Whether a file lies in a folder or below it, symbolic links followed."""
+    """Check whether a file lies in a folder or below it, symbolic links followed."""
     try:
         return path.resolve().is_relative_to(folder.resolve())
     except (OSError, RuntimeError, ValueError):
@@ -90,7 +90,7 @@ def _lies_in(path: Path, folder: Path) -> bool:
 
 
 def read_picture(path: Path) -> tuple[npt.NDArray[np.uint8], BoolArray | None]:
-    """Grey values and, where some may be transparent, which pixels are not; the size is checked before decoding.
+    """Read grey values and, where some may be transparent, which pixels are not; check the size before decoding.
 
     Returns:
         Grey values, shape (rows, cols), the first row at the top, and opaque pixels of the same shape or ``None``.

@@ -70,7 +70,7 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def new_file(path: Path) -> Iterator[BinaryIO]:
-    """Open a file under a temporary name, that takes the place of ``path`` when the block ends well.
+    """Open a file under a temporary name that takes the place of ``path`` when the block ends well.
 
     Inside :func:`new_files` it does so when all of them are whole.
 
@@ -96,7 +96,7 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def _put(claims: _Claims) -> None:
-    """Move whole files to their places, only there where nothing has appeared or changed."""
+    """Move whole files to their places, only where nothing has appeared or changed."""
     for path in claims.parts:
         _check_unchanged(path, claims.before[path])
     for path, temporary in claims.parts.items():
@@ -119,7 +119,7 @@ def _check_unchanged(path: Path, before: tuple[int, ...] | None) -> None:
 
 
 def _identity(path: Path) -> tuple[int, ...] | None:
-    """What tells a file from another one in its place, ``None`` without one."""
+    """Find what tells a file from another one in its place, ``None`` without one."""
     try:
         now = path.lstat()
     except FileNotFoundError:
@@ -190,7 +190,7 @@ def new_files(paths: Iterable[Path], *, force: bool = False, sources: Iterable[P
 
 
 def is_ours(folder: Path, command: object = None) -> bool:
-    """Tell whether every file in ``folder``, at every depth, was written by ``command`` and has not changed since.
+    """Check whether every file in ``folder``, at every depth, was written by ``command`` and has not changed since.
 
     Args:
         folder: With a manifest.
@@ -200,7 +200,7 @@ def is_ours(folder: Path, command: object = None) -> bool:
 
 
 def _strange(folder: Path, command: object) -> str:
-    """What in a folder the same command did not write, or was changed since; empty for nothing."""
+    """Find what in a folder the same command did not write, or was changed since; empty for nothing."""
     try:
         manifest = read_json(folder / MANIFEST, what="a manifest", max_bytes=MAX_MANIFEST)
         if manifest["program"] != PROGRAM or manifest.get("command") != command:
@@ -223,7 +223,7 @@ def _strange(folder: Path, command: object) -> str:
 
 
 def _walk(folder: Path) -> Iterator[Path]:
-    """Everything in a folder but the folders, at every depth; an empty folder counts as a file of somebody else."""
+    """List everything in a folder but its folders, at every depth; an empty one counts as somebody else's file."""
     for path in sorted(folder.iterdir()):
         if path.is_dir() and not path.is_symlink() and any(path.iterdir()):
             yield from _walk(path)
@@ -288,13 +288,13 @@ def _check_replaceable(folder: Path, command: object) -> None:
 
 
 def _real(folder: Path) -> Path:
-    """The folder itself where ``folder`` is a symbolic link to one, which stays as it is."""
+    """Follow ``folder`` to the folder itself where it is a symbolic link to one; the link stays as it is."""
     return folder.resolve() if folder.is_symlink() and folder.exists() else folder
 
 
 @contextlib.contextmanager
 def output_folder(folder: Path, manifest: dict[str, Any]) -> Iterator[Path]:
-    """Return a fresh folder to write into, that takes the place of ``folder`` when the block ends well.
+    """Make a fresh folder to write into that takes the place of ``folder`` when the block ends well.
 
     The manifest ``run.json`` is completed on leaving with ``program``, ``schema``, ``files`` and checksums; the caller
     may still add to the dictionary inside the block. A folder of the same ``manifest["command"]`` is replaced whole. On
@@ -368,7 +368,7 @@ def only_writer(folder: Path) -> Iterator[bool]:
 
 
 def _locked(path: Path, folder: Path) -> tuple[int, bool]:
-    """A descriptor of the file which now has this name, and whether it holds the lock."""
+    """Open the file which now has this name, and try to lock it: its descriptor, and whether it holds the lock."""
     while True:
         lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
         try:

@@ -57,16 +57,16 @@ class RosMap:
         return self.map_T_grid != IDENTITY
 
     def doors_on_grid(self, doors: Iterable[ClosedDoor]) -> list[ClosedDoor]:
-        """Doors of the map frame in the frame of the grid."""
+        """Move doors of the map frame to the frame of the grid."""
         grid_T_map = self.map_T_grid.inverse()
         return [door.moved(grid_T_map) for door in doors] if self.turned else list(doors)
 
     def doors_on_map(self, doors: Iterable[ClosedDoor]) -> list[ClosedDoor]:
-        """Doors of the grid's frame in the map frame."""
+        """Move doors of the grid's frame to the map frame."""
         return [door.moved(self.map_T_grid) for door in doors] if self.turned else list(doors)
 
     def rooms_on_map(self, rooms: Iterable[Room]) -> list[Room]:
-        """Rooms of the grid's frame in the map frame."""
+        """Move rooms of the grid's frame to the map frame."""
         if not self.turned:
             return list(rooms)
         return [
@@ -79,7 +79,7 @@ class RosMap:
         ]
 
     def on_map(self, geometry: BaseGeometry) -> Any:
-        """Return a geometry of the grid's frame in the map frame."""
+        """Move a geometry of the grid's frame to the map frame."""
         return shapely.transform(geometry, self.map_T_grid.transform) if self.turned else geometry
 
 
@@ -199,7 +199,7 @@ def read_bare_picture(path: Path, *, resolution: float) -> OccupancyGrid:
 
 
 def _grid(picture: Path, table: CellArray, resolution: float, x: float, y: float) -> OccupancyGrid:
-    """The grid that a picture holds when ``table`` gives the cell of each grey value."""
+    """Make the grid that a picture holds when ``table`` gives the cell of each grey value."""
     pixels, opaque = read_picture(picture)
     cells: CellArray = table[pixels[::-1]]
     if opaque is not None:
@@ -208,7 +208,7 @@ def _grid(picture: Path, table: CellArray, resolution: float, x: float, y: float
 
 
 def _read_fields(path: Path) -> dict[str, Any]:
-    """Every scalar as the text that stands there: map_server's reader (yaml-cpp) has other rules than PyYAML."""
+    """Read every scalar as the text that stands there: map_server's reader (yaml-cpp) has other rules than PyYAML."""
     # Read by the safe loader first: what it refuses is broken, and was never a map that somebody used.
     parse_yaml(path, what=WHAT, max_bytes=MAX_YAML)
     fields = parse_yaml(path, what=WHAT, max_bytes=MAX_YAML, plain=True)
@@ -218,7 +218,7 @@ def _read_fields(path: Path) -> dict[str, Any]:
 
 
 def _as_number(text: object) -> float | None:
-    """A number as yaml-cpp reads it (``5e-2``, ``-5e-05``, ``.5``, ``.nan``, quoted or not), ``None`` for none."""
+    """Parse a number as yaml-cpp does (``5e-2``, ``-5e-05``, ``.5``, ``.nan``, quoted or not), ``None`` for none."""
     if not isinstance(text, str) or "_" in text:
         return None
     word = text.strip().lower()
@@ -229,7 +229,7 @@ def _as_number(text: object) -> float | None:
 
 
 def _number(fields: dict[str, Any], key: str, default: float | None = None) -> Any:
-    """The number that a field holds, else what stands there, for the message."""
+    """Parse the number that a field holds, else keep what stands there, for the message."""
     if key not in fields:
         return default
     value = _as_number(fields[key])
@@ -237,7 +237,7 @@ def _number(fields: dict[str, Any], key: str, default: float | None = None) -> A
 
 
 def _origin(value: Any, path: Path, remarks: list[Remark]) -> tuple[float, float, float]:
-    """``x, y`` [m] and yaw [rad] of the map's lower left corner; a whole turn, and no number, are no yaw."""
+    """Read ``x, y`` [m] and yaw [rad] of the map's lower left corner; a whole turn, and no number, are no yaw."""
     numbers = [_as_number(v) for v in value] if isinstance(value, list) else []
     if len(numbers) not in {2, 3} or None in numbers:
         raise InvalidInputError(
@@ -259,7 +259,7 @@ def _raw() -> CellArray:
 
 
 def _meanings(fields: dict[str, Any], mode: str, path: Path) -> CellArray:
-    """The cell that each grey value stands for, shape (256,)."""
+    """Find the cell that each grey value stands for, shape (256,)."""
     negate = _negate(fields.get("negate", "0"), path)
     free_below, occupied_above = _thresholds(fields, path)
     levels = np.arange(256)
@@ -286,7 +286,7 @@ def _negate(value: Any, path: Path) -> bool:
 
 
 def _thresholds(fields: dict[str, Any], path: Path) -> tuple[float, float]:
-    """Below the first a cell is free, above the second occupied; one that is not given stays clear of the other."""
+    """Read the thresholds: free below the first, occupied above the second; a missing one stays clear of the other."""
     given = {
         key: bounded(_number(fields, key), 0.0, 1.0, name=f"map {key}", where=path)
         for key in ("free_thresh", "occupied_thresh")

@@ -26,7 +26,7 @@ def write_trajectory(path: Path, stamps: Sequence[float] | FloatArray, poses: Fl
 
 
 def read_trajectory(path: Path) -> tuple[FloatArray, FloatArray]:
-    """Stamps [s], shape (n,), and poses ``(x, y, theta)``, shape (n, 3).
+    """Read stamps [s], shape (n,), and poses ``(x, y, theta)``, shape (n, 3).
 
     Raises:
         InvalidInputError: A line that does not hold eight finite numbers within bounds (named by its number).

@@ -23,12 +23,12 @@ _OPEN: dict[Path, Path] = {}
 
 
 def part_of_file(path: Path) -> Path:
-    """Return the hidden name under which this process writes a file."""
+    """Make up the hidden name under which this process writes a file."""
     return path.with_name(f".{short_name(path.name)}.{_machine()}-{os.getpid()}.part")
 
 
 def part_of_folder(folder: Path, suffix: str = "part") -> Path:
-    """Return a new hidden name beside a folder, nothing is made."""
+    """Make up a new hidden name beside a folder, without making anything."""
     return folder.with_name(f".{short_name(folder.name)}.{secrets.token_hex(4)}.{suffix}")
 
 
@@ -47,7 +47,7 @@ def unfinished(path: Path, target: Path) -> Iterator[None]:
 
 
 def final_place(path: Path) -> Path:
-    """Return where a file will be in the end, of one that is written in a folder under a temporary name."""
+    """Find where a file will be in the end that is written in a folder under a temporary name."""
     for part, target in _OPEN.items():
         if path.is_relative_to(part):
             return target / path.relative_to(part)
@@ -96,7 +96,7 @@ def _remove(path: Path, target: Path) -> None:
 
 
 def _machine() -> str:
-    """This machine, among those that may share a file system: process numbers are its own."""
+    """Identify this machine among those that may share a file system: process numbers are its own."""
     return hashlib.sha256(platform.node().encode()).hexdigest()[:8]
 
 

@@ -61,7 +61,7 @@ class _Open:
 
 @dataclass(slots=True)
 class _Scan:
-    """What has been seen of a file: sizes by anchor (``None`` while it is open) and what aliases stand for."""
+    """Record of what was seen of a file: sizes by anchor (``None`` while it is open), and what aliases stand for."""
 
     path: Path
     what: str
@@ -90,7 +90,7 @@ class _Scan:
             self.open[-1].size += size
 
     def alias(self, anchor: str) -> int:
-        """Tell how many values an alias stands for."""
+        """Count the values that an alias stands for."""
         size = self.sizes.get(anchor, 1)
         if size is None:
             raise self.refuse(f"a YAML alias *{anchor} inside itself")

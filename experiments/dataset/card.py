@@ -25,7 +25,7 @@ POSES = {"erased": "the scans that make the map", "simulated": "every scan"}
 def card(
     config: DatasetConfig, worlds: Sequence[World], made: Mapping[Split, int], failed: Mapping[str, str], size: int
 ) -> str:
-    """Return the text of ``README.md``.
+    """Write the text of ``README.md``.
 
     Args:
         config: As given.
@@ -52,7 +52,7 @@ def card(
 
 
 def _data_files(made: Mapping[Split, int]) -> list[str]:
-    """Where Hugging Face's ``datasets`` finds the splits."""
+    """List where Hugging Face's ``datasets`` finds the splits."""
     lines = ["configs:", "- config_name: default", "  data_files:"]
     for split in SPLITS:
         if made[split]:
@@ -114,7 +114,7 @@ NAMES = "order of closing RR, NN closed doors. A door closed among n stays close
 
 
 def _files(config: DatasetConfig) -> list[str]:
-    """What a sample's folder holds."""
+    """Describe what a sample's folder holds."""
     return [
         f"A folder `SPLIT/BUILDING/rRR-cNN`: {NAMES}",
         "",
@@ -132,7 +132,7 @@ def _files(config: DatasetConfig) -> list[str]:
 
 
 def _columns(config: DatasetConfig) -> list[str]:
-    """What a row of a shard holds."""
+    """Describe what a row of a shard holds."""
     return [
         f"A row of `data/SPLIT-NNNNN.parquet`, its `id` is `SPLIT/BUILDING/rRR-cNN`: {NAMES}",
         "",
@@ -151,7 +151,7 @@ def _columns(config: DatasetConfig) -> list[str]:
 
 
 def _loading(config: DatasetConfig) -> list[str]:
-    """How others read it."""
+    """Describe how others read the dataset."""
     if config.format == "shards":
         return [
             "Hugging Face's `datasets` loads and streams the folder as it is: `load_dataset(DIR)`, "

@@ -12,13 +12,13 @@ NOT_REPEATABLE = {"run.rrd"}
 
 
 def checksums(folder: Path) -> dict[str, str]:
-    """Hexadecimal SHA-256 by name of every file in ``folder`` whose bytes are repeatable, without ``run.json``."""
+    """Hash every file in ``folder`` whose bytes are repeatable, without ``run.json``: hexadecimal SHA-256 by name."""
     names = sorted(path.name for path in folder.iterdir() if path.is_file())
     return {name: digest(folder / name) for name in names if name != MANIFEST and name not in NOT_REPEATABLE}
 
 
 def digest(path: Path) -> str:
-    """Hexadecimal SHA-256 of a file.
+    """Hash a file: hexadecimal SHA-256.
 
     Raises:
         InvalidInputError: It cannot be read.
@@ -28,7 +28,7 @@ def digest(path: Path) -> str:
 
 
 def check(folder: Path) -> None:
-    """Make sure that a folder holds what its ``run.json`` says, byte for byte.
+    """Check that a folder holds what its ``run.json`` says, byte for byte.
 
     Raises:
         InvalidInputError: A file is missing, or was changed since it was written; the message names it.

@@ -22,7 +22,7 @@ MOST_MB = 5000.0
 
 @dataclass(frozen=True, kw_only=True)
 class DatasetConfig:
-    """Which buildings, how often, with how many doors closed, and how their maps are made."""
+    """Choice of buildings, how often each, with how many doors closed, and how their maps are made."""
 
     worlds: tyro.conf.Positional[tuple[str, ...]]
     """Names of bundled worlds or files that the importers read; ``all`` names the 20 bundled worlds."""

@@ -113,7 +113,7 @@ def _report(
 
 
 def _make_folders(config: DatasetConfig, worlds: Sequence[World], progress: Progress) -> dict[str, str]:
-    """Make what is missing of a dataset of folders; why samples failed, by id."""
+    """Make what is missing of a dataset of folders and collect why samples failed, by id."""
     crew: Crew[Task, Outcome] = Crew(config.workers, config.scheduler, _needs(config), "closedrooms dataset")
     failures: dict[str, str] = {}
     if config.maps == "erased":
@@ -137,14 +137,14 @@ def _make_folders(config: DatasetConfig, worlds: Sequence[World], progress: Prog
 
 
 def _needs(config: DatasetConfig) -> tuple[str, ...]:
-    """Packages without which no worker makes a sample."""
+    """List the packages without which no worker makes a sample."""
     return ("pybullet", "mapbox_earcut", "skimage", *(("rerun",) if config.record else ()))
 
 
 def _make(
     tasks: Iterable[Task], total: int, crew: Crew[Task, Outcome], progress: Progress, stage: str
 ) -> list[tuple[Task, str]]:
-    """Make what is not there yet; the tasks that failed, with the reason.
+    """Make what is not there yet and collect the tasks that failed, with the reason.
 
     Raises:
         InvalidInputError: Something there was changed since it was written.
@@ -174,7 +174,7 @@ def _make(
 
 
 def _there(folder: Path) -> bool:
-    """Whether a survey or sample was finished before, and is as it was written.
+    """Check whether a survey or sample was finished before, and is as it was written.
 
     Raises:
         InvalidInputError: It is not.
@@ -188,7 +188,7 @@ def _there(folder: Path) -> bool:
 def _finish(
     config: DatasetConfig, worlds: Sequence[World], failed: Mapping[str, str]
 ) -> tuple[dict[Split, Count], dict[str, str]]:
-    """Write root and tables of a dataset of folders; what is in it, and which samples hold less than their building."""
+    """Write root and tables of a dataset of folders; count its content, and find samples that hold too little."""
     assert isinstance(config.out, Path), "folders are of this machine"
     out = config.out
     if len(failed) == count_variants(worlds, config):
@@ -217,7 +217,7 @@ def _finish(
 
 
 def _read(folder: Path, out: Path, sums: TextIO) -> tuple[dict[str, Any], int]:
-    """``run.json`` of a survey or sample and the bytes of its files; their checksums are put down in ``sums``."""
+    """Read ``run.json`` of a survey or sample, add up its files' bytes, and put their checksums down in ``sums``."""
     about = read_json(folder / MANIFEST, what="run.json")
     for name, value in file_sums(out, folder.relative_to(out).as_posix(), about):
         sums.write(f"{value}  {name}\n")
@@ -227,7 +227,7 @@ def _read(folder: Path, out: Path, sums: TextIO) -> tuple[dict[str, Any], int]:
 def _write_table(
     config: DatasetConfig, worlds: Sequence[World], failed: Mapping[str, str], sums: TextIO, stopped: dict[str, str]
 ) -> Count:
-    """Write the table of a split; what is in it. Explorations that ended early are added to ``stopped``."""
+    """Write the table of a split and count what is in it; add explorations that ended early to ``stopped``."""
     assert isinstance(config.out, Path), "folders are of this machine"
     out, sizes, samples, buildings = config.out, 0, 0, set()
 

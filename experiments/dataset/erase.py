@@ -41,7 +41,7 @@ KEPT_KEYFRAMES = 8000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ErasedMap:
-    """What the robot would have brought home with some doors closed.
+    """Map, doors and scans that the robot would have brought home with some doors closed.
 
     Attributes:
         grid: The map.
@@ -76,7 +76,7 @@ class _Drawn:
 
 
 class Eraser:
-    """Redraws maps of one survey; keeps what does not depend on which doors are closed.
+    """Editor of the maps of one survey; keeps what does not depend on which doors are closed.
 
     Attributes:
         survey: What the maps are drawn from.
@@ -113,7 +113,7 @@ class Eraser:
         self._draw(np.arange(len(survey.poses)), self._ranges, np.full(self._ranges.shape, -1), ())
 
     def erase(self, closed: Collection[str]) -> ErasedMap:
-        """Return the map with ``closed`` doors closed.
+        """Redraw the map with ``closed`` doors closed.
 
         Args:
             closed: Ids of doors that hide whole rooms.
@@ -150,7 +150,7 @@ class Eraser:
                 self._grid.stamp(after.imprint)
 
     def _keyframe(self, number: int, ranges: FloatArray, doors: tuple[str, ...]) -> _Drawn:
-        """A keyframe of the survey with other ranges, that sees ``doors``; remembered, as few doors show in one."""
+        """Make a keyframe of the survey with other ranges that sees ``doors``; keep it, as few doors show in one."""
         key = (number, doors, blake2b(ranges.tobytes(), digest_size=16).digest())
         drawn = self._known.pop(key, None) or self._new_keyframe(number, ranges, doors)
         self._known[key] = drawn
@@ -170,7 +170,7 @@ class Eraser:
         return _Drawn(scan, keyframe, doors, self._grid.imprint(beams, pose))
 
     def _outside(self, closed: Collection[str], poses_map: FloatArray) -> IntArray:
-        """Indices of the true poses, shape (n, 3), map frame, that are not behind a closed door."""
+        """Find the true poses, shape (n, 3), map frame, that are not behind a closed door: their indices."""
         plan = self.survey.plan
         rooms = {room.id: room.polygon for room in plan.rooms}
         names = [name for part, _ in hidden_rooms(plan, closed) for name in part]
@@ -179,7 +179,7 @@ class Eraser:
         return np.flatnonzero(~shapely.contains_xy(hidden, points[:, 0], points[:, 1]))
 
     def _cut(self, closed: tuple[str, ...]) -> tuple[FloatArray, IntArray]:
-        """Ranges with the doors closed, shape (k, beams) [m], and by which door (its index) each was cut, else -1."""
+        """Cut ranges at the closed doors, shape (k, beams) [m], and say by which door (its index) each was, else -1."""
         ranges = self._ranges.copy()
         config = self.survey.sim.lidar
         self._cast_anew(closed, ranges)
@@ -212,7 +212,7 @@ class Eraser:
         ranges[scan, beam] = seen
 
     def _ended_on(self, name: str) -> _Crossings:
-        """Beams that ended on the leaves of a door that stood open, and how far the walls let them go without."""
+        """Find beams that ended on the leaves of a door that stood open, and how far the walls let them go without."""
         if name not in self._stood_open:
             met = self._meeting(np.array([leaf.at(leaf.travel) for leaf in self._leaves[name]]))
             measured = self._ranges[met.scan, met.beam]
@@ -223,7 +223,7 @@ class Eraser:
         return self._stood_open[name]
 
     def _past(self, name: str, closed: frozenset[str]) -> FloatArray:
-        """How far beams that ended on the open leaves of ``name`` go with ``closed`` doors closed, shape (n,) [m]."""
+        """Measure how far beams that ended on the open leaves of ``name`` go with ``closed`` closed, shape (n,) [m]."""
         met = self._ended_on(name)
         distance = met.distance
         for other, leaves in self._leaves.items():
@@ -245,13 +245,13 @@ class Eraser:
         return np.column_stack((np.cos(angles), np.sin(angles)))
 
     def _crossings(self, name: str) -> _Crossings:
-        """Beams that meet a door's leaves where they close it."""
+        """Find beams that meet a door's leaves where they close it."""
         if name not in self._shut:
             self._shut[name] = self._meeting(np.array([leaf.at(0.0) for leaf in self._leaves[name]]))
         return self._shut[name]
 
     def _meeting(self, corners: FloatArray) -> _Crossings:
-        """Beams that meet leaves with ``corners``, shape (leaves, 4, 2), building frame [m]."""
+        """Find beams that meet leaves with ``corners``, shape (leaves, 4, 2), building frame [m]."""
         points = corners.reshape(-1, 2)
         middle = points.mean(axis=0)
         radius = float(np.linalg.norm(points - middle, axis=1).max())
@@ -268,7 +268,7 @@ class Eraser:
         return _Crossings(scan[met], beam[met], found[met])
 
     def _sighting(self, name: str, number: int) -> DoorSighting:
-        """A closed door as seen from the true pose of a keyframe, robot frame, as the simulation tells it."""
+        """Simulate how a closed door is seen from the true pose of a keyframe, robot frame."""
         door = next(door for door in self.survey.plan.doors if door.id == name)
         robot_T_world = (self.survey.world_T_map @ Pose2(*self.survey.true_poses[number])).inverse()
         (ax, ay), (bx, by) = robot_T_world.transform(np.array(door.segment))
@@ -277,7 +277,7 @@ class Eraser:
 
 
 def erase(survey: OpenSurvey, closed: Collection[str]) -> ErasedMap:
-    """Return the map of a survey with ``closed`` doors closed; for many maps of one survey, keep one :class:`Eraser`.
+    """Redraw the map of a survey with ``closed`` doors closed; for many maps of one survey, keep one :class:`Eraser`.
 
     Args:
         survey: An exploration with all doors open.

@@ -46,7 +46,7 @@ UNFINISHED = re.compile(r"\..+\.([A-Za-z0-9_]{8}\.(part|old)|([0-9a-f]{8}-)?\d+\
 
 @dataclass(frozen=True, slots=True)
 class Count:
-    """What is in one split.
+    """Number of buildings, samples and bytes in one split.
 
     Attributes:
         buildings: With a sample in it.
@@ -60,7 +60,7 @@ class Count:
 
 
 def claim(config: DatasetConfig, worlds: Sequence[World]) -> None:
-    """Make the place ours before the work, or make sure that it holds a part of this very dataset.
+    """Claim the place before the work, or check that it holds a part of this very dataset.
 
     Raises:
         OutputError: It holds something that is not ours, or cannot be written.
@@ -99,7 +99,7 @@ def claim(config: DatasetConfig, worlds: Sequence[World]) -> None:
 
 
 def _unfinished(path: Path) -> bool:
-    """Whether a killed process of ours left this behind while it wrote."""
+    """Check whether a killed process of ours left this behind while it wrote."""
     return UNFINISHED.fullmatch(path.name) is not None
 
 
@@ -169,12 +169,12 @@ def read_stored_json(store: Store, name: str) -> Any:
 
 
 def json_bytes(value: Any) -> bytes:
-    """Return a value as the JSON that a dataset holds."""
+    """Write a value as the JSON that a dataset holds."""
     return (json.dumps(value, indent=2, allow_nan=False) + "\n").encode()
 
 
 def description(config: DatasetConfig, worlds: Sequence[World]) -> dict[str, Any]:
-    """Tell what tells one dataset from another; whoever resumes must want the same."""
+    """Describe what tells one dataset from another; whoever resumes must want the same."""
     return {
         "program": PROGRAM,
         KEY: SCHEMA,
@@ -193,13 +193,13 @@ def description(config: DatasetConfig, worlds: Sequence[World]) -> dict[str, Any
 
 
 def said(worlds: Sequence[World]) -> dict[str, Any]:
-    """Return what was said on reading the plans, as an entry of a manifest; nothing where nothing was said."""
+    """Collect what was said on reading the plans, as an entry of a manifest; nothing where nothing was said."""
     remarks = [remark.as_json() for world in worlds for remark in world.remarks]
     return {"remarks": remarks} if remarks else {}
 
 
 def early_end(sample: str, about: Mapping[str, Any]) -> dict[str, str]:
-    """Return why a sample holds less than its building, by its id; nothing of one that was explored whole.
+    """Explain why a sample holds less than its building, by its id; nothing of one that was explored whole.
 
     Args:
         sample: Its id.
@@ -258,7 +258,7 @@ def write_manifest(config: DatasetConfig, worlds: Sequence[World], failed: Mappi
 
 
 def row(variant: Variant, about: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a sample in its split's metadata: file names relative to the split, then figures."""
+    """List a sample in its split's metadata: file names relative to the split, then figures."""
     base = f"{variant.world.name}/{Path(variant.id).name}"
     metrics = about["metrics"]
     return {
@@ -308,7 +308,7 @@ def write_metadata(folder: Path, rows: Iterable[Mapping[str, Any]]) -> None:
 
 
 def write_sums(folder: Path, sums: Iterable[tuple[str, str]]) -> None:
-    """``SHA256SUMS`` as ``sha256sum -c`` reads it, over every repeatable file of the dataset but itself.
+    """Write ``SHA256SUMS`` as ``sha256sum -c`` reads it, over every repeatable file of the dataset but itself.
 
     Args:
         folder: The dataset.
@@ -325,7 +325,7 @@ def write_sums(folder: Path, sums: Iterable[tuple[str, str]]) -> None:
 
 
 def file_sums(folder: Path, name: str, about: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Path relative to the dataset and SHA-256 of each file of one survey or sample, in order.
+    """List the path relative to the dataset and the SHA-256 of each file of one survey or sample, in order.
 
     Args:
         folder: The dataset.
@@ -337,5 +337,5 @@ def file_sums(folder: Path, name: str, about: Mapping[str, Any]) -> list[tuple[s
 
 
 def fingerprint(place: Path | Url) -> str:
-    """SHA-256 of ``SHA256SUMS``: one line that says whether two datasets are equal."""
+    """Hash ``SHA256SUMS``: one line that says whether two datasets are equal."""
     return file_digest(open_store(place), SUMS)

@@ -22,7 +22,7 @@ from closedrooms.worlds.plan import FloorPlan
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenSurvey:
-    """What a robot brought home from a building with all doors open.
+    """Recording that a robot brought home from a building with all doors open.
 
     Attributes:
         plan: The building.

@@ -35,7 +35,7 @@ MAX_FILE = 200_000_000
 
 
 def sample_schema(*, scans: bool) -> "pa.Schema":
-    """Return the columns of a split: what names a sample, its figures, its files.
+    """List the columns of a split: what names a sample, its figures, its files.
 
     Args:
         scans: With ``scans.npz``.
@@ -56,7 +56,7 @@ def sample_schema(*, scans: bool) -> "pa.Schema":
 
 
 def survey_schema() -> "pa.Schema":
-    """Return the columns of a survey: its files."""
+    """List the columns of a survey: its files."""
     import pyarrow as pa
 
     return pa.schema([*((name, pa.string()) for name in SURVEY), *((name, pa.binary()) for name in SCANS)])
@@ -120,7 +120,7 @@ def unpack(row: Mapping[str, Any], folder: Path) -> None:
 
 
 def as_bytes(row: "pa.RecordBatch") -> bytes:
-    """Return a row as an Arrow stream: what lies between a worker that makes a sample and one that fills a shard."""
+    """Write a row as an Arrow stream: what lies between a worker that makes a sample and one that fills a shard."""
     import pyarrow as pa
 
     sink = io.BytesIO()

@@ -9,7 +9,7 @@ PAIRS = 400_000
 
 
 def first_hits(origins: FloatArray, directions: FloatArray, edges: FloatArray) -> FloatArray:
-    """Distance along each ray to the first edge that it meets, infinity where it meets none.
+    """Measure along each ray to the first edge that it meets, infinity where it meets none.
 
     Args:
         origins: Shape (n, 2) [m].

@@ -49,7 +49,7 @@ NOT_CONTENT = ("out", "worlds", "workers", "scheduler", "repetitions", "max_clos
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """Something to make: a world's survey (no variant), or one sample."""
+    """Survey of a world (no variant), or one sample, to be made."""
 
     config: DatasetConfig
     world: World
@@ -57,7 +57,7 @@ class Task:
 
     @property
     def folder(self) -> Path:
-        """Where it goes in a dataset of folders."""
+        """Place in a dataset of folders."""
         assert isinstance(self.config.out, Path), "folders are of this machine"
         if self.variant is None:
             return self.config.out / SURVEYS / self.world.name
@@ -66,7 +66,7 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a task ended: nothing set is well.
+    """Result of a task: nothing set is well.
 
     Attributes:
         failure: Why this one cannot be made; the others can.
@@ -83,7 +83,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observed:
-    """What a sample's robot brought home, whichever way it was made.
+    """Map, doors and poses that a sample's robot brought home, whichever way it was made.
 
     Poses are those of all scans of an exploration, of an erased map those of the keyframes that make it.
     """
@@ -98,12 +98,12 @@ class Observed:
 
 
 def make(task: Task) -> Outcome:
-    """Make one survey or sample as a folder; what goes wrong is told, a missing package raised."""
+    """Make one survey or sample as a folder; tell what goes wrong, but raise a missing package."""
     return guarded(lambda: make_folder(task, task.folder))
 
 
 def guarded(work: Callable[[], Outcome | None]) -> Outcome:
-    """Do work and tell what goes wrong; a missing package is raised."""
+    """Do work and tell what goes wrong, but raise a missing package."""
     try:
         return work() or Outcome()
     except OutputError as error:
@@ -136,7 +136,7 @@ def make_folder(task: Task, folder: Path) -> None:
 
 
 def _about(task: Task, seed: int) -> dict[str, Any]:
-    """What a survey's and a sample's ``run.json`` begin with."""
+    """Describe what a survey's and a sample's ``run.json`` begin with."""
     return {
         "format": FORMAT,
         "world": task.world.name,
@@ -192,7 +192,7 @@ def _make_sample(task: Task, variant: Variant, plan: FloorPlan, folder: Path) ->
 def _metrics(
     source: str, closed: Sequence[str], observed: Observed, truth: OccupancyGrid, start: Pose2
 ) -> dict[str, Any]:
-    """What a run's ``run.json`` says of the map, under the same names."""
+    """Measure what a run's ``run.json`` says of the map, under the same names."""
     plan, map_T_world = _plan(source), start.inverse()
     position, heading = ate(observed.estimate, observed.truth)
     cells = reachable(plan, closed, truth.frame, map_T_world, (start.x, start.y))
@@ -219,7 +219,7 @@ def _erased(config: DatasetConfig, world: World, closed: Sequence[str]) -> Obser
 
 @functools.lru_cache(maxsize=1)
 def _eraser(config: DatasetConfig, world: World) -> Eraser:
-    """A worker takes the samples of one world after the other: it reads the survey once."""
+    """Read a survey once: a worker takes the samples of one world after the other."""
     with survey_folder(config, world) as folder:
         return Eraser(read_survey(folder, _plan(world.source), config, noise_seed(config, world)))
 
@@ -236,7 +236,7 @@ def _room_points(source: str) -> list[FloatArray]:
 
 @functools.lru_cache(maxsize=2)
 def _true_map(source: str, frame: GridFrame, start: Pose2) -> OccupancyGrid:
-    """The truth on ``frame``, grown so that it holds the building; erased maps of one survey share it."""
+    """Draw the truth on ``frame``, grown so that it holds the building; erased maps of one survey share it."""
     plan, map_T_world = _plan(source), start.inverse()
     return rasterise(plan, frame.covering(*truth_bounds(plan, map_T_world)), map_T_world)
 
@@ -258,7 +258,7 @@ def _simulated(
 
 
 def _show(recorder: "Recorder", observed: Observed) -> None:
-    """An erased map was never explored: its recording holds what there is, at the end of the survey."""
+    """Show what there is at the end of the survey: an erased map was never explored."""
     end = float(observed.stamps[-1])
     recorder.trajectory(observed.stamps, observed.estimate)
     recorder.map(observed.grid, end, final=True)

@@ -12,7 +12,7 @@ DATA, PARTS = "data", "parts"
 
 @dataclass(frozen=True, slots=True)
 class Shard:
-    """What a shard holds; without a row there is no file.
+    """Content of a shard; without a row there is no file.
 
     Attributes:
         name: Its file, relative to the dataset.
@@ -41,7 +41,7 @@ class Shard:
     stopped: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
-        """Return plain values."""
+        """Convert to plain values."""
         return asdict(self)
 
 
@@ -65,15 +65,15 @@ def read_shard(data: Any, where: str) -> Shard:
 
 
 def shard_name(split: str, number: int) -> str:
-    """Return the file of a shard."""
+    """Name the file of a shard."""
     return f"{DATA}/{split}-{number:05d}.parquet"
 
 
 def part_name(split: str, index: int) -> str:
-    """Return the file of a part."""
+    """Name the file of a part."""
     return f"{PARTS}/{split}-{index:08d}.arrow"
 
 
 def note_name(split: str, number: int) -> str:
-    """Return the file that says what is in a shard, until the whole dataset is done."""
+    """Name the file that says what is in a shard, until the whole dataset is done."""
     return f"{PARTS}/{split}-{number:05d}.json"

@@ -15,7 +15,7 @@ TOGETHER = 0.25
 
 
 class ShardPlan:
-    """The samples of one split in order: those in shards, those that wait as parts, those to come.
+    """Samples of one split in order: those in shards, those that wait as parts, those to come.
 
     A shard ends with the sample that reaches its size, with the split, or where one that is there already begins. No
     more is held than the sizes of parts that wait: about one shard's.
@@ -49,7 +49,7 @@ class ShardPlan:
         self._begins = sorted(self.shards, reverse=True)
 
     def wants(self, index: int) -> bool:
-        """Tell whether a sample has to be made; asked in order."""
+        """Check whether a sample has to be made; asked in order."""
         shard = self.shards.get(index)
         if shard is not None:
             self._inside = shard.end

@@ -77,7 +77,7 @@ def make_shards(
 
 
 def _plans(config: DatasetConfig, worlds: Sequence[World], store: Store) -> dict[Split, ShardPlan]:
-    """What is there: whole shards, shards whose file is gone, parts."""
+    """Find what is there: whole shards, shards whose file is gone, parts."""
     waiting = store.sizes(PARTS)
     found = {shard.name: shard for shard in _written(store, waiting)}
     there = store.sizes(DATA)
@@ -104,7 +104,7 @@ def _plans(config: DatasetConfig, worlds: Sequence[World], store: Store) -> dict
 
 
 def _written(store: Store, waiting: Mapping[str, int]) -> Iterator[Shard]:
-    """The shards that the manifest lists, and those with a note."""
+    """Yield the shards that the manifest lists, and those with a note."""
     where = store.where(DATASET_MANIFEST)
     for entry in read_stored_json(store, DATASET_MANIFEST).get("shards", []):
         yield read_shard(entry, where)
@@ -127,7 +127,7 @@ def _check_shard(config: DatasetConfig, store: Store, shard: Shard, size: int) -
 def _surveys(
     config: DatasetConfig, worlds: Sequence[World], store: Store, crew: Crew[Job, Outcome], progress: Progress
 ) -> dict[str, str]:
-    """Explore each building once; why it failed, by world."""
+    """Explore each building once and collect why it failed, by world."""
     progress.stage("surveys", len(worlds))
     there, failed = store.sizes(SURVEYS), {}
     done = 0
@@ -151,7 +151,7 @@ def _surveys(
 
 
 def _failure(outcome: Outcome | Lost) -> str:
-    """Why something was not made; empty where it was.
+    """Explain why something was not made; empty where it was.
 
     Raises:
         OutputError: Nothing can be written any more.
@@ -226,7 +226,7 @@ class _Samples:
 
 
 def shard_counts(shards: Sequence[Shard]) -> dict[Split, Count]:
-    """Return what is in each split."""
+    """Count what is in each split."""
     counts: dict[Split, Count] = {}
     for split in SPLITS:
         own = [shard for shard in shards if shard.split == split]

@@ -65,7 +65,7 @@ class Filling:
 
 
 def work(job: Part | Filling | Task) -> Outcome:
-    """Make a survey, a part or a shard; what goes wrong is told, a missing package raised."""
+    """Make a survey, a part or a shard; tell what goes wrong, but raise a missing package."""
     if isinstance(job, Task):
         return guarded(lambda: make_survey(job))
     if isinstance(job, Part):
@@ -100,7 +100,7 @@ def make_part(part: Part) -> Outcome:
 
 
 def fill(job: Filling) -> Outcome:
-    """Put parts together: the shard is written, then what is in it, then the parts are removed."""
+    """Put parts together: write the shard, then what is in it, then remove the parts."""
     import pyarrow.parquet as pq
 
     store = open_store(job.config.out)

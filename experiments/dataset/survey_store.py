@@ -81,7 +81,7 @@ def read_survey(folder: Path, plan: FloorPlan, config: DatasetConfig, seed: int)
 
 
 def survey_name(world: World) -> str:
-    """Return the file of a survey in a dataset of shards."""
+    """Name the file of a survey in a dataset of shards."""
     return f"{SURVEYS}/{world.name}.parquet"
 
 

@@ -61,12 +61,12 @@ class Variant:
 
     @property
     def id(self) -> str:
-        """Its folder relative to the dataset; depends on configuration and seed only."""
+        """Folder relative to the dataset; depends on configuration and seed only."""
         return f"{self.world.split}/{self.world.name}/r{self.repetition:02d}-c{len(self.closed):02d}"
 
 
 def find_worlds(config: DatasetConfig) -> list[World]:
-    """Return the buildings, in the order of their names.
+    """Find the buildings, in the order of their names.
 
     Raises:
         InvalidInputError: An unreadable world, two of one name, or one without a room that a door closes.
@@ -95,12 +95,12 @@ def find_worlds(config: DatasetConfig) -> list[World]:
 
 
 def remarks_on(plan: FloorPlan, name: str) -> tuple[Remark, ...]:
-    """Return what was said on reading one plan of several, with its name."""
+    """Collect what was said on reading one plan of several, with its name."""
     return tuple(replace(remark, why=f"{remark.why}, in {name}") for remark in plan.remarks)
 
 
 def split_buildings(names: Sequence[str], seed: int) -> dict[str, Split]:
-    """Tell which split each building belongs to, drawn by the seed; whole buildings, so that none is in two splits."""
+    """Draw the split of each building by the seed; whole buildings, so that none is in two splits."""
     order = stream(seed, "splits").permutation(len(names))
     held = max(round(HELD_OUT * len(names)), 1) if len(names) >= len(SPLITS) else 0
     splits: dict[str, Split] = {}
@@ -130,15 +130,15 @@ def _id(variant: Variant) -> str:
 
 
 def count_variants(worlds: Sequence[World], config: DatasetConfig) -> int:
-    """Return how many samples some buildings have."""
+    """Count the samples of some buildings."""
     return config.repetitions * sum(min(config.max_closed, len(world.closable)) for world in worlds)
 
 
 def in_order(worlds: Sequence[World], split: Split) -> list[World]:
-    """Return the buildings of a split in the order of their samples' ids."""
+    """Sort the buildings of a split in the order of their samples' ids."""
     return sorted((world for world in worlds if world.split == split), key=lambda world: f"{world.name}/")
 
 
 def noise_seed(config: DatasetConfig, world: World, *variant: str) -> int:
-    """Seed of the simulated noise of a world's survey, or of one variant's; 32 bits."""
+    """Draw the seed of the simulated noise of a world's survey, or of one variant's; 32 bits."""
     return zlib.crc32("/".join((str(config.seed), world.name, *variant)).encode())

@@ -4,4 +4,5 @@
 - ``hypotheses``: rectangles (``candidates``) scored by ``features`` of the ``evidence``.
 - ``selection``: all rooms together, by ``pair_features``; ``shared_rooms`` of several doors.
 - ``room_shape``: from rectangles to rooms.
+- ``belief``: where each room may be, for its confidence; ``trace``: what was seen and weighed, to be drawn.
 """

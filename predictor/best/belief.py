@@ -22,7 +22,7 @@ OTHER = 0.7
 def believe(
     scene: Scene, choices: Sequence[Choice], rooms: Sequence[Room], openings: Sequence[Doorway | None]
 ) -> tuple[Belief, ...]:
-    """Say what is thought of each room.
+    """Form a belief about each room.
 
     Args:
         scene: The map and its doors.

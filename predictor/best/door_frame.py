@@ -21,7 +21,7 @@ STRIP = 512
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Cells ``[v0, v1) x [u0, u1)`` of a frame."""
+    """Window of cells ``[v0, v1) x [u0, u1)`` of a frame."""
 
     v0: int
     u0: int
@@ -30,21 +30,21 @@ class Window:
 
     @property
     def cells(self) -> int:
-        """How many."""
+        """Number of cells."""
         return (self.v1 - self.v0) * (self.u1 - self.u0)
 
     @property
     def of(self) -> tuple[slice, slice]:
-        """To index a raster of the frame with."""
+        """Index of the window in a raster of the frame."""
         return slice(self.v0, self.v1), slice(self.u0, self.u1)
 
     def grown(self, v: int, u: int, shape: tuple[int, ...]) -> "Window":
-        """``v`` more rows and ``u`` more columns on either side, as far as a raster of ``shape`` goes."""
+        """Grow by ``v`` rows and ``u`` columns on either side, as far as a raster of ``shape`` goes."""
         rows, cols = shape
         return Window(max(self.v0 - v, 0), max(self.u0 - u, 0), min(self.v1 + v, rows), min(self.u1 + u, cols))
 
     def joined(self, other: "Window") -> "Window":
-        """Return the smallest window that holds both."""
+        """Find the smallest window that holds both."""
         return Window(min(self.v0, other.v0), min(self.u0, other.u0), max(self.v1, other.v1), max(self.u1, other.u1))
 
 
@@ -64,7 +64,7 @@ class Table:
     col: int = 0
 
     def count(self, v0: IntArray, u0: IntArray, v1: IntArray, u1: IntArray) -> IntArray:
-        """Cells set in ``[v0, v1) x [u0, u1)``, clipped to the table; none where that is reversed."""
+        """Count the cells set in ``[v0, v1) x [u0, u1)``, clipped to the table; none where that is reversed."""
         rows, cols = self.sums.shape
         v0, u0, v1, u1 = v0 - self.row, u0 - self.col, v1 - self.row, u1 - self.col
         # Twice as quick as np.clip on short arrays.
@@ -74,7 +74,7 @@ class Table:
         return np.asarray(sums[b, d] - sums[a, d] - sums[b, c] + sums[a, c], dtype=np.int64)
 
     def stretch(self, position: IntArray, low: IntArray, high: IntArray) -> FloatArray:
-        """Edges set along a side at ``position`` from ``low`` to ``high``, in a table of edges [along, position].
+        """Count the edges set along a side at ``position`` from ``low`` to ``high``, in a table [along, position].
 
         Args:
             position: Of the side, shape (n,); clipped to the table.
@@ -120,11 +120,11 @@ class DoorFrame:
     extent: Window
 
     def faces(self, side: str, window: Window) -> BoolArray:
-        """Edges of a window where a wall face was seen, see :func:`find_faces_in`."""
+        """Find the edges of a window where a wall face was seen, see :func:`find_faces_in`."""
         return find_faces_in(self.free, self.known, side, window)
 
     def taken(self, window: Window) -> BoolArray:
-        """Cells of a window that a wall of the usual thickness around known space fills."""
+        """Mark the cells of a window that a wall of the usual thickness around known space fills."""
         wide = window.grown(self.thickness, self.thickness, self.free.shape)
         kernel = np.ones((2 * self.thickness + 1,) * 2, np.uint8)
         taken = cv2.dilate(np.ascontiguousarray(self.free[wide.of]).view(np.uint8), kernel)
@@ -132,13 +132,13 @@ class DoorFrame:
         return taken[rows : rows + window.v1 - window.v0, cols : cols + window.u1 - window.u0] > 0
 
     def to_frame(self, points: FloatArray) -> FloatArray:
-        """Map points [m], shape (..., 2), as continuous edges ``(u, v)`` [cells]."""
+        """Convert map points [m], shape (..., 2), to continuous edges ``(u, v)`` [cells]."""
         c, s = math.cos(self.angle), math.sin(self.angle)
         turned = np.asarray(points, dtype=np.float64) @ np.array([[c, -s], [s, c]])
         return np.asarray((turned - self.origin) / self.resolution)
 
     def to_map(self, edges: FloatArray) -> FloatArray:
-        """Continuous edges ``(u, v)`` [cells], shape (..., 2), as map points [m]."""
+        """Convert continuous edges ``(u, v)`` [cells], shape (..., 2), to map points [m]."""
         c, s = math.cos(self.angle), math.sin(self.angle)
         turned = np.asarray(edges, dtype=np.float64) * self.resolution + self.origin
         return np.asarray(turned @ np.array([[c, s], [-s, c]]))
@@ -164,7 +164,7 @@ class TurnedMap:
 
     @property
     def rotation(self) -> FloatArray:
-        """Takes points of the map frame, as rows from the right, to the turned one, shape (2, 2)."""
+        """Rotation of points of the map frame, as rows from the right, into the turned one, shape (2, 2)."""
         c, s = math.cos(self.angle), math.sin(self.angle)
         return np.array([[c, -s], [s, c]])
 

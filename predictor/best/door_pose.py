@@ -46,7 +46,7 @@ class DoorPose:
     quarter: int
 
     def looks(self, angle: float, quarter: int) -> bool:
-        """Tell whether its frame is that one."""
+        """Check whether its frame is that one."""
         return self.angle == angle and self.quarter == quarter
 
 
@@ -110,12 +110,12 @@ class DoorsSeen:
         )
 
     def find_behind(self, boxes: IntArray) -> BoolArray:
-        """Tell behind which doors each rectangle, ``u0, v0, u1, v1``, reaches, shape (boxes, doors)."""
+        """Find the doors behind which each rectangle, ``u0, v0, u1, v1``, reaches, shape (boxes, doors)."""
         low, high = boxes[:, None, :2], boxes[:, None, 2:]
         return np.asarray(((low < self.behind) & (self.behind < high)).all(axis=-1))
 
     def find_entered(self, boxes: IntArray) -> BoolArray:
-        """Tell which doors each rectangle, ``u0, v0, u1, v1``, begins behind, shape (boxes, doors)."""
+        """Find the doors behind which each rectangle, ``u0, v0, u1, v1``, begins, shape (boxes, doors)."""
         axis = self.columns % 2
         doors = np.arange(len(axis))
         across, along = self.leaves[doors, axis], self.leaves[doors, 1 - axis]

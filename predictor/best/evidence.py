@@ -36,7 +36,7 @@ UInt8Array = npt.NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """What a frame says about every possible position of a side, as tables over windows of it.
+    """Tables over windows of a frame that say how likely every possible position of a side is.
 
     Each is a table of edges, indexed [along, position], so that any stretch of a side costs four look-ups: v and u for
     left and right, u and v for the back. ``enclosed`` counts cells between known cells of their row or their column,

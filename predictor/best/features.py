@@ -77,7 +77,7 @@ class Side:
 
     @property
     def aligned(self) -> FloatArray:
-        """How sure walls in line with it continue beyond its ends."""
+        """Certainty that walls in line with it continue beyond its ends."""
         same = self.evidence.same[self.name]
         own = same.stretch(self.position, self.low, self.high)
         outside = same.stretch(self.position, self.low - self.reach, self.high + self.reach) - own
@@ -85,14 +85,14 @@ class Side:
 
     @property
     def outer(self) -> FloatArray:
-        """How sure an outer wall of the building runs in line with it."""
+        """Certainty that an outer wall of the building runs in line with it."""
         table = self.evidence.outer[self.name]
         found = table.stretch(self.position, self.low - self.reach, self.high + self.reach)
         return np.asarray(1.0 - np.exp(-found / SURE))
 
     @cached_property
     def stub(self) -> FloatArray:
-        """How sure its wall begins before the door's wall."""
+        """Certainty that its wall begins before the door's wall."""
         found = self.evidence.same[self.name].stretch(self.position, self.low - STUB, self.low)
         found += self.evidence.tight[self.name].stretch(self.position, self.low - STUB, self.low)
         return np.asarray(1.0 - np.exp(-found / SURE_STUB))
@@ -125,12 +125,12 @@ class Rectangles:
 
     @cached_property
     def log_area(self) -> FloatArray:
-        """Of what known space leaves, against a usual room."""
+        """Logarithm of the area that known space leaves over that of a usual room."""
         return np.asarray(np.log(self.area / USUAL_AREA))
 
     @cached_property
     def log_small(self) -> FloatArray:
-        """Of what known space leaves, against a small room."""
+        """Logarithm of the area that known space leaves over that of a small room."""
         return np.asarray(np.log(self.area / SMALL_AREA))
 
     @cached_property
@@ -152,34 +152,34 @@ class Rectangles:
 
 
 def log_area(r: Rectangles) -> FloatArray:
-    """Large rooms."""
+    """Compare the area with that of a usual room, as a logarithm: positive for large rooms."""
     return r.log_area
 
 
 def log_area_squared(r: Rectangles) -> FloatArray:
-    """Rooms of unusual area."""
+    """Measure how unusual the area is."""
     return np.asarray(r.log_area**2)
 
 
 def log_proportion_squared(r: Rectangles) -> FloatArray:
-    """Rooms far from square."""
+    """Measure how far the rectangle is from square."""
     return np.asarray(np.log(r.width / r.depth) ** 2)
 
 
 def overlap(r: Rectangles) -> FloatArray:
-    """Share that known space and its walls take."""
+    """Measure the share that known space and its walls take."""
     return np.asarray(r.taken / (r.width * r.depth))
 
 
 def door_margin(r: Rectangles) -> FloatArray:
-    """Tell how much too near the door is to a side [m]."""
+    """Measure how much too near the door is to a side [m]."""
     first, last = r.entry.span
     margin = np.minimum(first - r.u0, r.u1 - last) * r.frame.resolution
     return np.asarray(np.maximum(DOOR_MARGIN - margin, 0.0))
 
 
 def side_middle(r: Rectangles) -> FloatArray:
-    """Tell how near the sides lie to the middle between this door and the next, 0 to 2."""
+    """Rate how near the sides lie to the middle between this door and the next, 0 to 2."""
     entry, thickness = r.entry, r.frame.thickness
     out = np.zeros(len(r.u0))
     if entry.right is not None:
@@ -190,51 +190,51 @@ def side_middle(r: Rectangles) -> FloatArray:
 
 
 def near_aligned(r: Rectangles) -> FloatArray:
-    """Tell how sure a near room of the same row ends in line with the back."""
+    """Rate how sure a near room of the same row ends in line with the back."""
     same = r.evidence.same["top"]
     near = same.stretch(r.v1, r.u0 - NEAR, r.u0) + same.stretch(r.v1, r.u1, r.u1 + NEAR)
     return np.asarray(1.0 - np.exp(-near / SURE))
 
 
 def log_depth_squared(r: Rectangles) -> FloatArray:
-    """Rooms of unusual depth."""
+    """Measure how unusual the depth is."""
     return np.asarray(np.log(r.depth * r.frame.resolution / USUAL_DEPTH) ** 2)
 
 
 def outside(r: Rectangles) -> FloatArray:
-    """Share beyond the bounding box of what is known."""
+    """Measure the share beyond the bounding box of what is known."""
     return r.outside
 
 
 def outside_area(r: Rectangles) -> FloatArray:
-    """Measure the same by area; a row of doors announces rooms that may lie outside all that is known."""
+    """Weigh that share by area; a row of doors announces rooms that may lie outside all that is known."""
     return r.outside * np.maximum(r.log_small, 0.0) / r.entry.row
 
 
 def lone_outside(r: Rectangles) -> FloatArray:
-    """Return the same, by area, of a lone door in the outline: it leads to a porch, stairs or a closet."""
+    """Weigh that share by area for a lone door in the outline: it leads to a porch, stairs or a closet."""
     lone = r.entry.left is None and r.entry.right is None
     return r.outside * r.log_small * lone
 
 
 def open_share(r: Rectangles) -> FloatArray:
-    """Share with nothing known beyond it along either axis."""
+    """Measure the share with nothing known beyond it along either axis."""
     return r.open
 
 
 def open_area(r: Rectangles) -> FloatArray:
-    """Return the same, by area; a row of doors announces a row of rooms there."""
+    """Weigh that share by area; a row of doors announces a row of rooms there."""
     return r.open * np.maximum(r.log_small, 0.0) / r.entry.row
 
 
 def front_taken(r: Rectangles) -> FloatArray:
-    """Share of the strip behind the door's wall that known space cuts into."""
+    """Measure the share of the strip behind the door's wall that known space cuts into."""
     strip = r.evidence.taken.count(r.v0 + FRONT[0], r.u0, r.v0 + FRONT[1], r.u1)
     return np.asarray(strip / (r.width * (FRONT[1] - FRONT[0])))
 
 
 def front_closed(r: Rectangles) -> FloatArray:
-    """Share of the door's wall with known space before it."""
+    """Measure the share of the door's wall with known space before it."""
     v0 = r.entry.v0
     before = r.frame.known[max(v0 - r.frame.thickness - SLACK, 0) : max(v0, 0)].any(axis=0)
     running = np.concatenate(([0], np.cumsum(before)))
@@ -243,13 +243,13 @@ def front_closed(r: Rectangles) -> FloatArray:
 
 
 def beyond_front(r: Rectangles) -> FloatArray:
-    """Share of the width that lies past the ends of the corridor that the door opens to."""
+    """Measure the share of the width that lies past the ends of the corridor that the door opens to."""
     first, last = r.entry.front
     return np.asarray((np.maximum(first - r.u0, 0) + np.maximum(r.u1 - last, 0)) / r.width)
 
 
 def sticks_out(r: Rectangles) -> FloatArray:
-    """Tell how sure the back walls of the building beside a rectangle end before its own, 0 to 1."""
+    """Rate how sure the back walls of the building beside a rectangle end before its own, 0 to 1."""
     first, last = r.v0 + PASSED[0] + 1, r.v1 - PASSED[1] + 1
     total = np.zeros(len(r.u0))
     for low, high in ((r.u0 - BESIDE, r.u0), (r.u1, r.u1 + BESIDE)):
@@ -259,25 +259,25 @@ def sticks_out(r: Rectangles) -> FloatArray:
 
 
 def passage_end(r: Rectangles) -> FloatArray:
-    """Tell how sure the walls of both sides begin before the door's wall: the room ends a passage."""
+    """Rate how sure the walls of both sides begin before the door's wall: the room ends a passage."""
     return r.right.stub * r.left.stub
 
 
 def width_seen(r: Rectangles) -> FloatArray:
-    """Tell how usual the width is in this building."""
+    """Rate how usual the width is in this building."""
     seen = r.evidence.seen["width"]
     return np.asarray(seen[np.clip(r.u1 - r.u0, 0, len(seen) - 1)])
 
 
 def depth_seen(r: Rectangles) -> FloatArray:
-    """Tell how usual the depth is in this building."""
+    """Rate how usual the depth is in this building."""
     seen = r.evidence.seen["depth"]
     return np.asarray(seen[np.clip(r.v1 - r.v0, 0, len(seen) - 1)])
 
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """One kind of evidence.
+    """Kind of evidence.
 
     Attributes:
         name: For people.

@@ -53,7 +53,7 @@ class Hypotheses:
     measured: FloatArray
 
     def weigh(self, scores: FloatArray | None = None) -> FloatArray:
-        """Probability of each rectangle by its score, or by ``scores`` that know more, shape (n,)."""
+        """Compute the probability of each rectangle by its score, or by ``scores`` that know more, shape (n,)."""
         scores = self.scores if scores is None else scores
         weight = np.exp((scores - scores.max()) / VAGUE)
         return np.asarray(weight / weight.sum())

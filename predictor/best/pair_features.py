@@ -29,7 +29,7 @@ OVERLAPS, MORE = 0.03, 0.2
 
 
 class Pairs:
-    """Every pair of rectangles of two doors; every array of shape (n, m).
+    """Pairs of all rectangles of two doors; every array of shape (n, m).
 
     Args:
         a: Rectangles ``x0, y0, x1, y1`` of one door in the turned map [cells], shape (n, 4).
@@ -55,7 +55,7 @@ class Pairs:
 
     @cached_property
     def gaps(self) -> list[tuple[FloatArray, FloatArray]]:
-        """Along either axis: how far the two are apart [cells], and the share of both sides that face each other."""
+        """Distance of the two [cells], and the share of both sides that face each other, along either axis."""
         found = []
         for axis in (0, 1):
             along = np.maximum(self.common[..., 1 - axis], 0.0)
@@ -64,7 +64,7 @@ class Pairs:
         return found
 
     def facing(self, nearest: float, furthest: float) -> FloatArray:
-        """Share of both rooms' sides that face each other at a distance between two [cells]."""
+        """Measure the share of both rooms' sides that face each other at a distance between two [cells]."""
         apart = [np.where((gap > nearest) & (gap <= furthest), share, 0.0) for gap, share in self.gaps]
         return np.asarray(apart[0] + apart[1])
 
@@ -75,34 +75,34 @@ def _emphasise(overlap: FloatArray) -> FloatArray:
 
 
 def overlap(p: Pairs) -> FloatArray:
-    """Area in common over the smaller area."""
+    """Measure the area in common over the smaller area."""
     return p.overlap
 
 
 def same_depth(p: Pairs) -> FloatArray:
-    """Tell how well the backs of two rooms of one wall agree."""
+    """Rate how well the backs of two rooms of one wall agree."""
     if p.back is None:
         return np.zeros(p.overlap.shape)
     return np.asarray(np.exp(-np.abs(p.a[..., p.back] - p.b[..., p.back]) / OFF_DEPTH) * p.agree)
 
 
 def shared_wall(p: Pairs) -> FloatArray:
-    """Share of the sides with a wall between the two."""
+    """Measure the share of the sides with a wall between the two."""
     return p.facing(-TOUCHING - 1, p.thickness + SLACK)
 
 
 def strip_between(p: Pairs) -> FloatArray:
-    """Share of the sides with a strip between the two that is too narrow for a room."""
+    """Measure the share of the sides with a strip between the two that is too narrow for a room."""
     return p.facing(p.thickness + SLACK, p.thickness + STRIP)
 
 
 def gap_between(p: Pairs) -> FloatArray:
-    """Share of the sides with space between the two that would need a door of its own."""
+    """Measure the share of the sides with space between the two that would need a door of its own."""
     return p.facing(p.thickness + STRIP, p.thickness + GAP)
 
 
 def same_width(p: Pairs) -> FloatArray:
-    """Tell how well the widths of two rooms of one wall agree."""
+    """Rate how well the widths of two rooms of one wall agree."""
     if p.back is None:
         return np.zeros(p.overlap.shape)
     axis = 1 - p.back % 2
@@ -111,7 +111,7 @@ def same_width(p: Pairs) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class PairFeature:
-    """One kind of evidence that two rooms give together.
+    """Kind of evidence that two rooms give together.
 
     Attributes:
         name: For people.
@@ -155,7 +155,7 @@ def score_pairs(a: Hypotheses, b: Hypotheses, thickness: int) -> tuple[FloatArra
 
 
 def are_apart(a: Hypotheses, b: Hypotheses, thickness: int) -> bool:
-    """Tell whether two doors' rectangles are all too far from each other to say anything: :func:`score_pairs` is 0."""
+    """Check whether two doors' rectangles are all too far apart to say anything: :func:`score_pairs` is 0."""
     if a.angle != b.angle or _are_in_one_wall(a, b):
         return False
     low = np.maximum(a.boxes[:, :2].min(axis=0), b.boxes[:, :2].min(axis=0))
@@ -164,7 +164,7 @@ def are_apart(a: Hypotheses, b: Hypotheses, thickness: int) -> bool:
 
 
 def weigh_pairs(a: Hypotheses, b: Hypotheses, thickness: int) -> dict[str, FloatArray]:
-    """Say what each feature counts in :func:`score_pairs`, by its name, each of shape (n, m)."""
+    """Weigh what each feature adds to :func:`score_pairs`, by its name, each of shape (n, m)."""
     if a.angle != b.angle:
         return {"overlap": OVERLAP_WEIGHT * _overlap_slanted(a.corners, b.corners)}
     terms = _measure(_pair_up(a, b, thickness)) * WEIGHTS

@@ -102,7 +102,7 @@ def choose(
 
 
 def _choose(search: "_Search", *, safe: bool) -> tuple[list[int], list[float], bool]:
-    """The same with the tables at hand."""
+    """Choose as :func:`choose` does, with the tables at hand."""
     alone, first_cut = search.ascend([0] * len(search.hypotheses))
     surest, second_cut = search.ascend(search.surest_first())
     better = search.total(surest) > search.total(alone) + 1e-9
@@ -134,7 +134,7 @@ class _Search:
                 self.links[j].append((i, table.T))
 
     def seen_by(self, i: int, chosen: list[int], skip: int = -1) -> FloatArray:
-        """Scores of a door's rectangles given what the others but ``skip`` have chosen, shape (n,)."""
+        """Score a door's rectangles given what the others but ``skip`` have chosen, shape (n,)."""
         score = self.hypotheses[i].scores.copy()
         for j, table in self.links[i]:
             if j != skip and chosen[j] >= 0:
@@ -142,7 +142,7 @@ class _Search:
         return score
 
     def weigh(self) -> list[FloatArray]:
-        """Probability of every rectangle of each door, all doors jointly: each sees the others where they may be.
+        """Compute the probability of each door's rectangles, all doors jointly: each sees the others where they may be.
 
         Mean field: door by door, the others' rectangles count by their probabilities.
         """
@@ -156,7 +156,7 @@ class _Search:
         return weights
 
     def safest(self, i: int, chosen: list[int]) -> int:
-        """Return the rectangle of a door with the largest expected overlap (IoU), given what the others have chosen."""
+        """Find the rectangle of a door with the largest expected overlap (IoU), given what the others have chosen."""
         score = self.seen_by(i, chosen) / TEMPERATURE
         weight = np.exp(score - score.max())
         expected = np.round(overlaps_of(self.hypotheses[i].boxes) @ (weight / weight.sum()), 9)
@@ -168,12 +168,12 @@ class _Search:
         return int(expected.argmax())
 
     def total(self, chosen: list[int]) -> float:
-        """Score of all rooms together."""
+        """Add up the score of all rooms together."""
         alone = sum(float(self.hypotheses[i].scores[at]) for i, at in enumerate(chosen))
         return alone + sum(float(table[chosen[i], chosen[j]]) for (i, j), table in self.pairs.items())
 
     def surest_first(self) -> list[int]:
-        """Return a start that settles the doors with the clearest best rectangle first."""
+        """Make a start that settles the doors with the clearest best rectangle first."""
         clear = [float(s.scores[0] - s.scores[min(5, len(s.scores) - 1)]) for s in self.hypotheses]
         chosen = [-1] * len(self.hypotheses)
         for i in sorted(range(len(chosen)), key=lambda i: (-round(clear[i], 9), *self.hypotheses[i].boxes[0].tolist())):
@@ -181,7 +181,7 @@ class _Search:
         return chosen
 
     def ascend(self, chosen: list[int]) -> tuple[list[int], bool]:
-        """Better one door or one pair at a time until nothing gets better; True when the rounds ran out."""
+        """Improve one door or one pair at a time until nothing gets better; ``True`` when the rounds ran out."""
         chosen = list(chosen)
         for _ in range(ROUNDS):
             if not self._round(chosen):
@@ -204,7 +204,7 @@ class _Search:
 
 
 def overlaps_of(boxes: IntArray) -> FloatArray:
-    """Intersection over union of every two rectangles, shape (n, n)."""
+    """Measure the intersection over union of every two rectangles, shape (n, n)."""
     sizes = (boxes[:, 2:] - boxes[:, :2]).prod(axis=-1)
     low, high = np.maximum(boxes[:, None, :2], boxes[None, :, :2]), np.minimum(boxes[:, None, 2:], boxes[None, :, 2:])
     shared = np.maximum(high - low, 0).prod(axis=-1)

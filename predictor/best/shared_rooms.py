@@ -20,7 +20,7 @@ COLUMNS = {feature.name: column for column, feature in enumerate(features.FEATUR
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Together:
-    """Some doors and the rooms that they may lead to.
+    """Doors with the rooms that they may lead to.
 
     Attributes:
         alone: Rectangles of each door by itself.
@@ -40,39 +40,39 @@ class Together:
         return np.asarray((self.both.boxes[0, 2:] - self.both.boxes[0, :2]) * RESOLUTION)
 
     def measured(self, *names: str) -> float:
-        """Sum of some features of the best room of all."""
+        """Add up some features of the best room of all."""
         return float(sum(self.both.measured[0, COLUMNS[name]] for name in names))
 
     @property
     def quarters(self) -> set[int]:
-        """Where the rooms lie as seen from the doors."""
+        """Directions in which the rooms lie as seen from the doors."""
         return {own.quarter for own in self.alone}
 
 
 def gain(t: Together) -> float:
-    """Tell how much better the room of all scores than the worst of the doors' own."""
+    """Measure how much better the room of all scores than the worst of the doors' own."""
     return float(t.both.scores[0] - min(own.scores[0] for own in t.alone))
 
 
 def crowd(t: Together) -> float:
-    """Tell how much the rooms of each are expected to overlap: where there is no room for two, there is one."""
+    """Measure how much the rooms of each are expected to overlap: where there is no room for two, there is one."""
     lots = list(zip(t.alone, t.weights, strict=True))
     found = [p @ score_pairs(a, b, t.thickness)[1] @ q for (a, p), (b, q) in itertools.combinations(lots, 2)]
     return float(np.mean(found))
 
 
 def one_wall(t: Together) -> float:
-    """Tell whether all doors are in one wall."""
+    """Check whether all doors are in one wall."""
     return float(len(t.quarters) == 1)
 
 
 def facing_walls(t: Together) -> float:
-    """Tell whether the doors are in two walls that face each other."""
+    """Check whether the doors are in two walls that face each other."""
     return float(len(t.quarters) == 2 and len({quarter % 2 for quarter in t.quarters}) == 1)
 
 
 def meeting_walls(t: Together) -> float:
-    """Tell whether the doors are in walls of which two meet."""
+    """Check whether the doors are in walls of which two meet."""
     return float(len({quarter % 2 for quarter in t.quarters}) == 2)
 
 
@@ -82,7 +82,7 @@ def count_doors(t: Together) -> float:
 
 
 def wall_filled(t: Together) -> float:
-    """Share of the width between the outer doors of one wall: those of one room are near its ends."""
+    """Measure how much of the width the outer doors of one wall span: those of one room are near its ends."""
     if not one_wall(t):
         return 0.0
     places = [own.u for own in t.alone]
@@ -90,28 +90,28 @@ def wall_filled(t: Together) -> float:
 
 
 def log_short_side(t: Together) -> float:
-    """Rooms that are not narrow."""
+    """Measure how narrow the room is, by the logarithm of its short side [m]."""
     return float(np.log(t.sides.min()))
 
 
 def open_share(t: Together) -> float:
-    """Share of the room with nothing known beyond it."""
+    """Measure the share of the room with nothing known beyond it."""
     return t.measured("open")
 
 
 def corner_gain(t: Together) -> float:
-    """Tell the same where the doors are in walls that meet."""
+    """Measure :func:`gain` where the doors are in walls that meet."""
     return gain(t) * meeting_walls(t)
 
 
 def corner_closed(t: Together) -> float:
-    """Sides with known space behind them where walls meet: a pocket closed all around holds two rooms as a rule."""
+    """Add up closed sides where walls meet: a pocket closed all around holds two rooms as a rule."""
     return t.measured("sides closed", "back closed") * meeting_walls(t)
 
 
 @dataclass(frozen=True, slots=True)
 class SharedFeature:
-    """One kind of evidence that doors lead to one room.
+    """Kind of evidence that doors lead to one room.
 
     Attributes:
         name: For people.

@@ -27,7 +27,7 @@ NO_LINES = np.zeros((0, 4))
 
 
 def trace_of(scene: Scene, proposals: Proposals, choices: Sequence[Choice], rooms: Sequence[Room]) -> WeighedTrace:
-    """Say what was seen and weighed.
+    """Collect what was seen and weighed.
 
     Args:
         scene: The map and its doors.
@@ -98,7 +98,7 @@ def _weigh(scene: Scene, choices: Sequence[Choice]) -> tuple[WeighedRoom, ...]:
 
 
 def _only(own: Hypotheses, at: int) -> Hypotheses:
-    """One rectangle of several."""
+    """Pick one rectangle of several."""
     one = slice(at, at + 1)
     return Hypotheses(
         own.boxes[one], own.corners[one], own.scores[one], own.angle, own.quarter, own.u, own.v, own.measured[one]

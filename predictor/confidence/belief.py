@@ -20,7 +20,7 @@ FLATTER = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spread:
-    """Where a room may be: a raster that may be turned against the map.
+    """Probability of where a room may be: a raster that may be turned against the map.
 
     Attributes:
         origin: Corner of cell (0, 0), map frame [m], shape (2,).
@@ -35,7 +35,7 @@ class Spread:
     share: FloatArray
 
     def on(self, frame: GridFrame) -> FloatArray:
-        """Return the probabilities at the centres of a frame's cells, 0 outside, shape ``frame.shape``, float32."""
+        """Sample the probabilities at the centres of a frame's cells, 0 outside, shape ``frame.shape``, float32."""
         rotation = np.array([self.along, [-self.along[1], self.along[0]]])  # map offsets to (col, row) [m]
         first = np.array([frame.origin_x, frame.origin_y]) + frame.resolution / 2 - self.origin
         matrix = np.empty((2, 3))
@@ -46,7 +46,7 @@ class Spread:
         return np.asarray(cv2.warpAffine(self.share.astype(np.float32), matrix, size, flags=flags, borderValue=0.0))
 
     def bounds(self, least: float) -> tuple[float, float, float, float] | None:
-        """Tell what holds all cells of a share of at least ``least``, map frame [m]; ``None`` where none has it."""
+        """Bound all cells of a share of at least ``least``, map frame [m]; ``None`` where none has it."""
         rows, cols = np.nonzero(self.share >= least)
         if not rows.size:
             return None
@@ -60,7 +60,7 @@ class Spread:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Belief:
-    """What is thought of one predicted room before it is calibrated.
+    """Belief about one predicted room before it is calibrated.
 
     Attributes:
         expected: IoU of the room with the true one, expected over all shapes it may have.
@@ -106,6 +106,6 @@ def choose_diverse(overlap: FloatArray, weights: FloatArray, first: int, count: 
 
 
 def share_nearest(overlap: FloatArray, weights: FloatArray, chosen: Sequence[int]) -> FloatArray:
-    """Share of belief that lies nearest to each chosen shape, shape (len(chosen),); a tie goes to the earlier one."""
+    """Add up the belief nearest to each chosen shape, shape (len(chosen),); a tie goes to the earlier one."""
     nearest: IntArray = np.round(overlap[:, list(chosen)], 9).argmax(axis=1)
     return np.asarray(np.bincount(nearest, weights=weights, minlength=len(chosen)), dtype=np.float64)

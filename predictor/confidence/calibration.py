@@ -17,13 +17,13 @@ ANY = "paper"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Curve:
-    """A growing function through knots, level beyond them (isotonic regression)."""
+    """Growing function through knots, level beyond them (isotonic regression)."""
 
     x: FloatArray
     y: FloatArray
 
     def at(self, values: Any) -> FloatArray:
-        """Its values, of the shape of ``values``."""
+        """Interpolate between the knots, in the shape of ``values``."""
         return np.asarray(np.interp(values, self.x, self.y))
 
 
@@ -50,12 +50,12 @@ class Calibration:
     variants: dict[str, FloatArray]
 
     def expect_iou(self, features: FloatArray) -> float:
-        """Expected IoU of a room with these features, shape (k,)."""
+        """Expect an IoU of a room with these features, shape (k,)."""
         return float(self.confidence.at(self.intercept + (features - self.mean) @ self.weights))
 
 
 def calibration_of(method: str) -> Calibration:
-    """Numbers of a method; those of :data:`ANY` for one that nobody calibrated."""
+    """Look up the numbers of a method; those of :data:`ANY` for one that nobody calibrated."""
     known = read_calibrations()
     return known.get(method) or known[ANY]
 

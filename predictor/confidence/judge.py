@@ -25,7 +25,7 @@ def judge(
     prediction: Prediction,
     calibration: Calibration | None = None,
 ) -> Prediction:
-    """Say how sure a prediction is.
+    """Judge how sure a prediction is.
 
     Args:
         method: That made it: whose calibration counts.
@@ -64,7 +64,7 @@ def judge(
 def form_beliefs(
     grid: OccupancyGrid, doors: Sequence[ClosedDoor], prediction: Prediction, numbers: Calibration
 ) -> list[Belief]:
-    """Tell what is thought of each room: as its method says, else from its shape and kind."""
+    """Form a belief about each room: as its method says, else from its shape and kind."""
     if prediction.beliefs:
         return list(prediction.beliefs)
     named: Mapping[str, ClosedDoor] = {door.id: door for door in doors}
@@ -99,6 +99,6 @@ def join_spreads(frame: GridFrame, beliefs: Sequence[Belief]) -> tuple[GridFrame
 
 
 def _find_window(frame: GridFrame, bounds: tuple[float, float, float, float]) -> tuple[int, int, int, int]:
-    """Rows and columns, ``r0, c0, r1, c1``, of the lattice that hold bounds [m]."""
+    """Find the rows and columns, ``r0, c0, r1, c1``, of the lattice that hold bounds [m]."""
     (r0, c0), (r1, c1) = frame.to_cells(np.array([bounds[:2], bounds[2:]])).tolist()
     return r0, c0, r1 + 1, c1 + 1

@@ -88,7 +88,7 @@ def _mark_near(grid: OccupancyGrid, rooms: tuple[Room, ...]) -> tuple[GridFrame,
 
 
 def _share_near(shape: Shape, frame: GridFrame, near: BoolArray) -> float:
-    """Share of a room's outline that known space bounds."""
+    """Measure the share of a room's outline that known space bounds."""
     points = shapely.get_coordinates(shapely.segmentize(shape.boundary, STEP))
     cells = frame.to_cells(points)
     cells = cells[frame.contains(cells)]

@@ -31,7 +31,7 @@ SMALLEST = 0.5
 
 
 class RoomVariants:
-    """The shapes that one room may have, on a raster along its walls.
+    """Shapes that one room may have, on a raster along its walls.
 
     Args:
         grid: The map.
@@ -54,7 +54,7 @@ class RoomVariants:
         self.masks = self._draw(grid)
 
     def _draw(self, grid: OccupancyGrid) -> BoolArray:
-        """All shapes less what is known, shape (variants, rows, cols)."""
+        """Draw all shapes less what is known, shape (variants, rows, cols)."""
         shapely.prepare(self.room.polygon)
         points = self._centres()
         own: BoolArray = np.asarray(shapely.contains_xy(self.room.polygon, points[..., 0], points[..., 1]))
@@ -73,16 +73,16 @@ class RoomVariants:
         return masks
 
     def _find_places(self, wanted: FloatArray, centres: FloatArray) -> IntArray:
-        """Index of the cell that holds each place along one axis, -1 outside."""
+        """Find the index of the cell that holds each place along one axis, -1 outside."""
         at = np.floor((wanted - centres[0]) / self.cell + 0.5).astype(np.int64)
         return np.asarray(np.where((at >= 0) & (at < len(centres)), at, -1))
 
     def _centres(self) -> FloatArray:
-        """Centres of all cells in the map frame [m], shape (rows, cols, 2)."""
+        """Compute the centres of all cells in the map frame [m], shape (rows, cols, 2)."""
         return np.asarray(self.middle + self.u[None, :, None] * self.along + self.v[:, None, None] * self.inward)
 
     def _find_open(self, grid: OccupancyGrid) -> BoolArray:
-        """Cells that the map does not know, a wall away from what is free, shape (rows, cols)."""
+        """Find cells that the map does not know, a wall away from what is free, shape (rows, cols)."""
         cells = grid.frame.to_cells(self._centres())
         inside = grid.frame.contains(cells)
         values = np.full(inside.shape, UNKNOWN, dtype=np.int8)
@@ -91,14 +91,14 @@ class RoomVariants:
         return ~(cv2.dilate(is_free(values).view(np.uint8), kernel) > 0) & ~is_occupied(values)
 
     def overlaps(self) -> FloatArray:
-        """Intersection over union of every two shapes, shape (variants, variants)."""
+        """Measure the intersection over union of every two shapes, shape (variants, variants)."""
         flat = self.masks.reshape(len(self.masks), -1).astype(np.float32)
         shared = flat @ flat.T
         size = np.diag(shared)
         return np.asarray(shared / np.maximum(size[:, None] + size[None, :] - shared, 1.0), dtype=np.float64)
 
     def overlaps_with(self, truth: Polygon) -> FloatArray:
-        """Intersection over union of each shape with a true room, shape (variants,)."""
+        """Measure the intersection over union of each shape with a true room, shape (variants,)."""
         points = self._centres()
         inside = np.asarray(shapely.contains_xy(truth, points[..., 0], points[..., 1]))
         size, shared = self.masks.sum(axis=(1, 2)), (self.masks & inside).sum(axis=(1, 2))
@@ -106,7 +106,7 @@ class RoomVariants:
         return np.asarray(shared / np.maximum(size + whole - shared, 1.0))
 
     def believe(self, weights: FloatArray) -> Belief:
-        """Tell what follows when the shapes have these probabilities, shape (variants,)."""
+        """Form the belief that follows when the shapes have these probabilities, shape (variants,)."""
         weights = weights / weights.sum()
         overlap = self.overlaps()
         chosen = choose_diverse(overlap, weights, SAME)
@@ -145,7 +145,7 @@ def _find_largest(mask: BoolArray) -> BoolArray:
 def believe_variants(
     grid: OccupancyGrid, room: Room, doors: Mapping[str, ClosedDoor], shares: Mapping[str, FloatArray]
 ) -> Belief:
-    """Tell what to think of a room of which nothing but its shape and kind is known.
+    """Form a belief about a room of which nothing but its shape and kind is known.
 
     Args:
         grid: The map.

@@ -31,7 +31,7 @@ BATCH = 8
 
 
 class Model:
-    """One network. Several threads may ask it, one after the other.
+    """Network of the method ``learned``. Several threads may ask it, one after the other.
 
     Args:
         path: Its file (ONNX).
@@ -54,13 +54,13 @@ class Model:
             raise InvalidInputError("a network with other outputs", expected=WHAT, where=path)
 
     def ask(self, patches: Any) -> Sequence[Any]:
-        """Return the outputs for patches of shape (n, 5, SIZE, SIZE), float32: logits by :data:`OUTPUTS`."""
+        """Compute the outputs for patches of shape (n, 5, SIZE, SIZE), float32: logits by :data:`OUTPUTS`."""
         with self._lock:
             self._network.setInput(patches)
             return self._network.forward(OUTPUTS)
 
     def look(self, patches: Sequence[Patch]) -> list[SeenRoom]:
-        """Say what is seen behind each door: the mean of what the network says of a patch and of its mirror image."""
+        """Look behind each door: average what the network says of a patch and of its mirror image."""
         rooms: list[SeenRoom] = []
         for first in range(0, len(patches), BATCH):
             some = patches[first : first + BATCH]
@@ -82,7 +82,7 @@ class Model:
 
 
 def seal(content: bytes) -> bytes:
-    """Return the file of a network in ONNX: with its SHA-256 behind it."""
+    """Append its SHA-256 to a network in ONNX, which makes it the file of a network."""
     return content + SEAL + hashlib.sha256(content).digest()
 
 
@@ -100,7 +100,7 @@ def unseal(path: Path) -> bytes:
 
 
 def load_model(path: Path | None) -> Model:
-    """Return the network of a folder that ``closedrooms train`` wrote, or of a file; the shipped one for ``None``.
+    """Load the network of a folder that ``closedrooms train`` wrote, or of a file; the shipped one for ``None``.
 
     Raises:
         InvalidInputError: See :class:`Model`.

@@ -46,7 +46,7 @@ class Patch:
     door: FloatArray
 
     def to_patch(self, points: FloatArray) -> FloatArray:
-        """Return map points [m], shape (..., 2), along and across the door's wall from the corner [m]."""
+        """Convert map points [m], shape (..., 2), to distances along and across the door's wall from the corner [m]."""
         return np.asarray((points - self.corner) @ np.array([self.along, self.inward]).T)
 
 
@@ -90,7 +90,7 @@ def _take(turned: TurnedMap, corner: IntArray, diagonal: IntArray, quarter: int)
 
 
 def _share(mask: BoolArray) -> FloatArray:
-    """Return the share of each cell of a patch that a mask fills, shape (SIZE, SIZE)."""
+    """Measure the share of each cell of a patch that a mask fills, shape (SIZE, SIZE)."""
     return np.asarray(cv2.resize(mask.astype(np.float32), (SIZE, SIZE), interpolation=cv2.INTER_AREA), np.float64)
 
 

@@ -22,7 +22,7 @@ WEIGHTS = np.array([2.0, 4.0])
 
 @dataclass(slots=True, eq=False)
 class Rater:
-    """Rates the rectangles of one map; keeps what the network said, for beliefs and traces.
+    """Judge of the rectangles of one map; keeps what the network said, for beliefs and traces.
 
     Attributes:
         model: The network.
@@ -59,7 +59,7 @@ class Rater:
         )
 
     def hear(self, doors: Sequence[str], corners: FloatArray) -> FloatArray:
-        """Return what the network says of rectangles as the room of some doors.
+        """Ask the network about rectangles as the room of some doors.
 
         Args:
             doors: Their ids: what is said of several is the mean.

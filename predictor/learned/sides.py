@@ -16,7 +16,7 @@ ASIDE_CELLS, AHEAD_CELLS, DOOR_ROW = round(ASIDE / CELL), round(AHEAD / CELL), r
 
 @dataclass(frozen=True, slots=False, eq=False)
 class SeenRoom:
-    """One door's room as the network sees it.
+    """Room of one door as the network sees it.
 
     Attributes:
         left: Logarithm of the probability that it reaches so far to the left, by cell, shape (ASIDE_CELLS,).
@@ -40,23 +40,23 @@ class SeenRoom:
         return tables
 
     def rate_sides(self, boxes: FloatArray) -> FloatArray:
-        """Log probability of the sides of rectangles ``u0, v0, u1, v1`` [m of the patch], (n, 4), shape (n,)."""
+        """Rate the sides of rectangles ``u0, v0, u1, v1`` [m of the patch], (n, 4): log probability, shape (n,)."""
         sides = ((self.left, ASIDE - boxes[:, 0]), (self.right, boxes[:, 2] - ASIDE), (self.back, boxes[:, 3] - BEHIND))
         return np.asarray(sum(np.interp(at / CELL - 0.5, np.arange(len(logs)), logs) for logs, at in sides))
 
     def rate_cells(self, boxes: FloatArray) -> FloatArray:
-        """Overlap of the unknown part of rectangles (n, 4) with the mask: intersection over union, shape (n,)."""
+        """Rate the unknown part of rectangles (n, 4) by its overlap (IoU) with the mask, shape (n,)."""
         shared, area = self._sum_in(boxes)
         return np.asarray(shared / np.maximum(area + self.sums[0, -1, -1] - shared, 1e-6))
 
     def _sum_in(self, boxes: FloatArray) -> FloatArray:
-        """Sums of both tables over rectangles whose sides cut cells, shape (2, n)."""
+        """Add up both tables over rectangles whose sides cut cells, shape (2, n)."""
         u0, v0, u1, v1 = np.clip(boxes.T / CELL, 0.0, SIZE)
         corners = ((v1, u1, 1.0), (v0, u1, -1.0), (v1, u0, -1.0), (v0, u0, 1.0))
         return np.asarray(sum(sign * self._look_up(v, u) for v, u, sign in corners))
 
     def _look_up(self, v: FloatArray, u: FloatArray) -> FloatArray:
-        """Values of both tables between their entries, shape (2, n)."""
+        """Interpolate both tables between their entries, shape (2, n)."""
         row, col = np.minimum(v.astype(int), SIZE - 1), np.minimum(u.astype(int), SIZE - 1)
         a, b = v - row, u - col
         low = self.sums[:, row, col] * (1 - b) + self.sums[:, row, col + 1] * b

@@ -8,7 +8,7 @@ from closedrooms.core.errors import InvalidInputError
 
 @dataclass(frozen=True, kw_only=True)
 class ProposalConfig:
-    """What a closed door looks like in a map, and which ones are worth proposing."""
+    """Limits on what a closed door looks like in a map, and which ones are worth proposing."""
 
     min_width: float = 0.60
     """Narrowest door [m]."""

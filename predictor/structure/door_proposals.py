@@ -106,7 +106,7 @@ class _Recesses:
 
 
 def propose_doors(grid: OccupancyGrid, config: ProposalConfig | None = None) -> tuple[DoorProposal, ...]:
-    """Places of the map that look like closed doors, the best first.
+    """Find places of the map that look like closed doors, the best first.
 
     Args:
         grid: The map.
@@ -142,7 +142,7 @@ def propose_doors(grid: OccupancyGrid, config: ProposalConfig | None = None) -> 
 
 
 def _lines(faces: WallFaces, directions: FloatArray, resolution: float, config: ProposalConfig) -> Iterator[_Line]:
-    """Every line of faces on which a leaf might be set back, for every wall direction and both sides of the walls."""
+    """Find every line of faces on which a leaf might be set back, for every wall direction and both sides of walls."""
     for direction in directions.tolist():
         for angle in (direction + quarter * math.pi / 2 for quarter in range(4)):
             outward = np.array([math.cos(angle), math.sin(angle)])
@@ -171,7 +171,7 @@ def _lines(faces: WallFaces, directions: FloatArray, resolution: float, config: 
 
 
 def _on_line(grid: OccupancyGrid, line: _Line, config: ProposalConfig) -> Iterator[tuple[DoorProposal, Niche]]:
-    """Proposals on one line that have free cells in front and unknown ones behind, where a room has room."""
+    """Find proposals on one line that have free cells in front and unknown ones behind, where a room has room."""
     resolution = grid.frame.resolution
     found = _recesses(line, resolution, config)
     for i in _best(found):
@@ -193,7 +193,7 @@ def _on_line(grid: OccupancyGrid, line: _Line, config: ProposalConfig) -> Iterat
 
 
 def _recesses(line: _Line, resolution: float, config: ProposalConfig) -> _Recesses:
-    """For every first bin the width over which the face lies back most clearly.
+    """Find for every first bin the width over which the face lies back most clearly.
 
     The face inside is compared with ``config.jamb`` metres beside each jamb; the bins at the jambs themselves belong
     to neither.
@@ -209,7 +209,7 @@ def _recesses(line: _Line, resolution: float, config: ProposalConfig) -> _Recess
     sums = np.cumsum(np.pad(values, ((0, 0), (before + 1, after))), axis=1)
 
     def window(low: int, high: int) -> FloatArray:
-        """Return the three sums over the bins from ``first + low`` up to ``first + high``, shape (3, size)."""
+        """Add up each of the three sums over the bins from ``first + low`` up to ``first + high``, shape (3, size)."""
         return np.asarray(sums[:, before + high :][:, :size] - sums[:, before + low :][:, :size])
 
     columns, gains = [], []
@@ -243,7 +243,7 @@ def _recesses(line: _Line, resolution: float, config: ProposalConfig) -> _Recess
 
 
 def _best(found: _Recesses) -> list[int]:
-    """Those that do not overlap a clearer one; ``found`` is sorted, the clearest first."""
+    """Keep those that do not overlap a clearer one; ``found`` is sorted, the clearest first."""
     kept: list[int] = []
     for i in range(found.first.size):
         low, high = found.first[i], found.first[i] + found.bins[i]
@@ -260,7 +260,7 @@ def _best(found: _Recesses) -> list[int]:
 def _around(
     grid: OccupancyGrid, line: _Line, low: float, high: float, leaf: float, config: ProposalConfig
 ) -> tuple[float, float]:
-    """Shares of unknown cells behind a leaf (outside the map counts) and of free cells in front of it."""
+    """Measure the shares of unknown cells behind a leaf (outside the map counts) and of free cells before it."""
     frame, resolution = grid.frame, grid.frame.resolution
     s = np.arange(low + 1.5 * resolution, high - resolution, resolution)
 
@@ -282,7 +282,7 @@ def _around(
 def _has_room_behind(
     grid: OccupancyGrid, line: _Line, low: float, high: float, leaf: float, config: ProposalConfig
 ) -> bool:
-    """Whether a square room with ``config.min_room`` metres a side fits into the unknown, the leaf in its near side.
+    """Check whether a square room of ``config.min_room`` [m] fits into the unknown, the leaf in its near side.
 
     What the map knows behind the wall, free or occupied, leaves no room; outside of the map all is unknown.
     """

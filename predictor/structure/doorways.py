@@ -154,7 +154,7 @@ def _find(grid: OccupancyGrid, door: FacingDoor) -> Doorway | None:
 
 
 def _long(mask: BoolArray, least: int) -> BoolArray:
-    """Entries in runs of at least so many, shape (n,)."""
+    """Find entries in runs of at least so many, shape (n,)."""
     ends = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False]))))
     kept = np.zeros_like(mask)
     for first, after in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
@@ -163,5 +163,5 @@ def _long(mask: BoolArray, least: int) -> BoolArray:
 
 
 def _steps(low: float, high: float, step: float) -> FloatArray:
-    """Middles of steps from ``low`` to ``high``, the same on either side of zero."""
+    """Find the middles of steps from ``low`` to ``high``, the same on either side of zero."""
     return np.asarray((np.arange(round(low / step), round(high / step)) + 0.5) * step, dtype=np.float64)

@@ -30,7 +30,7 @@ LEAST = 80.0
 
 
 def shows_walls(grid: OccupancyGrid) -> bool:
-    """Tell whether what is occupied follows some direction, as walls do, or none, as noise of single cells.
+    """Check whether occupied cells follow some direction, as walls do, or none, as noise of single cells.
 
     Edges are taken where the share of occupied cells among the known ones rises, so that the outline of what is known
     has no say; specks have none either.
@@ -111,7 +111,7 @@ def find_edges(
 
 
 def votes_by_degree(angles: FloatArray) -> IntArray:
-    """Edges by whole degrees from -45 on, smoothed over five degrees, shape (90,).
+    """Count edges by whole degrees from -45 on, smoothed over five degrees, shape (90,).
 
     Args:
         angles: Modulo a right angle, in [-pi/4, pi/4) [rad], shape (n,).
@@ -121,5 +121,5 @@ def votes_by_degree(angles: FloatArray) -> IntArray:
 
 
 def wrapped(angle: FloatArray | float) -> FloatArray:
-    """Modulo a right angle, in [-pi/4, pi/4) [rad]."""
+    """Wrap angles modulo a right angle, into [-pi/4, pi/4) [rad]."""
     return np.asarray((np.asarray(angle) + QUARTER / 2) % QUARTER - QUARTER / 2, dtype=np.float64)

@@ -15,25 +15,25 @@ PLAIN, BY_SIZE = 0, 2
 
 
 def quick_size(least: int) -> int:
-    """Return the smallest size from ``least`` on that has small prime factors only: a transform of it is quick."""
+    """Find the smallest size from ``least`` on that has small prime factors only: a transform of it is quick."""
     return int(_pocketfft().good_size(least, False))
 
 
 def transform(picture: npt.NDArray[np.float32]) -> Spectrum:
-    """Return the spectrum of a picture, shape (n, n)."""
+    """Compute the spectrum of a picture, shape (n, n)."""
     spectrum: Spectrum = _pocketfft().c2c(picture, (0, 1), True, PLAIN, None, 1)
     return spectrum
 
 
 def transform_back(spectrum: Spectrum) -> Spectrum:
-    """Return the picture of a spectrum, shape (n, n), in the place of the spectrum."""
+    """Compute the picture of a spectrum, shape (n, n), in the place of the spectrum."""
     picture: Spectrum = _pocketfft().c2c(spectrum, (0, 1), False, BY_SIZE, spectrum, 1)
     return picture
 
 
 @cache
 def _pocketfft() -> Any:
-    """Scipy's compiled transform.
+    """Import SciPy's compiled transform.
 
     ``import scipy.fft`` takes 0.2 s, a third of ``closedrooms cover``, for array libraries that nobody uses here. The
     compiled module needs none of them, so its file is loaded by itself; where a version keeps it elsewhere, by the

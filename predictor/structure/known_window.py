@@ -16,7 +16,7 @@ SMOOTH = 0.5
 
 
 def known_window(grid: OccupancyGrid, *, margin: int = 8) -> OccupancyGrid | None:
-    """Return the known cells with ``margin`` unknown cells around them, ``None`` when all is unknown.
+    """Crop a map to its known cells with ``margin`` unknown cells around them, ``None`` when all is unknown.
 
     Args:
         grid: A map.
@@ -30,7 +30,7 @@ def known_window(grid: OccupancyGrid, *, margin: int = 8) -> OccupancyGrid | Non
 
 
 def at_resolution(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:
-    """Return the same map in cells of ``resolution`` [m]; walls survive in coarser cells.
+    """Resample a map to cells of ``resolution`` [m]; walls survive in coarser cells.
 
     A coarser cell is occupied when any of the cells whose centre it holds is, else free when any is free. Finer cells
     interpolate, so that a slanted wall does not become a staircase, which has no direction.
@@ -68,7 +68,7 @@ def at_resolution(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:
 
 
 def _interpolated(mask: BoolArray, scale: float, target: GridFrame) -> FloatArray:
-    """A mask of coarse cells, interpolated linearly at the centres of finer ones."""
+    """Interpolate a mask of coarse cells linearly at the centres of finer ones."""
     import cv2
 
     shift = 0.5 * scale - 0.5

@@ -6,7 +6,7 @@ from closedrooms.core.arrays import FloatArray, IntArray
 
 
 def find_circular_peaks(profile: FloatArray, prominence: float) -> IntArray:
-    """Positions at which a profile is higher than beside, in rising order.
+    """Find positions at which a profile is higher than beside, in rising order.
 
     The prominence of a peak is its height above the higher of the two lowest places that lie between it and anything
     higher, on either side. A plateau peaks at its middle, rounded down.

@@ -25,7 +25,7 @@ FLAT = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoseStructure:
-    """What the spectrum says about a map.
+    """Directions and structure that the spectrum shows of a map.
 
     Attributes:
         angles: Dominant directions of walls in [0, pi) [rad], strongest first, shape (k,), k >= 2.
@@ -37,7 +37,7 @@ class RoseStructure:
 
 
 def find_rose(grid: OccupancyGrid) -> RoseStructure | None:
-    """Dominant directions and structural cells of a map.
+    """Find the dominant directions and structural cells of a map.
 
     A straight wall is a line through the centre of the spectrum, perpendicular to the wall: the magnitude summed
     along each direction peaks there. Keeping a narrow band around these lines and going back leaves the walls.
@@ -79,7 +79,7 @@ def _keep_bands(spectrum: Spectrum, normals: FloatArray) -> None:
 
 
 def _centred(spectrum: Spectrum) -> npt.NDArray[np.float32]:
-    """The magnitude, frequency 0 in the middle."""
+    """Compute the magnitude, frequency 0 in the middle."""
     size, middle = spectrum.shape[0], spectrum.shape[0] // 2
     magnitude = np.empty((size, size), dtype=np.float32)
     halves = (slice(None, middle), slice(middle, None))
@@ -89,7 +89,7 @@ def _centred(spectrum: Spectrum) -> npt.NDArray[np.float32]:
 
 
 def _dominant(spectrum: Spectrum) -> FloatArray:
-    """Directions in [0, pi) [rad] along which the magnitude sums to a peak, strongest first, shape (k,)."""
+    """Find directions in [0, pi) [rad] along which the magnitude sums to a peak, strongest first, shape (k,)."""
     import cv2
 
     size = spectrum.shape[0]
@@ -111,7 +111,7 @@ def _dominant(spectrum: Spectrum) -> FloatArray:
 
 
 def _between(profile: FloatArray, peak: int) -> float:
-    """Place of a peak between its bins, by the parabola through it and its neighbours."""
+    """Find the place of a peak between its bins, by the parabola through it and its neighbours."""
     left, middle, right = (float(profile[(peak + step) % profile.size]) for step in (-1, 0, 1))
     curve = left - 2.0 * middle + right
     return peak if curve >= 0.0 else peak + 0.5 * (left - right) / curve

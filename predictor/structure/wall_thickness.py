@@ -85,7 +85,7 @@ def measure_taken(grid: OccupancyGrid, directions: FloatArray) -> float:
 
 
 def _runs(grid: OccupancyGrid, starts: IntArray, angle: float, longest: int, clear: int) -> FloatArray:
-    """Lengths [cells] of the walls across a direction whose first occupied cell is one of ``starts``, shape (k,)."""
+    """Measure walls across a direction whose first occupied cell is one of ``starts``: lengths [cells], shape (k,)."""
     normal = np.array([np.cos(angle), -np.sin(angle)])  # (row, col) of one cell across the wall
     steps, last = np.arange(-clear, longest + clear + 1), np.array(grid.frame.shape) - 1
     # Nine in ten have no free cell right before them.
@@ -106,7 +106,7 @@ def _runs(grid: OccupancyGrid, starts: IntArray, angle: float, longest: int, cle
 
 
 def free_interior(room: Polygon, grid: OccupancyGrid, thickness: float) -> Polygon:
-    """Return a layout without what its walls take: the free interior, wall face to wall face.
+    """Subtract what walls take from a layout: what stays is the free interior, wall face to wall face.
 
     A line of the layout lies on a wall's middle, or on the face that was seen. Where free space was seen beyond it,
     the wall begins there and takes its thickness from then on; elsewhere, towards other predicted rooms too, half of
@@ -134,7 +134,7 @@ def free_interior(room: Polygon, grid: OccupancyGrid, thickness: float) -> Polyg
 
 
 def _depth(start: FloatArray, end: FloatArray, grid: OccupancyGrid, thickness: float) -> float:
-    """How deep the wall on a side of a counter-clockwise layout reaches into it [m]."""
+    """Measure how deep the wall on a side of a counter-clockwise layout reaches into it [m]."""
     span = float(np.hypot(*(end - start)))
     along = (end - start) / span
     outward = np.array([along[1], -along[0]])

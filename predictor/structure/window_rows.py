@@ -66,7 +66,7 @@ def find_window_rows(grid: OccupancyGrid, niches: Sequence[Niche]) -> BoolArray:
 
 
 def _lines(niches: Sequence[Niche]) -> list[list[int]]:
-    """Numbers of niches of one kind on one line of a wall, in order along it; every niche on one line at most."""
+    """Group niches of one kind on one line of a wall: numbers, in order along it; every niche on one line at most."""
     left = set(range(len(niches)))
     lines = []
     for first, one in enumerate(niches):
@@ -89,14 +89,14 @@ def _lines(niches: Sequence[Niche]) -> list[list[int]]:
 
 
 def _spacings(niches: Sequence[Niche], line: list[int]) -> FloatArray:
-    """Distances between neighbours [m]."""
+    """Measure the distances between neighbours [m]."""
     middles = np.array([niches[number].middle for number in line])
     spacings: FloatArray = np.hypot(*np.diff(middles, axis=0).T)
     return spacings
 
 
 def _runs(line: list[int], spacings: FloatArray, holds: Callable[[FloatArray], bool]) -> list[list[int]]:
-    """The longest pieces of a line, from its beginning on, of whose spacings something holds."""
+    """Find the longest pieces of a line, from its beginning on, of whose spacings something holds."""
     runs, first = [], 0
     while first <= len(line) - LEAST_IN_ROW:
         lasts = [last for last in range(first + LEAST_IN_ROW - 1, len(line)) if holds(spacings[first:last])]
@@ -107,7 +107,7 @@ def _runs(line: list[int], spacings: FloatArray, holds: Callable[[FloatArray], b
 
 
 def _lights_a_room(spacings: FloatArray) -> bool:
-    """Whether a row is one of windows if what they light is a room: evenly spaced, or five of them."""
+    """Check whether a row is one of windows if what they light is a room: evenly spaced, or five of them."""
     many = len(spacings) >= 4 and float(spacings.max()) <= WIDEST_STEP
     return many or (float(spacings.min()) <= WIDEST_STEP and _even(spacings))
 
@@ -119,7 +119,7 @@ def _even(spacings: FloatArray) -> bool:
 
 
 def _depth_in_front(grid: OccupancyGrid, niche: Niche) -> float:
-    """How far it is from a niche across free cells to whatever comes next [m]; the median over its width."""
+    """Measure from a niche across free cells to whatever comes next [m]; the median over its width."""
     resolution = grid.frame.resolution
     along = np.array([niche.outward[1], -niche.outward[0]])
     across = np.linspace(-0.3, 0.3, 5)[:, None] * niche.width * along
