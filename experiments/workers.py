@@ -93,7 +93,7 @@ class Crew(Generic[Job, Outcome]):
                 yield from self._locally(work, jobs)
 
     def _locally(self, work: Callable[[Job], Outcome], jobs: Iterator[Job]) -> Iterator[tuple[Job, Outcome | Lost]]:
-        # Jobs that were under way when a worker died are tried one at a time, so that the guilty one is known.
+        # Jobs that were under way when a worker died are retried one at a time, to find the one that kills workers.
         suspects: deque[tuple[Job, int]] = deque()
         while True:
             begun: dict[int, Job] = {}

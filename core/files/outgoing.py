@@ -200,7 +200,7 @@ def is_ours(folder: Path, command: object = None) -> bool:
 
 
 def _strange(folder: Path, command: object) -> str:
-    """Find what in a folder the same command did not write, or was changed since; empty for nothing."""
+    """Find something in a folder that the same command did not write, or was changed since; empty for nothing."""
     try:
         manifest = read_json(folder / MANIFEST, what="a manifest", max_bytes=MAX_MANIFEST)
         if manifest["program"] != PROGRAM or manifest.get("command") != command:

@@ -23,12 +23,12 @@ _OPEN: dict[Path, Path] = {}
 
 
 def part_of_file(path: Path) -> Path:
-    """Make up the hidden name under which this process writes a file."""
+    """Compose the hidden name under which this process writes a file."""
     return path.with_name(f".{short_name(path.name)}.{_machine()}-{os.getpid()}.part")
 
 
 def part_of_folder(folder: Path, suffix: str = "part") -> Path:
-    """Make up a new hidden name beside a folder, without making anything."""
+    """Compose a new hidden name beside a folder, without making anything."""
     return folder.with_name(f".{short_name(folder.name)}.{secrets.token_hex(4)}.{suffix}")
 
 
@@ -47,7 +47,7 @@ def unfinished(path: Path, target: Path) -> Iterator[None]:
 
 
 def final_place(path: Path) -> Path:
-    """Find where a file will be in the end that is written in a folder under a temporary name."""
+    """Find the final place of a file that is written in a folder under a temporary name."""
     for part, target in _OPEN.items():
         if path.is_relative_to(part):
             return target / path.relative_to(part)

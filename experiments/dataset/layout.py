@@ -258,7 +258,7 @@ def write_manifest(config: DatasetConfig, worlds: Sequence[World], failed: Mappi
 
 
 def row(variant: Variant, about: Mapping[str, Any]) -> dict[str, Any]:
-    """List a sample in its split's metadata: file names relative to the split, then figures."""
+    """Describe a sample in its split's metadata: file names relative to the split, then figures."""
     base = f"{variant.world.name}/{Path(variant.id).name}"
     metrics = about["metrics"]
     return {

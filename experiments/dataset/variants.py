@@ -135,10 +135,10 @@ def count_variants(worlds: Sequence[World], config: DatasetConfig) -> int:
 
 
 def in_order(worlds: Sequence[World], split: Split) -> list[World]:
-    """Sort the buildings of a split in the order of their samples' ids."""
+    """Sort the buildings of a split by their samples' ids."""
     return sorted((world for world in worlds if world.split == split), key=lambda world: f"{world.name}/")
 
 
 def noise_seed(config: DatasetConfig, world: World, *variant: str) -> int:
-    """Draw the seed of the simulated noise of a world's survey, or of one variant's; 32 bits."""
+    """Derive the seed of the simulated noise of a world's survey, or of one variant's; 32 bits."""
     return zlib.crc32("/".join((str(config.seed), world.name, *variant)).encode())

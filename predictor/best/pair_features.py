@@ -55,7 +55,7 @@ class Pairs:
 
     @cached_property
     def gaps(self) -> list[tuple[FloatArray, FloatArray]]:
-        """Distance of the two [cells], and the share of both sides that face each other, along either axis."""
+        """Distance of the two [cells] and the share of both sides that face each other, along either axis."""
         found = []
         for axis in (0, 1):
             along = np.maximum(self.common[..., 1 - axis], 0.0)

@@ -96,7 +96,7 @@ def trace_room(scene: Scene, choice: Choice, corners: FloatArray, openings: Sequ
 
 
 def _name_kind(corners: FloatArray, others: Sequence[FloatArray], grid: OccupancyGrid, thickness: int) -> RoomKind:
-    """Name a room: border beyond what is known, dependent beside another, else independent (paper, 3.3 and 3.6)."""
+    """Name the kind: border beyond what is known, dependent beside another room, else independent (paper, 3.3, 3.6)."""
     x0, y0, x1, y1 = grid.frame.bounds
     low, high = corners.min(axis=0), corners.max(axis=0)
     if low[0] < x0 - BEYOND or low[1] < y0 - BEYOND or high[0] > x1 + BEYOND or high[1] > y1 + BEYOND:

@@ -50,7 +50,7 @@ class Calibration:
     variants: dict[str, FloatArray]
 
     def expect_iou(self, features: FloatArray) -> float:
-        """Expect an IoU of a room with these features, shape (k,)."""
+        """Predict the IoU with the true room from the features of a room, shape (k,)."""
         return float(self.confidence.at(self.intercept + (features - self.mean) @ self.weights))
 
 

@@ -82,7 +82,7 @@ class Model:
 
 
 def seal(content: bytes) -> bytes:
-    """Append its SHA-256 to a network in ONNX, which makes it the file of a network."""
+    """Append its SHA-256 to a network in ONNX: the file of a network as it is written."""
     return content + SEAL + hashlib.sha256(content).digest()
 
 

@@ -22,7 +22,7 @@ WEIGHTS = np.array([2.0, 4.0])
 
 @dataclass(slots=True, eq=False)
 class Rater:
-    """Judge of the rectangles of one map; keeps what the network said, for beliefs and traces.
+    """Judge of one map's rectangles; keeps what the network said, for beliefs and traces.
 
     Attributes:
         model: The network.

@@ -15,7 +15,7 @@ THIN, FILLED = 0.5, 0.5
 
 
 def filter_clutter(grid: OccupancyGrid) -> OccupancyGrid:
-    """Free what stands free of the walls, on a copy of the map.
+    """Clear what stands free of the walls, on a copy of the map: its cells become free.
 
     The spectrum answers weakly at the ends of walls and in short ones; what hangs together with a structural cell
     is kept whole, so that no wall gets a hole through which a path would lead.
@@ -43,7 +43,7 @@ def filter_clutter(grid: OccupancyGrid) -> OccupancyGrid:
 
 
 def free_islands(grid: OccupancyGrid, area: float, doors: Sequence[Point], reach: float) -> OccupancyGrid:
-    """Free furniture that free space surrounds, hollows and all, on a copy of the map.
+    """Clear furniture that free space surrounds, hollows and all: its cells become free.
 
     A table in the middle of a room has straight sides as long as a wall's; its lines part rooms. Where walls are
     looked for it is better gone. Three things that free space surrounds look alike and stay: a piece of wall between

@@ -243,7 +243,7 @@ def _recesses(line: _Line, resolution: float, config: ProposalConfig) -> _Recess
 
 
 def _best(found: _Recesses) -> list[int]:
-    """Keep those that do not overlap a clearer one; ``found`` is sorted, the clearest first."""
+    """Keep recesses that do not overlap a clearer one; ``found`` is sorted, the clearest first."""
     kept: list[int] = []
     for i in range(found.first.size):
         low, high = found.first[i], found.first[i] + found.bins[i]
@@ -260,7 +260,7 @@ def _best(found: _Recesses) -> list[int]:
 def _around(
     grid: OccupancyGrid, line: _Line, low: float, high: float, leaf: float, config: ProposalConfig
 ) -> tuple[float, float]:
-    """Measure the shares of unknown cells behind a leaf (outside the map counts) and of free cells before it."""
+    """Measure the shares of unknown cells behind a leaf (outside the map counts) and of free cells in front of it."""
     frame, resolution = grid.frame, grid.frame.resolution
     s = np.arange(low + 1.5 * resolution, high - resolution, resolution)
 
