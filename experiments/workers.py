@@ -113,7 +113,7 @@ class Crew(Generic[Job, Outcome]):
     def _batch(
         self, work: Callable[[Job], Outcome], jobs: Iterator[Job], begun: dict[int, Job], workers: int
     ) -> Iterator[tuple[Job, Outcome]]:
-        """Hand out jobs, no more at a time than can be worked on, so that ``begun`` names what a death hits."""
+        """Hand out jobs, no more at a time than there are workers: ``begun`` names those under way when one dies."""
         under_way: dict[Future[Outcome], int] = {}
         numbers = count()
         with hire(workers) as pool:
@@ -201,7 +201,7 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def one_thread() -> None:
-    """Limit a worker to one thread: workers share the processors, and a library's own threads would get in the way.
+    """Limit a worker to one thread: workers share the processors, and a library's own threads would only be in the way.
 
     Holds for OpenCV and BLAS, those that are loaded and those that will be.
     """

@@ -126,7 +126,7 @@ def _read_feature(number: int, feature: Any, path: Path) -> Feature:
 
 
 def _check_positions(value: Any, depth: int) -> None:
-    """Make sure that coordinates are lists as deep as their geometry wants, and numbers at the bottom.
+    """Check that coordinates are lists as deep as their geometry wants, and numbers at the bottom.
 
     Raises:
         ValueError: They are not: shapely would take some of them for something else.

@@ -25,7 +25,7 @@ POSES = {"erased": "the scans that make the map", "simulated": "every scan"}
 def card(
     config: DatasetConfig, worlds: Sequence[World], made: Mapping[Split, int], failed: Mapping[str, str], size: int
 ) -> str:
-    """Write the text of ``README.md``.
+    """Compose the text of ``README.md``.
 
     Args:
         config: As given.

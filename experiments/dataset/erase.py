@@ -130,7 +130,7 @@ class Eraser:
         return ErasedMap(self._grid.grid(), doors, kept, tuple(entry.scan for entry in drawn))
 
     def _draw(self, kept: IntArray, ranges: FloatArray, owner: IntArray, closed: tuple[str, ...]) -> None:
-        """Bring the drawing to these scans: keyframes ``kept``, ranges and owners of all keyframes."""
+        """Update the drawing to these scans: keyframes ``kept``, ranges and owners of all keyframes."""
         wanted = set(kept.tolist())
         cut = owner.max(axis=1) >= 0
         for number, before in enumerate(self._drawn):

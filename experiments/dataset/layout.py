@@ -169,7 +169,7 @@ def read_stored_json(store: Store, name: str) -> Any:
 
 
 def json_bytes(value: Any) -> bytes:
-    """Write a value as the JSON that a dataset holds."""
+    """Encode a value as the JSON that a dataset holds."""
     return (json.dumps(value, indent=2, allow_nan=False) + "\n").encode()
 
 

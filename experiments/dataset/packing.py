@@ -120,7 +120,7 @@ def unpack(row: Mapping[str, Any], folder: Path) -> None:
 
 
 def as_bytes(row: "pa.RecordBatch") -> bytes:
-    """Write a row as an Arrow stream: what lies between a worker that makes a sample and one that fills a shard."""
+    """Encode a row as an Arrow stream: what lies between a worker that makes a sample and one that fills a shard."""
     import pyarrow as pa
 
     sink = io.BytesIO()

@@ -56,15 +56,15 @@ class ShardPlan:
         return index >= self._inside and index not in self._sizes
 
     def add(self, index: int, size: int) -> None:
-        """Put down that a part is there."""
+        """Record that a part is there."""
         self._sizes[index] = size
 
     def fail(self, index: int, name: str, reason: str) -> None:
-        """Put down that a sample cannot be made."""
+        """Record that a sample cannot be made."""
         self._failures[index] = (name, reason)
 
     def put(self, shard: Shard) -> None:
-        """Put down that a shard is written."""
+        """Record that a shard is written."""
         self.shards[shard.first] = shard
 
     def ready(self) -> Iterator[Filling]:

@@ -203,7 +203,7 @@ class _Samples:
             yield from plan.ready()
 
     def put_down(self, job: Job, outcome: Outcome | Lost) -> None:
-        """Note what came of a job.
+        """Record what came of a job.
 
         Raises:
             OutputError: Nothing can be written any more.

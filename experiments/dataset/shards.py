@@ -100,7 +100,7 @@ def make_part(part: Part) -> Outcome:
 
 
 def fill(job: Filling) -> Outcome:
-    """Put parts together: write the shard, then what is in it, then remove the parts."""
+    """Fill a shard from its parts: write the shard, then what is in it, then remove the parts."""
     import pyarrow.parquet as pq
 
     store = open_store(job.config.out)

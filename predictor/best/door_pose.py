@@ -157,7 +157,7 @@ def face_door(door: ClosedDoor, turned: TurnedMap, *, reach: float) -> DoorPose 
 
 
 def _sample(mask: BoolArray, at: FloatArray, quarter: int, low: int, high: int) -> BoolArray:
-    """Take the cells between ``low`` and ``high`` cells ahead of a point, :data:`ASIDE` to either side."""
+    """Sample the cells between ``low`` and ``high`` cells ahead of a point, :data:`ASIDE` to either side."""
     inward = np.array([(0, 1), (-1, 0), (0, -1), (1, 0)][quarter], dtype=np.float64)
     along = np.array([inward[1], -inward[0]])
     steps, sides = np.arange(low, high), np.arange(-ASIDE, ASIDE + 1)
@@ -199,7 +199,7 @@ def enter(frame: DoorFrame, pose: DoorPose, poses: Sequence[DoorPose]) -> Entry:
 
 
 def see_doors(frame: DoorFrame, poses: Sequence[DoorPose], entries: Sequence[tuple[DoorFrame, Entry]]) -> DoorsSeen:
-    """See all doors of a map from one frame: where the rooms behind them begin.
+    """Find where the rooms behind all doors of a map begin, as seen from one frame.
 
     Args:
         frame: To see them from.

@@ -75,7 +75,7 @@ def _find_runs(edges: BoolArray) -> tuple[IntArray, IntArray, IntArray]:
 
 
 def _weigh(scene: Scene, choices: Sequence[Choice]) -> tuple[WeighedRoom, ...]:
-    """Take the evidence of every room's candidates apart, beside the rooms that were chosen for the others."""
+    """Split the score of every room's candidates into its evidence, beside the rooms chosen for the others."""
     weighed = []
     for choice in choices:
         own, chosen = choice.options, choice.index

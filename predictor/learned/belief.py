@@ -37,7 +37,7 @@ def believe_cells(belief: Belief, heard: Sequence[tuple[Patch, SeenRoom]]) -> Be
 
 
 def _sample_mask(patch: Patch, seen: SeenRoom, spread: Spread) -> FloatArray:
-    """Take the mask of a patch at the cells of a spread, 0 outside, shape ``spread.share.shape``."""
+    """Sample the mask of a patch at the cells of a spread, 0 outside, shape ``spread.share.shape``."""
     across = np.array([-spread.along[1], spread.along[0]])
     axes = np.array([patch.along, patch.inward]) @ np.stack((spread.along, across), axis=1)
     first = patch.to_patch(spread.origin + (spread.along + across) * spread.resolution / 2)

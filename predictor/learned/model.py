@@ -75,7 +75,7 @@ class Model:
 
     @staticmethod
     def _unfold(part: Any) -> FloatArray:
-        """Bring cells to (n, SIZE, SIZE), columns and rows from groups of :data:`PARTS` to (n, SIZE)."""
+        """Reshape cells to (n, SIZE, SIZE), columns and rows from groups of :data:`PARTS` to (n, SIZE)."""
         if part.ndim == 4:
             return np.asarray(part[:, 0], dtype=np.float64)
         return np.asarray(part.transpose(0, 2, 1).reshape(len(part), SIZE), dtype=np.float64)

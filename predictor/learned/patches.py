@@ -75,7 +75,7 @@ def _cut_patch(turned: TurnedMap, pose: DoorPose, poses: tuple[DoorPose, ...]) -
 
 
 def _take(turned: TurnedMap, corner: IntArray, diagonal: IntArray, quarter: int) -> CellArray:
-    """Take the cells of the turned map under a patch, rows into the room, shape (SIZE * FINE, SIZE * FINE)."""
+    """Sample the cells of the turned map under a patch, rows into the room, shape (SIZE * FINE, SIZE * FINE)."""
     side = SIZE * FINE
     col, row = np.minimum(corner, corner + side * diagonal).tolist()
     rows, cols = turned.free.shape

@@ -118,7 +118,7 @@ def _between(profile: FloatArray, peak: int) -> float:
 
 
 def rose_directions(segments: FloatArray, structure: RoseStructure, config: LinesConfig) -> Directions:
-    """Give each segment the dominant direction that it follows (section 4.2: lines are aligned to them).
+    """Assign each segment the dominant direction that it follows (section 4.2: lines are aligned to them).
 
     Args:
         segments: Ends [m] of segments found in the structural cells, shape (n, 4).
