@@ -22,7 +22,7 @@ POCKETS, POCKET = 6, 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Batch:
-    """Patches and what the network should say of them.
+    """Patches, and what the network should say of them.
 
     Attributes:
         patches: Shape (n, 5, SIZE, SIZE).
@@ -75,7 +75,7 @@ def make_batch(shown: Bytes, masks: Bytes, sides: FloatArray) -> Batch:
 
 
 def blur(at: FloatArray, length: int) -> Floats:
-    """Return probabilities of ``length`` cells around distances [m] of shape (n,), shape (n, length)."""
+    """Compute probabilities of ``length`` cells around distances [m] of shape (n,), shape (n, length)."""
     centres = (np.arange(length) + 0.5) * CELL
     inside = np.clip(at, centres[0], centres[-1])
     weight = np.exp(-0.5 * ((centres - inside[:, None]) / BLUR) ** 2)
