@@ -34,7 +34,7 @@ SIZES = ((40.0, 30.0), (100.0, 75.0), (200.0, 150.0))
 
 
 def office(width: float, height: float, *, pillars: int = 0, resolution: float = 0.05, seed: int = 0) -> OccupancyGrid:
-    """Build corridors of 2.4 m, joined by one along each side, and rooms of 3 to 7 m x 6 m behind doors of 0.9 m."""
+    """Build corridors of 2.4 m that a corridor along each side joins; rooms of 3 to 7 m x 6 m, doors of 0.9 m."""
     draws = stream(seed, "benchmark office")
     cells = np.full((round(height / resolution), round(width / resolution)), OCCUPIED, dtype=np.int8)
 

@@ -176,7 +176,7 @@ def predictions(
 def collect(
     folders: list[Path], method: str, every: int, held_out: set[str] | None
 ) -> tuple[Collected, dict[str, FloatArray]]:
-    """Go through the samples: every third tells how often each variant is right, the others how sure to be then."""
+    """Collect from every third sample how often each variant is right, from the others how sure to be then."""
     collected = Collected()
     waiting: list[tuple[Sample, Prediction]] = []
     variants: dict[str, FloatArray] = {}

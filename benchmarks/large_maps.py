@@ -31,7 +31,7 @@ RESOLUTION = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """Choices of what to measure."""
+    """Options of a measurement."""
 
     runs: tyro.conf.Positional[tuple[Path, ...]]
     """Folders with a map and its doors."""

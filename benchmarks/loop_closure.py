@@ -42,7 +42,7 @@ COLUMNS = (
 
 
 def mapped(run: RecordedRun, config: MapperConfig) -> Mapper:
-    """Run the mapper on all scans of a run."""
+    """Map all scans of a run."""
     mapper = Mapper(config)
     for scan, odometry in zip(run.scans, run.odometry, strict=True):
         mapper.process(scan, Pose2(*odometry))

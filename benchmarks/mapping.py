@@ -64,7 +64,7 @@ def since(start: tuple[float, float]) -> tuple[float, float]:
 
 
 def mapped(run: RecordedRun, config: MapperConfig) -> tuple[Mapper, FloatArray, tuple[float, float]]:
-    """Run the mapper on a run: the mapper, the poses as estimated at the time, processor and wall-clock time [s]."""
+    """Map a run: the mapper, the poses as estimated at the time, processor and wall-clock time [s]."""
     mapper = Mapper(config)
     start = clocks()
     taken = zip(run.scans, run.odometry, prepare_scans(run.scans, config), strict=True)

@@ -26,7 +26,7 @@ from closedrooms.predictor.methods import predict
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """Choices of what to measure."""
+    """Options of a measurement."""
 
     folder: tyro.conf.Positional[Path]
     """Where the samples are, at any depth."""

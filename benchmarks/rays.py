@@ -79,7 +79,7 @@ def medians(ways: dict[str, Callable[[], object]], repeats: int) -> dict[str, fl
 
 
 def bare_batches(physics: PhysicsWorld, poses: list[Pose2], lidar: LidarConfig) -> Callable[[], object]:
-    """Prepare ``rayTestBatch`` on lists made beforehand, results thrown away: what PyBullet itself takes."""
+    """Prepare calls of ``rayTestBatch`` on ready lists, results thrown away: what PyBullet itself takes."""
     bullet, client = physics._bullet, physics._client
     angles = lidar.angle_min + lidar.angle_increment * np.arange(lidar.beams)
     batches = []

@@ -40,7 +40,7 @@ RULES: dict[str, Callable[[FloatArray, FloatArray], BoolArray]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """Choices of what to compare."""
+    """Options of a comparison."""
 
     samples: tyro.conf.Positional[tuple[Path, ...]]
     """Folders with a map and its doors."""

@@ -37,7 +37,7 @@ PLOTS = {"TimeSeries", "BarChart", "StateTimeline"}
 
 @dataclass(frozen=True, kw_only=True)
 class ScreenshotConfig:
-    """Options of what to show."""
+    """Options of the pictures."""
 
     recording: Annotated[Path, tyro.conf.Positional]
     """The ``.rrd`` file."""
@@ -174,7 +174,7 @@ def _name(content: dict[str, Any]) -> str:
 
 
 def _places(blueprint: dict[str, Any], path: str, area: Area) -> Iterator[tuple[str, Area]]:
-    """Find ids of the views on the tabs in front, and what of the window each takes, below its own title."""
+    """Find the ids of the views on the tabs in front, and what of the window each takes, below its own title."""
     x0, y0, x1, y1 = area
     container = _containers(blueprint).get(path)
     if container is None:
@@ -206,7 +206,7 @@ def _root(blueprint: dict[str, Any]) -> str:
 
 
 def _find_empty(viewer: ViewerClient, blueprint: dict[str, Any], picture: Image.Image) -> Iterator[str]:
-    """Find names of the views that show nothing, and what the viewer complains of."""
+    """Find the names of the views that show nothing, and what the viewer complains of."""
     pixels = np.array(picture).astype(int)
     views = {view.view_id: view for view in viewer.get_state().views}
     area = (0.0, float(MENU), float(picture.width), float(picture.height - TIME_PANEL))

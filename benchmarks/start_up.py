@@ -26,7 +26,7 @@ SIMULATED = ("run", "dataset", "evaluate")
 
 
 def commands(folder: Path) -> dict[str, tuple[str, ...]]:
-    """List command lines by name; OUT is where each call writes."""
+    """List the command lines by name; OUT is where each call writes."""
     doors = str(folder / "doors.geojson")
     truth = str(folder / "truth.yaml")
     # Without physics, where it can be chosen: the same work in every version.

@@ -63,7 +63,7 @@ class Extras:
     """Work beside predicting and scoring.
 
     Attributes:
-        tours: Plan coverage tours, where the sample tells |R|.
+        tours: Plan coverage tours, where the sample tells ``|R|``.
         probability: Write each cell's probability.
         completions: Tell the cost of coverage from so many completions.
     """
@@ -99,7 +99,7 @@ def evaluate_sample(
         sample: The sample.
         methods: Methods; the authors' own map is scored too where the sample has it.
         out: Folder of the evaluation.
-        tours: Plan coverage tours too, where the sample's run.json tells |R|.
+        tours: Plan coverage tours too, where the sample's run.json tells ``|R|``.
         probability: Write each cell's probability too (``probability.{yaml,png}``).
         completions: Tell the cost of coverage as a distribution too, from so many completions.
 

@@ -43,7 +43,7 @@ class Sample:
         world: Building.
         repetition: Repetition, 0 where nothing names it.
         closed: Closed doors, those that the robot did not see included; the doors of the map where nothing tells.
-        rooms_seen: |R| of section 5.2, ``None`` where no run.json tells.
+        rooms_seen: ``|R|`` of section 5.2, ``None`` where no run.json tells.
     """
 
     observed: OccupancyGrid

@@ -36,7 +36,7 @@ class Batch:
 
 
 def draw_batches(examples: Examples, of: IntArray, size: int, seed: int, epoch: int) -> Iterator[Batch]:
-    """Go through examples once: each in its turn, as it is or mirrored, with pockets in known space.
+    """Draw batches in random order, each example as it is or mirrored, with pockets in known space.
 
     Args:
         examples: All.
@@ -60,7 +60,7 @@ def draw_batches(examples: Examples, of: IntArray, size: int, seed: int, epoch: 
 
 
 def still_batches(examples: Examples, of: IntArray, size: int) -> Iterator[Batch]:
-    """Go through examples in their order, as they are."""
+    """Yield the examples in their order, as they are."""
     for first in range(0, len(of), size):
         chosen = of[first : first + size]
         yield make_batch(examples.shown[chosen], examples.masks[chosen], examples.sides[chosen])

@@ -55,7 +55,7 @@ class Examples:
         return len(self.groups)
 
     def digest(self) -> str:
-        """Compute the SHA-256 of everything."""
+        """Compute the SHA-256 of names and arrays."""
         total = hashlib.sha256(repr(self.names).encode())
         for part in (self.shown, self.masks, self.sides, self.groups):
             total.update(np.ascontiguousarray(part).tobytes())
@@ -64,7 +64,7 @@ class Examples:
 
 @dataclass(slots=True, eq=False)
 class Gathered:
-    """Outcome of gathering: what became of the samples.
+    """Outcome of reading samples.
 
     Attributes:
         examples: Doors with their rooms.

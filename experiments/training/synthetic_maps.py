@@ -81,7 +81,7 @@ def draw_map(plan: FloorPlan, closed: Sequence[str], rng: np.random.Generator, *
 
 
 def _observe(reached: BoolArray, rng: np.random.Generator) -> CellArray:
-    """Draw the cells of the map where ``reached`` is the floor that can be reached, both of shape (rows, cols)."""
+    """Draw the cells of a map whose reachable floor is ``reached``, both of shape (rows, cols)."""
     shape = reached.shape
     field = [_smooth_field(shape, BEND_LENGTH, rng) * BEND / RESOLUTION for _ in range(2)]
     y, x = np.indices(shape, dtype=np.float32)

@@ -97,7 +97,7 @@ class Training:
 
     @property
     def best_epoch(self) -> Epoch:
-        """The one with the smallest loss on the buildings held out, the first of several."""
+        """Epoch with the smallest loss on the buildings held out, the first of several."""
         return min(self.epochs, key=lambda epoch: epoch.held_loss)
 
     @property
