@@ -126,7 +126,7 @@ def paired(
 
 
 def _wilcoxon(differences: FloatArray) -> float:
-    """Compute the two-sided p of Wilcoxon's signed-rank test, zeros after Pratt; 1 when all are zero."""
+    """Compute the two-sided p of Wilcoxon's signed-rank test with Pratt's treatment of zeros; 1 when all are zero."""
     from scipy.stats import wilcoxon
 
     if not np.abs(differences).max() > 0.0:

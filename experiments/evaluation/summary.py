@@ -37,7 +37,7 @@ def grouped(scores: Sequence[Scores], key: str) -> dict[Any, list[Scores]]:
 
 
 def headline(scores: Sequence[Scores]) -> str:
-    """Choose the measure that heads the report: on the authors' maps, with rooms without a door, matched rooms."""
+    """Choose the headline measure: of authors' maps, whose truth has rooms without a door, the matched rooms."""
     return "matched" if any("agreement" in score for score in scores) else "by_door"
 
 
@@ -109,7 +109,7 @@ def estimates(scores: Sequence[Scores]) -> dict[str, list[Scores]]:
 
 
 def world_rows(scores: Sequence[Scores]) -> list[Row]:
-    """Summarise each building and method: largest number of closed doors (table 1), IoU, coverage error."""
+    """Summarise each building and method: largest number of closed doors (paper, table 1), IoU, coverage error."""
     rows = []
     for world, own in grouped(scores, "world").items():
         for method, group in grouped(own, "method").items():
@@ -123,7 +123,7 @@ def world_rows(scores: Sequence[Scores]) -> list[Row]:
 
 
 def paired_rows(scores: Sequence[Scores], config: EvaluateConfig) -> list[Row]:
-    """Test every method against the first of paper, best and rose: IoU and coverage error, in pairs."""
+    """Compare every method with the first of paper, best and rose in paired tests: IoU and coverage error."""
     methods = grouped(scores, "method")
     reference = next((method for method in REFERENCES if method in methods), None)
     if reference is None:
@@ -152,7 +152,7 @@ def _figure(scores: Sequence[Scores], name: str) -> dict[str, float]:
 
 
 def room_rows(scores: Sequence[Scores]) -> list[Row]:
-    """List each room and measure; a hidden room whose door was not seen counts 0 in a measure of its own."""
+    """List the IoU by room and measure; a hidden room whose door was not seen counts 0 in a measure of its own."""
     rows: list[Row] = []
     for score in scores:
         head = {name: score[name] for name in ("method", "sample", "world", "repetition", "closed_doors")}
@@ -166,7 +166,7 @@ def room_rows(scores: Sequence[Scores]) -> list[Row]:
 
 
 def sample_rows(scores: Sequence[Scores]) -> list[Row]:
-    """List each sample and method."""
+    """List the figures of each sample and method."""
     rows: list[Row] = []
     for score in scores:
         names = ("method", "sample", "world", "repetition", "closed_doors", "doors", "hidden_share")

@@ -26,7 +26,7 @@ BAR_COLOURS: dict[str, Colour] = {CHOSEN: colours.ESTIMATE, RUNNER_UP: colours.L
 
 
 def room_name(room: "WeighedRoom") -> str:
-    """Name a room as in entity paths."""
+    """Name a room for entity paths."""
     return rr.escape_entity_path_part("+".join(room.doors))
 
 
