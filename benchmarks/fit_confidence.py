@@ -60,7 +60,7 @@ class Collected:
 
 
 def learn_variants(collected: Collected, sample: Sample, prediction: Prediction) -> None:
-    """Count which variant of every room came nearest to the true room."""
+    """Measure how near each variant of every room comes to the true room, against the nearest."""
     doors = {door.id: door for door in sample.doors}
     truth = {door: room.polygon for room in sample.rooms for door in room.doors}
     for room in prediction.rooms:

@@ -154,7 +154,7 @@ def _choices(blueprint: dict[str, Any], path: str) -> Iterator[tuple[str, list[t
 
 
 def _containers(blueprint: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Read containers by path; of one value in a list the viewer gives the value alone."""
+    """Collect containers by path; of one value in a list the viewer gives the value alone."""
     lists = ("contents", "col_shares", "row_shares")
     return {
         path: {

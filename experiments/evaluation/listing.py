@@ -112,7 +112,7 @@ def _listed(dataset: Path, manifest: Mapping[str, Any]) -> Iterator[SamplePath]:
 
 
 def _digests(dataset: Path) -> dict[str, str]:
-    """Read SHA-256 by path, as far as ``SHA256SUMS`` tells."""
+    """Read the SHA-256 of files by path, as far as ``SHA256SUMS`` tells."""
     from closedrooms.experiments.dataset.layout import SUMS
 
     path = dataset / SUMS

@@ -450,7 +450,7 @@ def _known_bounds(grid: OccupancyGrid) -> Bounds | None:
 
 
 def _rooms_table(prediction: "Prediction") -> str:
-    """Write what stands under ``result`` until the run's own table comes."""
+    """Write the table that stands under ``result`` until the run's own comes."""
     rows = [
         [", ".join(room.doors), room.kind or "", f"{room.polygon.area:.1f} m²", "cut" if room.bounded else ""]
         for room in prediction.rooms

@@ -125,7 +125,7 @@ def _draw_bars(stream: RecordingStream, room: "WeighedRoom") -> None:
 
 
 def _candidates_table(rooms: Sequence["WeighedRoom"]) -> str:
-    """List the chosen candidate and the best others of each room."""
+    """Write a table of the chosen candidate and the best others of each room."""
     lines = ["| doors | candidate | size [m] | score by itself | beside its neighbours |"]
     lines.append("| --- | --- | ---: | ---: | ---: |")
     for room in rooms:
