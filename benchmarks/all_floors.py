@@ -46,7 +46,7 @@ HEAD = (
 
 @dataclass(frozen=True)
 class Floor:
-    """One floor: what to run, and its size [m]."""
+    """Floor to run, and its size [m]."""
 
     name: str
     path: str
@@ -59,7 +59,7 @@ class Floor:
 
 @dataclass(frozen=True)
 class Spent:
-    """One process: exit status (negative: the signal that ended it), seconds, megabytes, last line of its errors."""
+    """Cost of a process: exit status (negative: the signal that ended it), seconds, megabytes, last line of errors."""
 
     status: int
     wall: float
@@ -69,7 +69,7 @@ class Spent:
 
 
 def find_floors(folder: Path) -> tuple[list[Floor], dict[str, str]]:
-    """Every floor below a folder, the largest first, and the files that could not be read with the reason."""
+    """Find every floor below a folder, the largest first, and the unreadable files with the reason."""
     floors, broken = [], {}
     for path in sorted(p for p in folder.rglob("*") if p.suffix in {".xml", ".yaml", ".json"}):
         for level in levels_of(path):
@@ -86,7 +86,7 @@ def find_floors(folder: Path) -> tuple[list[Floor], dict[str, str]]:
 
 
 def levels_of(path: Path) -> list[str | None]:
-    """Names of the levels of an RMF building, ``[None]`` for every other file."""
+    """List the names of the levels of an RMF building, ``[None]`` for every other file."""
     import yaml
 
     if not path.name.endswith(".building.yaml"):
@@ -125,7 +125,7 @@ def spend(words: list[str], limit: float) -> Spent:
 
 
 def run_floor(floor: Floor, out: Path, options: argparse.Namespace) -> None:
-    """Both processes of a floor, where their results are not there yet; what they cost goes beside them."""
+    """Run both processes of a floor, where their results are not there yet; what they cost goes beside them."""
     folder, paper = out / floor.name, out / f"{floor.name}-paper"
     level = ["--level", floor.level] if floor.level else []
     close = ["--close", str(min(options.close, floor.closable)), "--noise", options.noise, "--seed", str(options.seed)]
@@ -143,7 +143,7 @@ def note(out: Path, name: str, spent: Spent) -> None:
 
 
 def row(floor: Floor, out: Path) -> list[str]:
-    """The table's cells of one floor."""
+    """Build the table's cells of one floor."""
     size = [floor.name, f"{floor.width:.0f} x {floor.height:.0f}", str(floor.rooms)]
     spent = Spent(**read(out / f"{floor.name}.json")) if (out / f"{floor.name}.json").exists() else None
     cost = ["", "", ""] if spent is None else [f"{spent.wall:.0f}", f"{spent.cpu:.0f}", f"{spent.memory:.0f}"]
@@ -177,7 +177,7 @@ def remark_of(status: str, doors: dict[str, Any], notes: list[str]) -> str:
 
 
 def paper_iou(floor: Floor, out: Path, seen: set[str]) -> float | None:
-    """Mean IoU by door of the method ``paper`` on the map of the run."""
+    """Measure the mean IoU by door of the method ``paper`` on the map of the run."""
     predicted = out / f"{floor.name}-paper" / "rooms.geojson"
     if not predicted.exists():
         return None
@@ -194,7 +194,7 @@ def _figure(value: float | None) -> str:
 
 
 def summary(rows: list[list[str]]) -> list[list[str]]:
-    """Mean and worst of every column of figures."""
+    """Compute mean and worst of every column of figures."""
     worst = {"area mapped [%]": min, "IoU best": min, "IoU paper": min}
     lines = []
     for name in ("mean", "worst"):

@@ -26,7 +26,7 @@ NOISES = (0.0, 0.01, COST_NOISE, 0.02)
 
 
 def measure(sample: Sample, method: str, count: int) -> list[tuple[bool, float]]:
-    """Whether the interval holds the true cost, and its width [percent of it], for each of the noises."""
+    """Check whether the interval holds the true cost, and measure its width [percent of it], for each noise."""
     prediction, _ = predict_with(method, sample)
     tour = plan_tour(prediction.grid)
     truth = plan_tour(sample.truth, start=find_start(sample, tour)).length

@@ -34,7 +34,7 @@ SIZES = ((40.0, 30.0), (100.0, 75.0), (200.0, 150.0))
 
 
 def office(width: float, height: float, *, pillars: int = 0, resolution: float = 0.05, seed: int = 0) -> OccupancyGrid:
-    """Corridors of 2.4 m that a corridor along each side joins, rooms of 3 to 7 m x 6 m behind doors of 0.9 m."""
+    """Build corridors of 2.4 m that a corridor along each side joins; rooms of 3 to 7 m x 6 m, doors of 0.9 m."""
     draws = stream(seed, "benchmark office")
     cells = np.full((round(height / resolution), round(width / resolution)), OCCUPIED, dtype=np.int8)
 
@@ -67,7 +67,7 @@ def office(width: float, height: float, *, pillars: int = 0, resolution: float =
 
 
 def measured(run: Callable[[], Any], repeats: int = 3) -> tuple[float, Any]:
-    """Least CPU time of some runs [s], and what the last one gave; one run when it takes over 2 s."""
+    """Measure the least CPU time of some runs [s], with the last result; one run when it takes over 2 s."""
     best, result = np.inf, None
     for _ in range(repeats):
         began = time.process_time()
@@ -79,7 +79,7 @@ def measured(run: Callable[[], Any], repeats: int = 3) -> tuple[float, Any]:
 
 
 def plain_trace(skeleton: BoolArray) -> "nx.Graph[Any]":
-    """The paper's way, cell by cell: every skeleton cell a networkx vertex, chains contracted one vertex at a time."""
+    """Trace as the paper does, cell by cell: a networkx vertex a skeleton cell, chains contracted one at a time."""
     graph: nx.Graph[Any] = nx.Graph()
     for row in range(skeleton.shape[0]):
         for col in range(skeleton.shape[1]):
@@ -98,7 +98,7 @@ def plain_trace(skeleton: BoolArray) -> "nx.Graph[Any]":
 
 
 def plain_two_opt(distances: FloatArray) -> list[int]:
-    """Nearest neighbour, then 2-opt with two plain loops until nothing improves."""
+    """Find a tour: nearest neighbour, then 2-opt with two plain loops until nothing improves."""
     d, n = distances.tolist(), len(distances)
     tour, left = [0], set(range(1, n))
     while left:
@@ -117,7 +117,7 @@ def plain_two_opt(distances: FloatArray) -> list[int]:
 
 
 def networkx_christofides(distances: FloatArray) -> list[int]:
-    """Christofides of networkx itself on the complete graph."""
+    """Run the Christofides algorithm of networkx itself on the complete graph."""
     n = len(distances)
     full: nx.Graph[Any] = nx.Graph()
     full.add_weighted_edges_from((i, j, float(distances[i, j])) for i in range(n) for j in range(i + 1, n))

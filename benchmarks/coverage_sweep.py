@@ -51,7 +51,7 @@ Row = dict[str, str]
 
 
 def samples(world: str, seed: int, done: set[int], out: Path, noise: str) -> Iterator[Row]:
-    """The rows of one world and seed that are not there yet."""
+    """Measure the rows of one world and seed that are not there yet."""
     plan = load_world(world)
     closable = [doors[0] for doors in closable_rooms(plan).values()]
     order = [closable[i] for i in stream(seed, "closed doors", plan.name).permutation(len(closable))]
@@ -86,7 +86,7 @@ def samples(world: str, seed: int, done: set[int], out: Path, noise: str) -> Ite
 
 
 def errors(row: Row) -> dict[str, float]:
-    """The errors of one row in percent, by kind of estimate."""
+    """Compute the errors of one row in percent, by kind of estimate."""
     found: dict[str, float | None] = {}
     for method in METHODS:
         figures = compare_lengths(
@@ -98,7 +98,7 @@ def errors(row: Row) -> dict[str, float]:
 
 
 def report(rows: list[Row]) -> Iterator[str]:
-    """Markdown: all errors beside the paper's, by share of closed doors, and the worst."""
+    """Write Markdown: all errors beside the paper's, by share of closed doors, and the worst."""
     table = [errors(row) for row in rows]
     yield f"{len(rows)} maps of {len({row['world'] for row in rows})} worlds"
     yield ""
@@ -124,7 +124,7 @@ def report(rows: list[Row]) -> Iterator[str]:
 
 
 def draw(rows: list[Row], picture: Path) -> None:
-    """Figure 12: each error against the number of closed doors."""
+    """Draw figure 12: each error against the number of closed doors."""
     import matplotlib as mpl
 
     mpl.use("Agg")

@@ -33,7 +33,7 @@ HEAD = ("samples", "shards", "CPU ms a sample", "wall s", "command MB", "worker 
 
 
 def make_nothing(job: Task | Part | Filling) -> Outcome:
-    """A part with nothing in it; shards are filled as always."""
+    """Make a part with nothing in it; shards are filled as always."""
     import pyarrow as pa
 
     if isinstance(job, Filling):

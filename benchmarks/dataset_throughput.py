@@ -79,7 +79,7 @@ def make(words: list[str], out: Path, pids: list[int]) -> Cost:
 
 
 def everybody(pids: list[int]) -> list[int]:
-    """Processes and all that they have begun."""
+    """List processes and all that they have begun."""
     found = []
     for pid in pids:
         found.append(pid)
@@ -89,14 +89,14 @@ def everybody(pids: list[int]) -> list[int]:
 
 
 def used(pid: int) -> float:
-    """User and system time of a process so far [s]."""
+    """Measure user and system time of a process so far [s]."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()
     return (int(fields[11]) + int(fields[12])) / TICKS
 
 
 @contextmanager
 def cluster(folder: Path) -> Iterator[tuple[str, list[int]]]:
-    """A scheduler and two workers with one thread each, as docs/datasets.md starts them: address and processes."""
+    """Start a scheduler and two workers of one thread, as docs/datasets.md does; yield address and processes."""
     where = folder / "scheduler.json"
     common = ["--no-dashboard", "--scheduler-file", str(where)]
     scheduler = [sys.executable, "-m", "dask", "scheduler", "--host", "127.0.0.1", "--port", "0", *common]

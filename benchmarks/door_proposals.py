@@ -79,7 +79,7 @@ def table(title: str, samples: list[Sample]) -> None:
 
 
 def fit(samples: list[Sample]) -> None:
-    """The regression whose coefficients stand in door_proposals.py."""
+    """Fit the regression whose coefficients stand in door_proposals.py."""
     from sklearn.linear_model import LogisticRegression
 
     pairs = [pair for sample in samples for pair in sample.found]

@@ -27,7 +27,7 @@ MOST_CLOSED, TURNED = 12, 0.2
 
 
 def find_plans(args: argparse.Namespace) -> Iterator[tuple[str, FloorPlan]]:
-    """Plans of the use asked for, by name."""
+    """Find the plans of the use asked for, by name."""
     known = {name for group in read_groups() for name in group.buildings}
     for path in sorted(args.plans.rglob("*.xml")):
         if path.stem in known and use_of(path.stem) == args.use:

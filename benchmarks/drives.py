@@ -21,7 +21,7 @@ HEAD = (
 
 
 def driven(name: str, out: Path, options: argparse.Namespace) -> dict[str, Any]:
-    """The ``metrics`` of one run, made unless it is there."""
+    """Read the ``metrics`` of one run, made unless it is there."""
     world, _, seed = name.partition(":")
     folder = out / f"{Path(world).stem}-{seed or 0}"
     if not (folder / "run.json").exists():
@@ -57,14 +57,14 @@ def row(name: str, metrics: dict[str, Any]) -> list[str]:
 
 
 def doors_row(name: str, metrics: dict[str, Any]) -> list[str]:
-    """IoU behind each door as planned, and at the end, when it had been opened and driven into."""
+    """Compare IoU behind each door as planned, and at the end, when it had been opened and driven into."""
     before, after = metrics["room_iou"], metrics["drive"]["room_iou_end"]
     pairs = [f"{door} {before[door]:.2f} to {after.get(door, 0.0):.2f}" for door in sorted(before)]
     return [name.replace(":", ", seed "), ", ".join(pairs)]
 
 
 def montage(folders: list[Path], picture: Path, *, width: int = 760) -> None:
-    """The pictures of the driven ways, two in a row."""
+    """Join the pictures of the driven paths, two in a row."""
     from PIL import Image, ImageDraw
 
     from closedrooms.visualization.canvas import font
@@ -84,7 +84,7 @@ def montage(folders: list[Path], picture: Path, *, width: int = 760) -> None:
             draw.text((column * (width + 12) + 4, y + 16), name, fill="black", font=font(18), anchor="lm")
             sheet.paste(tile, (column * (width + 12), y + 32))
         y += height
-    # Few colours are left of maps and ways: a palette keeps the file small.
+    # Few colours are left of maps and paths: a palette keeps the file small.
     sheet.quantize(128).save(picture, optimize=True)
 
 

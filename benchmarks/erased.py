@@ -33,7 +33,7 @@ KNOWN, HIDDEN, PREDICTED = 0.97, 0.95, 0.03
 
 
 def chosen(config: DatasetConfig) -> list[Variant]:
-    """Four samples of each world: one door, a third, two thirds and all of the doors closed."""
+    """Choose four samples of each world: one door, a third, two thirds and all of the doors closed."""
     variants = []
     for world in find_worlds(config):
         order = list(find_variants(world, config))
@@ -43,7 +43,7 @@ def chosen(config: DatasetConfig) -> list[Variant]:
 
 
 def build(out: Path, maps: MapSource, workers: int, worlds: tuple[str, ...] = WORLDS) -> list[tuple[Variant, Path]]:
-    """Make the samples one way; those that failed are named and left out."""
+    """Make the samples from one source of maps; those that failed are named and left out."""
     config = DatasetConfig(worlds=worlds, out=out.resolve() / maps, repetitions=1, maps=maps)
     variants = chosen(config)
     tasks = [Task(config, world) for world in find_worlds(config)] if maps == "erased" else []
@@ -56,14 +56,14 @@ def build(out: Path, maps: MapSource, workers: int, worlds: tuple[str, ...] = WO
 
 
 def prediction_iou(folder: Path) -> float:
-    """Mean IoU by door of the method ``paper``; a room whose door was not seen counts 0."""
+    """Measure the mean IoU by door of the method ``paper``; a room whose door was not seen counts 0."""
     prediction = predict(read_map(folder / "map.yaml"), read_doors(folder / "doors.geojson"), "paper")
     figures = room_iou(prediction.rooms, read_rooms(folder / "truth_rooms.geojson"))
     return float(np.mean(list(figures.values())))
 
 
 def compare(erased: Path, simulated: Path) -> tuple[float, float, float, float]:
-    """IoU of the known areas and of the hidden rooms, and the two prediction IoUs."""
+    """Measure IoU of the known areas and of the hidden rooms, and the two prediction IoUs."""
     first, truth, second = (read_map(path) for path in (
         erased / "map.yaml", erased / "truth.yaml", simulated / "map.yaml",
     ))  # fmt: skip
@@ -75,7 +75,7 @@ def compare(erased: Path, simulated: Path) -> tuple[float, float, float, float]:
 
 
 def main() -> None:
-    """Make, compare, print."""
+    """Make both kinds of samples, compare them, print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--workers", type=int, default=2)

@@ -2,8 +2,8 @@
 
     python benchmarks/exploration.py [WORLD ...] [--noise medium] [--close 5] [--seed 0] [--quick]
 
-Prints one row a world: status, simulated seconds, way, plans, share of the reachable free cells that is known at the
-end, trajectory error, doors seen, and milliseconds a scan for sensing, mapping and navigating.
+Prints one row a world: status, simulated seconds, travelled distance, plans, share of the reachable free cells that is
+known at the end, trajectory error, doors seen, and milliseconds a scan for sensing, mapping and navigating.
 """
 
 import argparse

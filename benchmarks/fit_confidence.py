@@ -49,7 +49,7 @@ KINDS = ("independent", "dependent", "border", "none")
 
 @dataclass
 class Collected:
-    """What the rooms of one method showed, room by room or cell by cell."""
+    """Observations of the rooms of one method, room by room or cell by cell."""
 
     features: list[FloatArray] = field(default_factory=list)
     ious: list[float] = field(default_factory=list)
@@ -60,7 +60,7 @@ class Collected:
 
 
 def learn_variants(collected: Collected, sample: Sample, prediction: Prediction) -> None:
-    """Which variant of every room came nearest to the true room."""
+    """Measure how near each variant of every room comes to the true room, against the nearest."""
     doors = {door.id: door for door in sample.doors}
     truth = {door: room.polygon for room in sample.rooms for door in room.doors}
     for room in prediction.rooms:
@@ -72,7 +72,7 @@ def learn_variants(collected: Collected, sample: Sample, prediction: Prediction)
 
 
 def smooth(shares: list[FloatArray]) -> FloatArray:
-    """Shares of the variants, the same for left and right."""
+    """Smooth the shares of the variants, the same for left and right."""
     mean = np.mean(shares, axis=0) if shares else np.zeros(len(FACTORS))
     places = {tuple(factors): place for place, factors in enumerate(FACTORS.tolist())}
     mirrored = [places[right, left, depth] for left, right, depth in FACTORS.tolist()]
@@ -83,7 +83,7 @@ def smooth(shares: list[FloatArray]) -> FloatArray:
 
 
 def learn_rooms(collected: Collected, sample: Sample, prediction: Prediction, beliefs: list[Belief]) -> None:
-    """Features and IoU of every room, and which of its shapes came nearest."""
+    """Measure features and IoU of every room, and which of its shapes came nearest."""
     truth = {door: room.polygon for room in sample.rooms for door in room.doors}
     measured = measure_rooms(sample.observed, prediction.rooms, beliefs)
     for room, belief, features in zip(prediction.rooms, beliefs, measured, strict=True):
@@ -101,7 +101,7 @@ def learn_rooms(collected: Collected, sample: Sample, prediction: Prediction, be
 
 
 def learn_cells(collected: Collected, sample: Sample, beliefs: list[Belief]) -> None:
-    """Where rooms were thought to be, and where they are; a sixteenth of all cells."""
+    """Sample where rooms were thought to be, and where they are; a sixteenth of all cells."""
     frame, joint = join_spreads(sample.observed.frame, beliefs)
     asked = cells_asked(sample.observed, sample.doors)
     thought = on_frame(joint, frame, sample)
@@ -112,7 +112,7 @@ def learn_cells(collected: Collected, sample: Sample, beliefs: list[Belief]) -> 
 
 
 def on_frame(values: FloatArray, frame: GridFrame, sample: Sample) -> FloatArray:
-    """Values of one frame on that of the sample, 0 outside."""
+    """Copy values of one frame to that of the sample, 0 outside."""
     own = sample.observed.frame
     out = np.zeros(own.shape)
     row = round((frame.origin_y - own.origin_y) / own.resolution)
@@ -124,7 +124,7 @@ def on_frame(values: FloatArray, frame: GridFrame, sample: Sample) -> FloatArray
 
 
 def knots(x: FloatArray, y: FloatArray) -> list[list[float]]:
-    """A growing curve through a few knots: isotonic regression, read at equal shares of the values."""
+    """Fit a growing curve through a few knots: isotonic regression, read at equal shares of the values."""
     curve = IsotonicRegression(out_of_bounds="clip").fit(x, y)
     edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, KNOTS)))
     if len(edges) < 2:
@@ -136,7 +136,7 @@ def knots(x: FloatArray, y: FloatArray) -> list[list[float]]:
 
 
 def fit(collected: Collected, variants: dict[str, FloatArray]) -> dict[str, Any]:
-    """The numbers of one method."""
+    """Fit the numbers of one method."""
     x, y = np.array(collected.features), np.array(collected.ious)
     mean, scale = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-6)
     model = Ridge(alpha=RIDGE)
@@ -160,7 +160,7 @@ def fit(collected: Collected, variants: dict[str, FloatArray]) -> dict[str, Any]
 def predictions(
     folders: list[Path], method: str, every: int, held_out: set[str] | None
 ) -> Iterator[tuple[Sample, Prediction]]:
-    """Samples with the raw prediction of a method."""
+    """Yield samples with the raw prediction of a method."""
     chosen = find_method(method)
     for path in find_samples(folders)[::every]:
         sample = read_sample(path)
@@ -176,7 +176,7 @@ def predictions(
 def collect(
     folders: list[Path], method: str, every: int, held_out: set[str] | None
 ) -> tuple[Collected, dict[str, FloatArray]]:
-    """Go through the samples: every third tells how often each variant is right, the others how sure to be then."""
+    """Collect from every third sample how often each variant is right, from the others how sure to be then."""
     collected = Collected()
     waiting: list[tuple[Sample, Prediction]] = []
     variants: dict[str, FloatArray] = {}

@@ -36,7 +36,7 @@ def group_of(building: str) -> str:
 
 
 def measure(sample: Sample) -> list[tuple[FloatArray, bool]]:
-    """What every set of doors of a sample shows, and whether they share a room."""
+    """Measure what every set of doors of a sample shows, and whether they share a room."""
     owner = {door: number for number, room in enumerate(sample.rooms) for door in room.doors}
     scene = prepare(sample.observed, sample.doors, BestConfig())
     names = [pose.facing.door.id for pose in scene.poses]

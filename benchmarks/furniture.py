@@ -30,7 +30,7 @@ METHODS = ("paper", "rose", "best")
 
 
 def figures(world: str, share: float, sets: int, closed: int) -> list[float]:
-    """Mean IoU by door of each method, furniture as it is and counted as free."""
+    """Measure the mean IoU by door of each method, furniture as it is and counted as free."""
     plan = load_world(world)
     drive = record_drive(furnished(plan, share, 0), SimConfig(), MapperConfig(), NavigationConfig(), 0)
     eraser = Eraser(map_drive(drive, NOISE_LEVELS["medium"], MapperConfig(), 0))

@@ -31,7 +31,7 @@ RESOLUTION = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """What to measure."""
+    """Options of a measurement."""
 
     runs: tyro.conf.Positional[tuple[Path, ...]]
     """Folders with a map and its doors."""
@@ -70,7 +70,7 @@ def tile(runs: tuple[Path, ...], cells: int, doors: int, folder: Path) -> None:
 
 
 def measure(method: str, folder: Path) -> tuple[float, float, int]:
-    """Seconds of processor time, megabytes at the peak and rooms of one method in a process of its own."""
+    """Measure processor seconds, megabytes at the peak and rooms of one method in a process of its own."""
     here = Path(__file__).resolve()
     words = [sys.executable, str(here), "--only", method, str(folder)]
     text = subprocess.run(words, check=True, capture_output=True, text=True).stdout

@@ -42,7 +42,7 @@ COLUMNS = (
 
 
 def mapped(run: RecordedRun, config: MapperConfig) -> Mapper:
-    """The mapper after all scans of a run."""
+    """Map all scans of a run."""
     mapper = Mapper(config)
     for scan, odometry in zip(run.scans, run.odometry, strict=True):
         mapper.process(scan, Pose2(*odometry))
@@ -91,7 +91,7 @@ def read_rows(path: Path) -> list[dict[str, str]]:
 
 
 def table(rows: list[dict[str, str]], worlds: list[str], levels: list[str]) -> str:
-    """One row a world, the levels of noise side by side."""
+    """Build one row a world, the levels of noise side by side."""
     found = {(row["world"], row["noise"]): row for row in rows}
     head = [f"{noise}: odometry | ATE without / with loops [m] | loops | area without / with" for noise in levels]
     lines = [f"| world | {' | '.join(head)} |", "| --- |" + " ---: |" * (4 * len(levels))]

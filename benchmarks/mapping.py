@@ -53,18 +53,18 @@ KISS_VOXEL = 0.5
 
 
 def clocks() -> tuple[float, float]:
-    """Processor time of this process and wall-clock time [s]."""
+    """Read processor time of this process and wall-clock time [s]."""
     return time.process_time(), time.perf_counter()
 
 
 def since(start: tuple[float, float]) -> tuple[float, float]:
-    """The same since ``start``."""
+    """Measure the times passed since ``start``."""
     now = clocks()
     return now[0] - start[0], now[1] - start[1]
 
 
 def mapped(run: RecordedRun, config: MapperConfig) -> tuple[Mapper, FloatArray, tuple[float, float]]:
-    """The mapper after a run, the poses as estimated at the time, and the processor and wall-clock time it took [s]."""
+    """Map a run: the mapper, the poses as estimated at the time, processor and wall-clock time [s]."""
     mapper = Mapper(config)
     start = clocks()
     taken = zip(run.scans, run.odometry, prepare_scans(run.scans, config), strict=True)
@@ -75,7 +75,7 @@ def mapped(run: RecordedRun, config: MapperConfig) -> tuple[Mapper, FloatArray, 
 
 
 def gicp(run: RecordedRun) -> FloatArray:
-    """Scan to keyframe with small_gicp (GICP), from odometry; scans stand as walls of three layers."""
+    """Match scan to keyframe with small_gicp (GICP), from odometry; scans stand as walls of three layers."""
     import small_gicp
 
     def cloud(points: FloatArray) -> FloatArray:
@@ -105,7 +105,7 @@ def gicp(run: RecordedRun) -> FloatArray:
 
 
 def kiss(run: RecordedRun) -> FloatArray:
-    """KISS-ICP on the scans as flat clouds, each started from odometry."""
+    """Run KISS-ICP on the scans as flat clouds, each started from odometry."""
     from kiss_icp.config import KISSConfig
     from kiss_icp.kiss_icp import KissICP
 
@@ -134,7 +134,7 @@ def kiss(run: RecordedRun) -> FloatArray:
 
 
 def gtsam_optimise(poses: FloatArray, edges: list[Edge], *, kernel: float, iterations: int = 20) -> Solution:
-    """What :func:`closedrooms.mapping.graph.pose_graph.optimise` does, by gtsam's Levenberg-Marquardt."""
+    """Optimise what :func:`closedrooms.mapping.graph.pose_graph.optimise` does, by gtsam's Levenberg-Marquardt."""
     import gtsam
 
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
@@ -155,7 +155,7 @@ def gtsam_optimise(poses: FloatArray, edges: list[Edge], *, kernel: float, itera
 
 
 def with_gtsam(run: RecordedRun) -> FloatArray:
-    """The final trajectory of the mapper whose pose graph gtsam solves."""
+    """Compute the final trajectory of the mapper whose pose graph gtsam solves."""
     import gtsam  # noqa: F401  (a missing one shows here, not in the middle of a run)
 
     own = graph_module.optimise
@@ -174,12 +174,12 @@ def error(estimate: FloatArray, reference: FloatArray | None) -> str:
 
 
 def speed(scans: int, clocks: tuple[float, float]) -> str:
-    """Scans a second of processor time and of wall-clock time."""
+    """Compute scans a second of processor time and of wall-clock time."""
     return f"{scans / clocks[0]:.0f} ({scans / clocks[1]:.0f})"
 
 
 def bench_log(path: Path) -> list[str]:
-    """One row of the table."""
+    """Measure one row of the table."""
     run = read_run(path)
     n = len(run.scans)
 
@@ -210,7 +210,7 @@ def bench_log(path: Path) -> list[str]:
 
 
 def bench_parts(run: RecordedRun) -> None:
-    """Refinements, insertions and stampings a second on the scans of one run."""
+    """Measure refinements, insertions and stampings a second on the scans of one run."""
     config = MapperConfig()
     scans = run.scans[: min(400, len(run.scans))]
     field = LikelihoodField(config.resolution, config.matcher)

@@ -43,7 +43,7 @@ YAG_RANGE = 20.0
 
 
 def with_faults(odometry: FloatArray, kind: str, share: float, seed: int) -> FloatArray:
-    """Odometry, shape (n, 3), some steps of which failed."""
+    """Make odometry, shape (n, 3), some steps of which fail."""
     if kind == "good":
         return odometry
     if kind == "none":
@@ -63,7 +63,7 @@ def with_faults(odometry: FloatArray, kind: str, share: float, seed: int) -> Flo
 
 
 def yag_slam(run: RecordedRun) -> FloatArray:
-    """Karto's matcher and loop closure (``yag-slam``) with 20 scans to match against and a window of ``YAG_SEARCH``.
+    """Run Karto's matcher and loop closure (``yag-slam``): 20 scans to match against, a window of ``YAG_SEARCH``.
 
     It looks at the response of a loop's fine match only where it is told to print what it does, and takes every loop
     else: so it is told to, and not listened to.
@@ -114,7 +114,7 @@ def yag_slam(run: RecordedRun) -> FloatArray:
 def rows_of(
     path: Path, methods: dict[str, Method], seeds: int, cases: tuple[tuple[str, float], ...]
 ) -> Iterator[list[str]]:
-    """One row a method and fault; a peer that is not installed is skipped with a line."""
+    """Measure one row a method and fault; a peer that is not installed is skipped with a line."""
     run = read_run(path)
     if run.reference is None:
         print(f"{path.name}: no reference poses to compare with: skipped", file=sys.stderr)

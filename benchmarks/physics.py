@@ -48,7 +48,7 @@ def main() -> None:
 
 
 def compare_bodies(name: str, plan: FloorPlan, seconds: float) -> None:
-    """One row a body, and one for the steps alone."""
+    """Measure one row a body, and one for the steps alone."""
     closed = draw_closed(plan, min(CLOSED, len(closable_rooms(plan))), np.random.default_rng(0))
     first = 0.0
     for body in ("kinematic", "wheels"):
@@ -72,14 +72,14 @@ def row(name: str, doors: int, body: str, moved: float, rays: float, share: floa
 
 
 def cost(work: Callable[[], object]) -> float:
-    """Processor time [s]."""
+    """Measure processor time [s]."""
     begun = process_time()
     work()
     return process_time() - begun
 
 
 def compare_sweeps(name: str, plan: FloorPlan, seconds: float) -> None:
-    """Errors of the trajectory on one drive back and forth with turns on the spot, at 10 Hz."""
+    """Compare trajectory errors on one drive back and forth with turns on the spot, at 10 Hz."""
     for sweep, undistort in (("instant", True), ("rolling", False), ("rolling", True)):
         lidar = LidarConfig(sweep="rolling") if sweep == "rolling" else LidarConfig()
         robot = RobotConfig(max_speed=1.0, max_turn_rate=2.0)
@@ -98,7 +98,7 @@ def compare_sweeps(name: str, plan: FloorPlan, seconds: float) -> None:
 
 
 def command(number: int, ranges: np.ndarray) -> tuple[float, float]:
-    """Ahead at 1 m/s where 1.5 m are free, else on the spot at 2 rad/s; a whole turn every 6 s."""
+    """Choose speeds: 1 m/s ahead where 1.5 m are free, else 2 rad/s on the spot; a whole turn every 6 s."""
     middle = len(ranges) // 2
     ahead = np.nanmin(ranges[middle - 40 : middle + 40])
     if number % 60 < 32 and number % 60 >= 0 and number >= 60:

@@ -26,7 +26,7 @@ from closedrooms.predictor.methods import predict
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """What to measure."""
+    """Options of a measurement."""
 
     folder: tyro.conf.Positional[Path]
     """Where the samples are, at any depth."""
@@ -39,7 +39,7 @@ class Options:
 
 
 def added_iou(predicted: OccupancyGrid, other: OccupancyGrid, map_grid: OccupancyGrid) -> float:
-    """IoU of the cells that two completed maps add to a map."""
+    """Measure the IoU of the cells that two completed maps add to a map."""
     frame = predicted.frame.covering(*other.frame.bounds)
     unknown = map_grid.on(frame).unknown
     a, b = predicted.on(frame).free & unknown, other.on(frame).free & unknown

@@ -29,7 +29,7 @@ LENGTHS = (20, 40, 80, 130)
 
 
 def comb(length: float) -> FloorPlan:
-    """A corridor of ``length`` [m], 2.4 m wide, with rooms of 4 x 6 m on both sides and a door to each."""
+    """Build a corridor of ``length`` [m], 2.4 m wide, with rooms of 4 x 6 m on both sides and a door to each."""
     count = int(length // 4)
     rooms = [PlanRoom("corridor", "corridor", box(0, 6, length, 8.4))]
     lines = [(0, 6, length, 6), (0, 8.4, length, 8.4), (0, 0, length, 0), (0, 14.4, length, 14.4)]
@@ -50,7 +50,7 @@ def comb(length: float) -> FloorPlan:
 
 
 def wander(sim: Simulation, count: int) -> list[Pose2]:
-    """The poses of a robot that goes ahead and turns away from what is near, one every 0.1 s."""
+    """Simulate a robot that goes ahead and turns away from what is near: its poses, one every 0.1 s."""
     ahead = np.abs(sim.observe().scan.angles) < 0.5
     rng = np.random.default_rng(0)
     poses: list[Pose2] = []
@@ -68,7 +68,7 @@ def wander(sim: Simulation, count: int) -> list[Pose2]:
 
 
 def medians(ways: dict[str, Callable[[], object]], repeats: int) -> dict[str, float]:
-    """Median processor time of each way [s]; they take turns, so that a busy machine is unfair to none."""
+    """Measure the median processor time of each method [s]; they take turns, so a busy machine is fair to all."""
     times: dict[str, list[float]] = {name: [] for name in ways}
     for _ in range(repeats):
         for name, run in ways.items():
@@ -79,7 +79,7 @@ def medians(ways: dict[str, Callable[[], object]], repeats: int) -> dict[str, fl
 
 
 def bare_batches(physics: PhysicsWorld, poses: list[Pose2], lidar: LidarConfig) -> Callable[[], object]:
-    """``rayTestBatch`` on lists made beforehand, results thrown away: what PyBullet itself takes."""
+    """Prepare calls of ``rayTestBatch`` on ready lists, results thrown away: what PyBullet itself takes."""
     bullet, client = physics._bullet, physics._client
     angles = lidar.angle_min + lidar.angle_increment * np.arange(lidar.beams)
     batches = []
@@ -98,7 +98,7 @@ def bare_batches(physics: PhysicsWorld, poses: list[Pose2], lidar: LidarConfig) 
 
 
 def measure(plan: FloorPlan, scans: int, repeats: int) -> str:
-    """One line of the table."""
+    """Measure one line of the table."""
     config = SimConfig(noise=noise_level("medium"))
     closed = [door.id for door in plan.doors if None not in door.rooms][::6][:5]
     started = time.perf_counter()

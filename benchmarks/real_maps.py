@@ -46,7 +46,7 @@ METHODS = ("paper", "rose", "best")
 
 @dataclass(frozen=True)
 class Erased:
-    """One room to erase, in pixels of the picture."""
+    """Room to erase, in pixels of the picture."""
 
     map: str
     name: str
@@ -79,7 +79,7 @@ ROOMS = (
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A map with rooms erased: what the predictor gets, and the cells of each erased room by its door."""
+    """Map with rooms erased: what the predictor gets, and the cells of each erased room by its door."""
 
     name: str
     grid: OccupancyGrid
@@ -88,7 +88,7 @@ class Case:
 
 
 def open_map(folder: Path, name: str) -> OccupancyGrid:
-    """A map of the folder; a picture without a YAML is taken at 0.05 m."""
+    """Read a map of the folder; a picture without a YAML is taken at 0.05 m."""
     path = folder / f"{name}.yaml"
     if path.exists():
         return read_map(path)
@@ -109,7 +109,7 @@ def point_of(frame: GridFrame, pixel: Pixel) -> Point:
 
 
 def gap_cells(frame: GridFrame, gap: Gap) -> BoolArray:
-    """Cells of a wall two cells thick between two pixels."""
+    """Find the cells of a wall two cells thick between two pixels."""
     import cv2
 
     drawn = np.zeros(frame.shape, dtype=np.uint8)
@@ -119,7 +119,7 @@ def gap_cells(frame: GridFrame, gap: Gap) -> BoolArray:
 
 
 def room_cells(grid: OccupancyGrid, shut: BoolArray, seed: tuple[int, int]) -> BoolArray:
-    """The room around a seed: free, connected, with the furniture that it surrounds."""
+    """Find the room around a seed: free, connected, with the furniture that it surrounds."""
     import cv2
     from scipy.ndimage import binary_fill_holes
 
@@ -134,7 +134,7 @@ def room_cells(grid: OccupancyGrid, shut: BoolArray, seed: tuple[int, int]) -> B
 
 
 def large_parts(mask: BoolArray, resolution: float) -> BoolArray:
-    """A mask without its specks: free cells in and behind a wall that a noisy range put there."""
+    """Remove the specks of a mask: free cells in and behind a wall that a noisy range put there."""
     import cv2
 
     _, labels, figures, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
@@ -144,7 +144,7 @@ def large_parts(mask: BoolArray, resolution: float) -> BoolArray:
 
 
 def erase(grid: OccupancyGrid, rooms: Sequence[Erased], name: str) -> Case:
-    """The map with some rooms erased and their doors shut."""
+    """Erase some rooms of the map and shut their doors."""
     import cv2
 
     frame = grid.frame
@@ -170,7 +170,7 @@ def erase(grid: OccupancyGrid, rooms: Sequence[Erased], name: str) -> Case:
 
 
 def cases(folder: Path, names: Sequence[str]) -> Iterator[Case]:
-    """Every room by itself, then all of a map at once."""
+    """Yield every room by itself, then all of a map at once."""
     for name in names:
         grid = open_map(folder, name)
         rooms = [room for room in ROOMS if room.map == name]
@@ -181,7 +181,7 @@ def cases(folder: Path, names: Sequence[str]) -> Iterator[Case]:
 
 
 def judge(case: Case, predicted: Sequence[Room]) -> dict[str, float]:
-    """IoU of each erased room with the room predicted behind its door, 0 without one."""
+    """Measure the IoU of each erased room with the room predicted behind its door, 0 without one."""
     frame = case.grid.frame
     grown = frame
     for room in predicted:
@@ -196,7 +196,7 @@ def judge(case: Case, predicted: Sequence[Room]) -> dict[str, float]:
 
 
 def draw(path: Path, case: Case, predicted: dict[str, Sequence[Room]]) -> None:
-    """The erased map, the truth (green) and what each method predicts (outlines)."""
+    """Draw the erased map, the truth (green) and what each method predicts (outlines)."""
     import cv2
     import shapely
 

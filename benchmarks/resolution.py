@@ -40,7 +40,7 @@ RULES: dict[str, Callable[[FloatArray, FloatArray], BoolArray]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """What to compare."""
+    """Options of a comparison."""
 
     samples: tyro.conf.Positional[tuple[Path, ...]]
     """Folders with a map and its doors."""
@@ -55,7 +55,7 @@ class Options:
 
 
 def redrawn(grid: OccupancyGrid, resolution: float, rule: str) -> OccupancyGrid:
-    """The map drawn in cells of ``resolution`` [m], from the share of each that is occupied and free."""
+    """Redraw the map in cells of ``resolution`` [m], from the share of each that is occupied and free."""
     frame = grid.frame
     size = resolution / frame.resolution
     rows, cols = (math.ceil(count / size - 1e-9) for count in frame.shape)
@@ -66,13 +66,13 @@ def redrawn(grid: OccupancyGrid, resolution: float, rule: str) -> OccupancyGrid:
 
 
 def _overlaps(count: int, wanted: int, size: float) -> FloatArray:
-    """Share of each new cell, ``size`` old ones long, that lies in each old one, shape (wanted, count)."""
+    """Compute the share of each new cell, ``size`` old ones long, in each old one, shape (wanted, count)."""
     starts, cells = np.arange(wanted)[:, None] * size, np.arange(count)[None, :]
     return np.maximum(np.minimum(starts + size, cells + 1) - np.maximum(starts, cells), 0.0) / size
 
 
 def turned(grid: OccupancyGrid, angle: float) -> OccupancyGrid:
-    """The map turned about the origin by ``angle`` [rad], in cells of its own size and by ``third``."""
+    """Turn the map about the origin by ``angle`` [rad], in cells of its own size and by ``third``."""
     c, s = math.cos(angle), math.sin(angle)
     turn = np.array([[c, s], [-s, c]])
     x0, y0, x1, y1 = grid.frame.bounds
@@ -109,21 +109,21 @@ def turned_door(door: ClosedDoor, angle: float) -> ClosedDoor:
 
 
 def rooms(grid: OccupancyGrid, doors: Sequence[ClosedDoor], method: str, angle: float = 0.0) -> dict[str, Shape]:
-    """Predicted rooms by door, turned back by ``angle`` [rad]."""
+    """Predict rooms by door, turned back by ``angle`` [rad]."""
     found = predict(grid, doors, method).rooms
     back = -math.degrees(angle)
     return {door: affinity.rotate(room.polygon, back, origin=(0, 0)) for room in found for door in room.doors}
 
 
 def agreement(one: dict[str, Shape], other: dict[str, Shape]) -> tuple[float, float]:
-    """IoU of the whole area, and the mean over rooms."""
+    """Measure IoU of the whole area, and the mean over rooms."""
     a, b = (shapely.union_all(list(found.values())) for found in (one, other))
     each = [one[d].intersection(other[d]).area / one[d].union(other[d]).area if d in other else 0.0 for d in one]
     return float(a.intersection(b).area / max(a.union(b).area, 1e-9)), float(np.mean(each or [1.0]))
 
 
 def measure(folder: Path, options: Options) -> dict[tuple[str, str], tuple[float, float]]:
-    """Agreement by change and method."""
+    """Measure agreement by change and method."""
     window = known_window(read_map(folder / "map.yaml"))
     assert window is not None, f"{folder}: nothing is known"
     doors, found = read_doors(folder / "doors.geojson"), {}

@@ -37,7 +37,7 @@ PLOTS = {"TimeSeries", "BarChart", "StateTimeline"}
 
 @dataclass(frozen=True, kw_only=True)
 class ScreenshotConfig:
-    """What to show."""
+    """Options of the pictures."""
 
     recording: Annotated[Path, tyro.conf.Positional]
     """The ``.rrd`` file."""
@@ -59,7 +59,7 @@ class ScreenshotConfig:
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """One picture.
+    """Picture of one tab at one moment.
 
     Attributes:
         tab: Names of the tabs that it shows, from the outermost.
@@ -120,13 +120,13 @@ def _free_port() -> int:
 
 
 def _viewer() -> str | None:
-    """The viewer that came with this Python's rerun-sdk, whatever the search path."""
+    """Find the viewer that came with this Python's rerun-sdk, whatever the search path."""
     beside = Path(sys.executable).with_name("rerun")
     return str(beside) if beside.exists() else None
 
 
 def _tabs(blueprint: dict[str, Any]) -> Iterator[tuple[str, list[tuple[str, str]]]]:
-    """Every combination of a tab and the tabs within it: its name, and which tab each container then shows."""
+    """List every combination of a tab and the tabs within it: its name, and which tab each container then shows."""
     yield from _choices(blueprint, _root(blueprint))
 
 
@@ -154,7 +154,7 @@ def _choices(blueprint: dict[str, Any], path: str) -> Iterator[tuple[str, list[t
 
 
 def _containers(blueprint: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Containers by path; of one value in a list the viewer gives the value alone."""
+    """Collect containers by path; of one value in a list the viewer gives the value alone."""
     lists = ("contents", "col_shares", "row_shares")
     return {
         path: {
@@ -167,14 +167,14 @@ def _containers(blueprint: dict[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 def _name(content: dict[str, Any]) -> str:
-    """What a tab that holds a container or a single view is called."""
+    """Name a tab that holds a container or a single view as the viewer does."""
     return str(
         next(content[kind]["display_name"] for kind in ("ContainerBlueprint", "ViewBlueprint") if kind in content)
     )
 
 
 def _places(blueprint: dict[str, Any], path: str, area: Area) -> Iterator[tuple[str, Area]]:
-    """Ids of the views on the tabs in front, and what of the window each takes, below its own title."""
+    """Find the ids of the views on the tabs in front, and what of the window each takes, below its own title."""
     x0, y0, x1, y1 = area
     container = _containers(blueprint).get(path)
     if container is None:
@@ -200,13 +200,13 @@ def _divide(first: float, last: float, shares: Sequence[float]) -> list[float]:
 
 
 def _root(blueprint: dict[str, Any]) -> str:
-    """The outermost container."""
+    """Find the outermost container."""
     inner = {f"/{path}" for container in _containers(blueprint).values() for path in container["contents"]}
     return next(path for path in _containers(blueprint) if path not in inner)
 
 
 def _find_empty(viewer: ViewerClient, blueprint: dict[str, Any], picture: Image.Image) -> Iterator[str]:
-    """Names of the views that show nothing, and what the viewer complains of."""
+    """Find the names of the views that show nothing, and what the viewer complains of."""
     pixels = np.array(picture).astype(int)
     views = {view.view_id: view for view in viewer.get_state().views}
     area = (0.0, float(MENU), float(picture.width), float(picture.height - TIME_PANEL))
@@ -222,7 +222,7 @@ def _find_empty(viewer: ViewerClient, blueprint: dict[str, Any], picture: Image.
 
 
 def is_empty(pixels: "np.ndarray[Any, Any]", *, plot: bool) -> bool:
-    """Whether a picture of a view shows nothing, shape (rows, columns, 3)."""
+    """Check whether a picture of a view shows nothing, shape (rows, columns, 3)."""
     if plot:
         drawn = np.ptp(pixels, axis=-1) >= COLOURED
     else:

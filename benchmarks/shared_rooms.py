@@ -42,7 +42,7 @@ PARALLEL, ACROSS, SEEN = 0.1, 0.5, 0.4
 
 @dataclass
 class Tally:
-    """What was found over some maps; figures are IoU by door."""
+    """Counts over some maps; figures are IoU by door."""
 
     rooms: int = 0
     one_wall: int = 0
@@ -54,7 +54,7 @@ class Tally:
     walled: dict[str, list[float]] = field(default_factory=lambda: {"joined": [], "apart": []})
 
     def row(self, name: str) -> str:
-        """A row of the table."""
+        """Build a row of the table."""
         figures = [_mean(kind[how]) for kind in (self.walled, self.several) for how in ("joined", "apart")]
         counts = (self.rooms, self.one_wall, self.joined, self.wrong, self.pairs_apart)
         return f"| {name} | {' | '.join(map(str, counts))} | {' | '.join(figures)} | {_mean(self.alone)} |"
@@ -65,7 +65,7 @@ def _mean(values: Sequence[float]) -> str:
 
 
 def seen_map(plan: FloorPlan, closed: Sequence[str]) -> OccupancyGrid:
-    """The map of all that a robot reaches with some doors closed."""
+    """Draw the map of all that a robot reaches with some doors closed."""
     import cv2
 
     x0, y0, x1, y1 = truth_bounds(plan, HERE)
@@ -79,14 +79,14 @@ def seen_map(plan: FloorPlan, closed: Sequence[str]) -> OccupancyGrid:
 
 
 def seen_doors(plan: FloorPlan, closed: Sequence[str], grid: OccupancyGrid) -> list[ClosedDoor]:
-    """The closed doors with free space beside them."""
+    """Find the closed doors with free space beside them."""
     places = grid.frame.to_points(np.argwhere(grid.free))
     doors = true_doors(plan, closed, HERE)
     return [door for door in doors if np.hypot(*(places - door.midpoint).T).min() <= SEEN]
 
 
 def in_one_wall(a: ClosedDoor, b: ClosedDoor) -> bool:
-    """Whether two doors are in one straight wall."""
+    """Check whether two doors are in one straight wall."""
     assert a.segment is not None, "doors of a plan have jambs"
     assert b.segment is not None, "doors of a plan have jambs"
     along, other = (np.subtract(*door.segment) / door.width for door in (a, b))  # type: ignore[misc]
@@ -97,7 +97,7 @@ def in_one_wall(a: ClosedDoor, b: ClosedDoor) -> bool:
 
 @contextmanager
 def no_joining() -> Iterator[None]:
-    """Every door has a room of its own."""
+    """Give every door a room of its own."""
     with mock.patch.object(shared, "SHARED", math.inf):
         yield
 

@@ -26,7 +26,7 @@ SIMULATED = ("run", "dataset", "evaluate")
 
 
 def commands(folder: Path) -> dict[str, tuple[str, ...]]:
-    """Lines by name; OUT is where each call writes."""
+    """List the command lines by name; OUT is where each call writes."""
     doors = str(folder / "doors.geojson")
     truth = str(folder / "truth.yaml")
     # Without physics, where it can be chosen: the same work in every version.
@@ -46,7 +46,7 @@ def commands(folder: Path) -> dict[str, tuple[str, ...]]:
 
 
 def call(source: Path, words: tuple[str, ...], out: Path) -> float:
-    """User and system time of one command [s].
+    """Measure user and system time of one command [s].
 
     Raises:
         subprocess.CalledProcessError: It failed; 3 is part of the work.
@@ -70,7 +70,7 @@ def call(source: Path, words: tuple[str, ...], out: Path) -> float:
 
 
 def prepare(folder: Path) -> None:
-    """A map with proposed doors, and three samples to evaluate."""
+    """Make a map with proposed doors, and three samples to evaluate."""
     words = ("worlds", "convert", "office-02", str(folder / "truth.yaml"), "--to", "rosmap")
     call(HERE, words, folder / "none")
     call(HERE, ("doors", str(folder / "truth.yaml"), "--out", str(folder / "doors.geojson")), folder / "none")

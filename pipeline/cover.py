@@ -100,7 +100,7 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Repor
 
 
 def _spread(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: CoverConfig, start: Point | None) -> CostSpread:
-    """What covering the map with the rooms behind its doors may cost."""
+    """Compute what covering the map with the rooms behind its doors may cost."""
     try:
         prediction = predict(grid, doors, config.method)
         tour = plan_coverage(prediction.grid, (), config.coverage, start=start, map_name="predicted")
@@ -121,7 +121,7 @@ def _spread(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: CoverConfi
 def _rows(
     tour: CoverageTour, missed: dict[str, str], metrics: Mapping[str, Any], seconds: float
 ) -> list[tuple[str, str]]:
-    """The table for people."""
+    """Build the table for people."""
     return [
         ("figure", "value"),
         ("vertices", f"{len(tour.graph.vertices)}"),
@@ -136,13 +136,13 @@ def _rows(
 
 
 def _on_grid(read: RosMap, point: tuple[float, float]) -> tuple[float, float]:
-    """A point of the map frame in the frame of the grid [m]."""
+    """Convert a point of the map frame to the frame of the grid [m]."""
     x, y = read.map_T_grid.inverse().transform(np.array(point)).tolist() if read.turned else point
     return x, y
 
 
 def _write_for_ros(folder: Path, read: RosMap, tour: CoverageTour, config: CoverConfig) -> None:
-    """``path.yaml`` and, for nav2, ``waypoints.yaml``; of unconnected parts a pair each, with its number."""
+    """Write ``path.yaml`` and, for nav2, ``waypoints.yaml``; of unconnected parts a pair each, with its number."""
     paths = find_drivable_paths(read.grid, tour, config.coverage.graph.robot_radius)
     for number, path in enumerate(paths):
         poses = np.column_stack(

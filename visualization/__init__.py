@@ -1,7 +1,7 @@
 """Pictures and plots; the recording for the rerun viewer is in ``rerun/``.
 
 ``summary`` draws ``summary.png`` with the map, the prediction and the tour, ``floor_plan`` plans; both on a ``canvas``
-in ``colours`` that the recording shares. ``no_recording`` stands in where nothing is recorded.
+in ``colours`` and with ``dashes`` that the recording shares. ``no_recording`` stands in where nothing is recorded.
 """
 
 from typing import TYPE_CHECKING

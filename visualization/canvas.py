@@ -21,9 +21,9 @@ from closedrooms.visualization.dashes import cut_dashes
 
 Pixels = npt.NDArray[np.uint8]
 Bounds = tuple[float, float, float, float]
-# A way starts in the first colour and ends in the last: the eye can follow it.
+# A path starts in the first colour and ends in the last: the eye can follow it.
 COURSE_START, COURSE_END = np.array([48, 18, 140]), np.array([250, 150, 20])
-# Pieces of one colour in which a way is drawn.
+# Pieces of one colour in which a path is drawn.
 COURSE_PIECES = 240
 # OpenCV takes coordinates as fixed-point numbers with this many bits behind the point.
 SHIFT = 4
@@ -32,10 +32,10 @@ FAR = 1e6
 
 
 class Canvas:
-    """One panel of a picture that shows the map frame, y up."""
+    """Panel of a picture that shows the map frame, y up."""
 
     def __init__(self, bounds: Bounds, scale: float) -> None:
-        """An empty panel.
+        """Make an empty panel.
 
         Args:
             bounds: ``x_min, y_min, x_max, y_max`` [m].
@@ -99,7 +99,7 @@ class Canvas:
             )
 
     def course(self, points: FloatArray, *, width: int = 2) -> None:
-        """Draw a way, shape (k, 2), from blue at its start to orange at its end; rows of NaN interrupt it."""
+        """Draw a path, shape (k, 2), from blue at its start to orange at its end; rows of NaN interrupt it."""
         points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         pieces = min(len(points) - 1, COURSE_PIECES)
         cuts = np.linspace(0, len(points) - 1, pieces + 1).astype(int).tolist() if pieces > 0 else []
@@ -121,7 +121,7 @@ class Canvas:
         self._texts.append((u, v, "\n".join(map(shown, text.split("\n"))), size, colour))
 
     def finished(self) -> Pixels:
-        """Return the panel with its texts."""
+        """Draw the texts onto the panel and hand over its pixels."""
         image = Image.fromarray(self.pixels)
         draw = ImageDraw.Draw(image)
         for u, v, text, size, colour in self._texts:
@@ -142,5 +142,5 @@ class Canvas:
 
 @cache
 def font(size: int) -> Any:
-    """Pillow's own font: the same on every machine."""
+    """Load Pillow's own font: the same on every machine."""
     return ImageFont.load_default(size)

@@ -47,5 +47,5 @@ TOURS: dict[str, Colour] = {
 
 
 def room_colours(doors: Iterable[str]) -> dict[str, Colour]:
-    """Return a colour for each door id, by its place in the sorted list."""
+    """Choose a colour for each door id, by its place in the sorted list."""
     return {door: ROOM_COLOURS[place % len(ROOM_COLOURS)] for place, door in enumerate(sorted(set(doors)))}

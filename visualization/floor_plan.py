@@ -127,7 +127,7 @@ def _name_door(axes: Any, door: PlanDoor, colour: str) -> None:
 
 
 def _draw_scale(axes: Any, width: float) -> None:
-    """A bar of 1, 2 or 5 times a power of ten metres, at most a fifth of the building, in the lower right corner."""
+    """Draw a bar of 1, 2 or 5 times a power of ten metres, at most a fifth of the building, lower right."""
     power = 10.0 ** math.floor(math.log10(width / 5.0))
     length = max(step * power for step in (1.0, 2.0, 5.0) if step * power <= width / 5.0)
     (_, right), (low, high) = axes.get_xlim(), axes.get_ylim()

@@ -8,12 +8,12 @@ if TYPE_CHECKING:
 
 
 class NoRecording:
-    """Takes every call of a recorder and does nothing; it never wants a map."""
+    """Recorder that takes every call and does nothing; it never wants a map."""
 
     def __getattr__(self, name: str) -> Callable[..., None]:
         return lambda *_args, **_kwargs: None
 
 
 def no_recording() -> "Recorder":
-    """Return a recorder to those who call it, so that their calls are checked as the real one's are."""
+    """Make a stand-in typed as a recorder, so that calls of it are checked as the real one's are."""
     return cast("Recorder", NoRecording())

@@ -180,7 +180,7 @@ def _draw_doors(canvas: "Canvas", doors: Sequence[ClosedDoor], *, named: bool = 
 
 
 def room_opacity(confidence: float) -> float:
-    """Tell how strongly a room of a confidence is drawn, 0..1."""
+    """Choose how strongly a room of a confidence is drawn, 0..1."""
     return FAINTEST + (STRONGEST - FAINTEST) * confidence
 
 
@@ -204,7 +204,7 @@ def _draw_rooms(
 
 
 def _bounds(grids: Sequence[OccupancyGrid], shapes: Sequence[BaseGeometry] = ()) -> "Bounds":
-    """What is known in any of the grids, and some shapes, with a margin [m]."""
+    """Find the bounds of what is known in any of the grids, and of some shapes, with a margin [m]."""
     boxes = [shape.bounds for shape in shapes if not shape.is_empty]
     for grid in grids:
         window = grid.known_bounds()
@@ -225,7 +225,7 @@ def _canvas(bounds: "Bounds") -> "Canvas":
 
 
 def _write(path: Path, panels: Sequence[Panel]) -> None:
-    """Panels in the grid that comes nearest to the shape of a screen, each under its title, as PNG."""
+    """Write panels in the grid nearest to the shape of a screen, each under its title, as PNG."""
     from PIL import Image, ImageDraw
 
     from closedrooms.visualization.canvas import font

@@ -63,7 +63,7 @@ def draw_worst(path: Path, scores: Sequence[Scores], samples: Mapping[str, Sampl
 
 
 def extreme_cases(scores: Sequence[Scores], method: str) -> list[Scores]:
-    """Return the two kinds of case of figures 7 and 13: much is predicted from little, and well, or less well.
+    """Choose the two kinds of case of figures 7 and 13: much is predicted from little, and well, or less well.
 
     Among the tenth of the samples whose maps show least of the building, the one with the lowest coverage error and,
     of another building where there is one, the one with the highest; where there are no tours, highest and lowest IoU.
@@ -89,7 +89,7 @@ def _badness(score: Scores) -> float:
 def draw_extremes(
     rooms_path: Path, tours_path: Path, cases: Sequence[Scores], samples: Mapping[str, SamplePath]
 ) -> int:
-    """Two pictures of the same cases: M, M_pred, M_GT (figure 7), and their graphs with tours (figure 13).
+    """Draw the same cases twice: as M, M_pred, M_GT (figure 7), and as their graphs with tours (figure 13).
 
     Returns:
         How many of the two were drawn: the second only where the cases have tours.

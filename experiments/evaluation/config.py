@@ -17,13 +17,13 @@ COMPARED = ("paper", "best", "rose", "line-of-sight", "geometric")
 
 
 def in_order(names: Iterable[str]) -> list[str]:
-    """Names of methods in the order of tables: ours first, then the rest by name."""
+    """Sort names of methods as in the tables: ours first, then the rest by name."""
     return sorted(set(names), key=lambda name: (COMPARED.index(name) if name in COMPARED else len(COMPARED), name))
 
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluateConfig:
-    """What is compared with what."""
+    """Options of an evaluation: what is compared with what."""
 
     datasets: tyro.conf.Positional[tuple[Place, ...]]
     """Folders that ``closedrooms dataset`` wrote (with manifest.json), or the address of shards; in any other folder, a

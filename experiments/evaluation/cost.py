@@ -53,7 +53,7 @@ def find_start(sample: Sample, predicted: CoverageTour) -> Point:
 
 
 def cost_rows(scores: Sequence[Scores], resamples: int) -> list[Row]:
-    """Return a row a method.
+    """Summarise the scores of the cost of coverage, a row a method.
 
     ``within``: share of samples whose true cost lies in the interval, and the 95 % interval of that share over
     buildings. ``below`` and ``above``: where it lies else. ``width``, ``error_mean`` and ``error_predicted`` in percent

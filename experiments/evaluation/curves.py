@@ -28,7 +28,7 @@ TITLES = {"matched": "hidden rooms, matched one-to-one", "by_door": "rooms with 
 
 
 def draw_iou(path: Path, rows: Sequence[Row], methods: Sequence[str], measures: Sequence[str]) -> bool:
-    """IoU against the number of closed doors (paper, figures 5 and 9); a panel a measure.
+    """Draw IoU against the number of closed doors (paper, figures 5 and 9); a panel a measure.
 
     Args:
         path: The PNG.
@@ -44,7 +44,7 @@ def draw_iou(path: Path, rows: Sequence[Row], methods: Sequence[str], measures: 
 
 
 def draw_errors(path: Path, rows: Sequence[Row], names: Sequence[str]) -> bool:
-    """Error of estimates of the coverage cost against the number of closed doors (paper, figures 12 and 14).
+    """Draw the error of estimates of the coverage cost by number of closed doors (paper, figures 12 and 14).
 
     Args:
         path: The PNG.
@@ -66,7 +66,7 @@ Series = tuple[list[int], list[float], list[float]]
 
 
 def _series(rows: Sequence[Row], key: str, name: str, measure: str) -> Series:
-    """Numbers of closed doors, means and standard deviations of one method."""
+    """Compute means and standard deviations of one method by number of closed doors."""
     own = [row for row in rows if row[key] == name and row["closed_doors"] != "all"]
     own = [row for row in own if row[f"{measure}_mean"] is not None]
     own.sort(key=lambda row: row["closed_doors"])
@@ -107,7 +107,7 @@ def _draw(path: Path, panels: Sequence[tuple[str, list[tuple[str, Series]]]], la
 
 
 def draw_reliability(path: Path, rows: Sequence[Row], methods: Sequence[str]) -> bool:
-    """Mean IoU of rooms against their confidence, a curve a method.
+    """Draw the mean IoU of rooms against their confidence, a curve a method.
 
     Args:
         path: The PNG.
@@ -140,7 +140,7 @@ def draw_reliability(path: Path, rows: Sequence[Row], methods: Sequence[str]) ->
 
 
 def draw_costs(path: Path, scores: Sequence[Row], methods: Sequence[str]) -> bool:
-    """Intervals of the cost of coverage by share of the true cost, from low to high, a panel a method.
+    """Draw the intervals of the cost of coverage by share of the true cost, from low to high, a panel a method.
 
     Args:
         path: The PNG.
@@ -211,6 +211,6 @@ def save_figure(figure: Any, path: Path) -> None:
 
 
 def _colour_of(name: str, number: int) -> list[float]:
-    """Return the colour of a method or estimate, 0 to 1; for one without its own by its place in the figure."""
+    """Choose the colour of a method or estimate, 0 to 1; for one without its own by its place in the figure."""
     colour = COLOURS.get(name, ROOM_COLOURS[(len(COLOURS) + number) % len(ROOM_COLOURS)])
     return [value / 255 for value in colour]

@@ -46,7 +46,7 @@ def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Rep
 
 
 def _evaluate(samples: Sequence[SamplePath], config: EvaluateConfig, progress: Progress) -> Report:
-    """Do what is not done yet, then write tables, pictures and manifest."""
+    """Evaluate what is not done yet, then write tables, pictures and manifest."""
     progress.stage("evaluate", len(samples))
     scores: list[Scores] = []
     failures: dict[str, str] = {}
@@ -84,7 +84,7 @@ def _evaluate(samples: Sequence[SamplePath], config: EvaluateConfig, progress: P
 
 
 def _rows(summary: Sequence[Mapping[str, Any]], seconds: Mapping[str, float]) -> list[tuple[str, ...]]:
-    """The table for people, one row a method over all samples."""
+    """Build the table for people, one row a method over all samples."""
     head = ("method", "rooms", "IoU matched", "median", "IoU by door", "IoU whole area", "agreement", "s a map")
     names = ("matched_mean", "matched_median", "by_door_mean", "area_mean", "agreement_mean")
     rows: list[tuple[str, ...]] = [head]
@@ -104,7 +104,7 @@ def _seconds(scores: Sequence[Scores]) -> dict[str, float]:
 
 
 def _work(samples: Sequence[SamplePath], config: EvaluateConfig) -> Iterator[Outcome]:
-    """What comes of the samples, as they are finished."""
+    """Yield what comes of the samples, as they are finished."""
     job = partial(
         evaluate_sample,
         methods=config.methods,

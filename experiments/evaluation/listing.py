@@ -19,7 +19,7 @@ MAX_REPETITION = 1_000_000
 
 @dataclass(frozen=True, slots=True, order=True)
 class SamplePath:
-    """Where a sample is.
+    """Place of a sample.
 
     Attributes:
         name: Its path relative to the dataset.
@@ -43,7 +43,7 @@ class SamplePath:
 
 
 def find_samples(datasets: Sequence[Path | Url]) -> list[SamplePath]:
-    """Return every sample of the datasets, by name.
+    """Find every sample of the datasets, by name.
 
     Raises:
         InvalidInputError: A dataset that is no folder, holds no sample or is of another version; two samples of one
@@ -81,7 +81,7 @@ def _samples_of(dataset: Path | Url) -> Iterator[SamplePath]:
 
 
 def _rows(dataset: Path | Url, manifest: Mapping[str, Any]) -> Iterator[SamplePath]:
-    """The samples in the shards of a dataset, those that failed included."""
+    """List the samples in the shards of a dataset, those that failed included."""
     place = dataset.resolve() if isinstance(dataset, Path) else dataset
     for row in list_rows(place, manifest):
         folder = Path(f"{row.shard.name}/{row.name}") if row.shard else Path(row.name)
@@ -91,7 +91,7 @@ def _rows(dataset: Path | Url, manifest: Mapping[str, Any]) -> Iterator[SamplePa
 
 
 def _folders(dataset: Path) -> Iterator[SamplePath]:
-    """Every folder with the files of a sample, at any depth."""
+    """Find every folder with the files of a sample, at any depth."""
     for folder in sorted(path.parent for path in dataset.rglob(FILES[0])):
         if all((folder / name).is_file() for name in FILES):
             name = folder.relative_to(dataset).as_posix()
@@ -99,7 +99,7 @@ def _folders(dataset: Path) -> Iterator[SamplePath]:
 
 
 def _listed(dataset: Path, manifest: Mapping[str, Any]) -> Iterator[SamplePath]:
-    """The samples of a manifest, those that failed included."""
+    """List the samples of a manifest, those that failed included."""
     path = dataset / DATASET_MANIFEST
     entries = manifest.get("samples")
     if not isinstance(entries, list):
@@ -112,7 +112,7 @@ def _listed(dataset: Path, manifest: Mapping[str, Any]) -> Iterator[SamplePath]:
 
 
 def _digests(dataset: Path) -> dict[str, str]:
-    """SHA-256 by path, as far as ``SHA256SUMS`` tells."""
+    """Read the SHA-256 of files by path, as far as ``SHA256SUMS`` tells."""
     from closedrooms.experiments.dataset.layout import SUMS
 
     path = dataset / SUMS

@@ -15,7 +15,7 @@ PRINTED: dict[str, tuple[float, float]] = {"closed": (21.37, 16.18), "baseline":
 
 
 def number_rows(scores: Sequence[Scores], chosen: Sequence[Scores], tests: Sequence[Row]) -> list[Row]:
-    """Rows of ``where`` (section of the paper), ``what``, the paper's figure and ours with what goes with them.
+    """List ``where`` (section of the paper), ``what``, the paper's figure and ours with what goes with them.
 
     ``sd`` are standard deviations, ``low`` and ``high`` 95 % intervals over buildings, ``p_worlds`` and ``p_samples``
     those of paired tests; ``None`` where there is none.
@@ -77,7 +77,7 @@ def _deviation(values: Sequence[float]) -> float:
 
 
 def _coverage(scores: Sequence[Scores], part: str) -> list[Row]:
-    """Section 5.3: the subset, then the same over all."""
+    """Compare with section 5.3: the subset, then the same over all."""
     by_estimate = estimates(scores)
     if not by_estimate:
         return []

@@ -80,7 +80,7 @@ class Table:
 
 @dataclass(slots=True, eq=False)
 class Section:
-    """A part of the page: text, then a picture, then tables.
+    """Part of the page: text, then a picture, then tables.
 
     Attributes:
         heading: Its heading.
@@ -161,19 +161,19 @@ def _without_empty_columns(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
 
 
 def _is_number(column: Sequence[Any]) -> bool:
-    """Whether a column holds numbers, and nothing else beside them."""
+    """Check whether a column holds numbers, and nothing else beside them."""
     values = [value for value in column if value is not None]
     return bool(values) and all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
 
 
 def _cell(title: Any, kind: str, value: Any, text: Any) -> str:
-    """A cell with its title, and where it is a number with what it is sorted by."""
+    """Write a cell with its title, and where it is a number with what it is sorted by."""
     sorted_by = f' data-value="{"" if value is None else value}"' if kind else ""
     return f'<td{kind} data-head="{_text(title)}"{sorted_by}>{_text("" if text is None else text)}</td>'
 
 
 def _in_line(column: Sequence[Any]) -> list[str]:
-    """Numbers to four digits, filled up behind so that their points are below each other."""
+    """Write numbers to four digits, filled up behind so that their points are below each other."""
     texts = ["" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value) for value in column]
     tails = [re.sub(r"^[^.e]*", "", text) for text in texts]
     longest = max(map(len, tails))

@@ -124,7 +124,7 @@ def _sections(
     iou: Sequence[Row],
     coverage: Sequence[Row],
 ) -> list[Section]:
-    """The figures of the paper, as far as methods and samples allow."""
+    """Collect the figures of the paper, as far as methods and samples allow."""
     present = {score["method"] for score in scores}
     measure = headline(scores)
     sections: list[Section] = []
@@ -174,7 +174,7 @@ def _table(rows: Sequence[Row], caption: str = "") -> Table:
 
 
 def _iou_tables(rows: Sequence[Row]) -> list[Table]:
-    """A table a measure: means, standard deviations, and both intervals in columns of their own."""
+    """Build a table a measure: means, standard deviations, and both intervals in columns of their own."""
     measures = {"by_door": "IoU by door", "matched": "IoU matched one-to-one", "area": "IoU of the whole area",
                 "with_unseen": "IoU by door, doors that were not seen as 0"}  # fmt: skip
     counts, keys = ("samples", "rooms", "not_seen"), ("mean", "sd", "low", "high", "world_low", "world_high")
@@ -190,7 +190,7 @@ def _iou_tables(rows: Sequence[Row]) -> list[Table]:
 
 
 def _doors_table(rows: Sequence[Row], key: str, names: Sequence[str], measure: str) -> Table:
-    """Means by number of closed doors: a line a number, a column a method."""
+    """Tabulate means by number of closed doors: a line a number, a column a method."""
     numbers = sorted({row["closed_doors"] for row in rows if row["closed_doors"] != "all"})
     means = {(row[key], row["closed_doors"]): row[f"{measure}_mean"] for row in rows}
     return Table([["closed doors", *names], *([n, *(means.get((name, n)) for name in names)] for n in numbers)])

@@ -47,7 +47,7 @@ Scores = dict[str, Any]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What came of one sample.
+    """Result of one sample.
 
     Attributes:
         scores: One entry a method that could be scored.
@@ -60,10 +60,10 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Extras:
-    """What is done beside predicting and scoring.
+    """Work beside predicting and scoring.
 
     Attributes:
-        tours: Plan coverage tours, where the sample tells |R|.
+        tours: Plan coverage tours, where the sample tells ``|R|``.
         probability: Write each cell's probability.
         completions: Tell the cost of coverage from so many completions.
     """
@@ -75,7 +75,7 @@ class Extras:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Hidden:
-    """What the map does not show of the truth: the same for every method."""
+    """Truth that the map does not show: the same for every method."""
 
     area: BoolArray
     rooms: list[BoolArray]
@@ -91,7 +91,7 @@ def evaluate_sample(
     probability: bool = False,
     completions: int = 0,
 ) -> Outcome:
-    """Scores of some methods on one sample, each kept in ``out/<method>/<sample>``.
+    """Score some methods on one sample, each kept in ``out/<method>/<sample>``.
 
     What was kept before from the same files, with the same method and code, is not done again.
 
@@ -99,7 +99,7 @@ def evaluate_sample(
         sample: The sample.
         methods: Methods; the authors' own map is scored too where the sample has it.
         out: Folder of the evaluation.
-        tours: Plan coverage tours too, where the sample's run.json tells |R|.
+        tours: Plan coverage tours too, where the sample's run.json tells ``|R|``.
         probability: Write each cell's probability too (``probability.{yaml,png}``).
         completions: Tell the cost of coverage as a distribution too, from so many completions.
 
@@ -118,7 +118,7 @@ def evaluate_sample(
 
 
 def _evaluate(sample: SamplePath, methods: Sequence[str], out: Path, extras: Extras) -> Outcome:
-    """Scores of some methods on one sample in a folder."""
+    """Score some methods on one sample in a folder."""
     outcome = Outcome()
     wanted = [*methods, *([AUTHORS] if (sample.folder / "authors.yaml").is_file() else [])]
     content = _content(sample.folder)
@@ -162,7 +162,7 @@ def _make(folder: Path) -> None:
 
 
 def _content(folder: Path) -> str:
-    """Digest of the files of a sample."""
+    """Compute the digest of the files of a sample."""
     content = hashlib.sha256()
     for path in sorted(path for path in folder.glob("*") if path.suffix in INPUTS and path.is_file()):
         content.update(path.name.encode() + digest(path).encode())
@@ -170,7 +170,7 @@ def _content(folder: Path) -> str:
 
 
 def _fingerprint(content: str, method: str, extras: Extras) -> str:
-    """Changes with the input, the method, the versions of libraries and the code that predicts, plans and scores."""
+    """Digest the input, the method, the versions of libraries and the code that predicts, plans and scores."""
     planned = (extras.tours or extras.completions) and _has_tour(method)
     parts = [content, method, json.dumps(versions()), _code(), tour_code() if planned else ""]
     parts += ["probability"] if extras.probability and method != AUTHORS else []
@@ -212,7 +212,7 @@ class Starts:
         self._found: dict[FacesConfig, tuple[Started, float]] = {}
 
     def of(self, config: FacesConfig) -> tuple[Started, float]:
-        """Tell what a method starts from, and the seconds that this took when it was done."""
+        """Find what a method starts from, and the seconds that this took when it was done."""
         from closedrooms.predictor.paper.initial_layouts import start_rooms
 
         faces = FacesConfig(**{item.name: getattr(config, item.name) for item in fields(FacesConfig)})
@@ -224,7 +224,7 @@ class Starts:
 
 
 def predict_with(name: str, sample: Sample, starts: Starts | None = None) -> tuple[Prediction, float]:
-    """Return the prediction of one method on one sample, and how long it took.
+    """Predict one sample with one method, and measure how long it takes.
 
     Args:
         name: Of the method.
@@ -317,7 +317,7 @@ def _score(
 
 
 def _tours(sample: Sample, own: Tour, out: Path) -> Tour:
-    """The three tours and the errors of the three estimates in percent (paper, sections 5.2 and 5.3).
+    """Measure the three tours and the errors of the three estimates in percent (paper, sections 5.2 and 5.3).
 
     ``own`` is the one on the predicted map, of a sample that knows how many rooms were seen.
     """

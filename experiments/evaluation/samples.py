@@ -32,7 +32,7 @@ MAX_COUNT = 1_000_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
-    """One sample; all grids on one frame, cropped to what any of them knows.
+    """Map, closed doors and truth of one sample; all grids on one frame, cropped to what any of them knows.
 
     Attributes:
         observed: The map with closed doors.
@@ -43,7 +43,7 @@ class Sample:
         world: Building.
         repetition: Repetition, 0 where nothing names it.
         closed: Closed doors, those that the robot did not see included; the doors of the map where nothing tells.
-        rooms_seen: |R| of section 5.2, ``None`` where no run.json tells.
+        rooms_seen: ``|R|`` of section 5.2, ``None`` where no run.json tells.
     """
 
     observed: OccupancyGrid
@@ -131,7 +131,7 @@ def read_sample(sample: SamplePath) -> Sample:
 
 
 def _read_about(sample: SamplePath) -> dict[str, Any]:
-    """``world``, ``closed``, ``repetition`` and ``rooms_seen`` of the sample's run.json, its checksums compared."""
+    """Read ``world``, ``closed``, ``repetition`` and ``rooms_seen`` of the sample's run.json, checksums compared."""
     path = sample.folder / MANIFEST
     if not os.path.lexists(path) and not sample.listed:
         return {}
@@ -155,7 +155,7 @@ def _read_about(sample: SamplePath) -> dict[str, Any]:
 
 
 def _count(value: Any, name: str, path: Path) -> int | None:
-    """A whole number of a manifest, ``None`` where there is none.
+    """Read a whole number of a manifest, ``None`` where there is none.
 
     Raises:
         InvalidInputError: Something else, or larger than any count.

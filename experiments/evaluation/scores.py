@@ -19,7 +19,7 @@ MIN_PIECE = 0.25
 
 
 def hidden_area(observed: OccupancyGrid, truth: OccupancyGrid) -> BoolArray:
-    """Cells free in ``truth`` and unknown in ``observed`` (same frame), closed with a disc of 0.1 m; walls stay walls.
+    """Find cells free in ``truth``, unknown in ``observed`` (same frame), closed with a 0.1 m disc; walls stay walls.
 
     Closing alone joins rooms through thin walls.
     """
@@ -33,7 +33,7 @@ def hidden_area(observed: OccupancyGrid, truth: OccupancyGrid) -> BoolArray:
 
 
 def hidden_rooms(area: BoolArray, resolution: float) -> list[BoolArray]:
-    """Rooms of a hidden area: watershed of its distance transform, one seed for each part deeper than 0.45 m.
+    """Split a hidden area into rooms: watershed of its distance transform, a seed for each part deeper than 0.45 m.
 
     Args:
         area: Hidden cells, shape (rows, cols).
@@ -54,7 +54,7 @@ def hidden_rooms(area: BoolArray, resolution: float) -> list[BoolArray]:
 
 
 def added_rooms(observed: OccupancyGrid, completed: OccupancyGrid) -> list[BoolArray]:
-    """Rooms of somebody's completed map: connected cells (4 neighbours) free there and unknown before."""
+    """Find the rooms of somebody's completed map: connected cells (4 neighbours) free there and unknown before."""
     import cv2
 
     _, labels = cv2.connectedComponents((completed.free & observed.unknown).astype(np.uint8), connectivity=4)
@@ -67,12 +67,12 @@ def _pieces(labels: npt.NDArray[Any], least: float) -> list[BoolArray]:
 
 
 def room_masks(rooms: Sequence[Room], frame: GridFrame) -> list[BoolArray]:
-    """Cells whose centre lies in each room, one mask a room, shape ``frame.shape``."""
+    """Find the cells whose centre lies in each room, one mask a room, shape ``frame.shape``."""
     return [cells_inside(room.polygon, frame) for room in rooms]
 
 
 def matched_iou(truth: Sequence[BoolArray], predicted: Sequence[BoolArray]) -> FloatArray:
-    """IoU of each true room with the predicted room matched to it, 0 without one.
+    """Measure the IoU of each true room with the predicted room matched to it, 0 without one.
 
     One-to-one, so that the sum of the IoU is largest (Hungarian method).
 
@@ -95,13 +95,13 @@ def matched_iou(truth: Sequence[BoolArray], predicted: Sequence[BoolArray]) -> F
 
 
 def iou(a: BoolArray, b: BoolArray) -> float:
-    """Intersection over union of two masks, 1 when both are empty."""
+    """Measure the intersection over union of two masks, 1 when both are empty."""
     union = np.count_nonzero(a | b)
     return float(np.count_nonzero(a & b) / union) if union else 1.0
 
 
 def union_of(masks: Sequence[BoolArray], shape: tuple[int, int]) -> BoolArray:
-    """Return all cells of any mask."""
+    """Join masks into all cells of any of them."""
     total = np.zeros(shape, dtype=np.bool_)
     for mask in masks:
         total |= mask

@@ -17,7 +17,7 @@ COLUMNS = ("id", "world", "repetition")
 
 @dataclass(frozen=True, slots=True, order=True)
 class ShardRow:
-    """One row of a shard.
+    """Row of a shard.
 
     Attributes:
         dataset: The dataset: an absolute path or an address, as text.
@@ -34,7 +34,7 @@ class ShardRow:
 
 @dataclass(frozen=True, slots=True)
 class ListedRow:
-    """A sample that a dataset of shards holds, or should.
+    """Sample that a dataset of shards holds, or should.
 
     Attributes:
         name: Its id.
@@ -125,7 +125,7 @@ def unpacked(row: ShardRow) -> Iterator[Path]:
 
 @lru_cache(maxsize=2)
 def _group(dataset: str, name: str, group: int) -> list[dict[str, Any]]:
-    """The rows of a group: whoever wants one of them wants its neighbours next."""
+    """Read the rows of a group: whoever wants one of them wants its neighbours next."""
     from closedrooms.experiments.dataset.packing import read_rows
     from closedrooms.experiments.places import read_place
 

@@ -14,7 +14,7 @@ Interval = tuple[float | None, float | None]
 
 
 def bootstrap(groups: Sequence[FloatArray], resamples: int, name: str) -> Interval:
-    """95 % percentile interval of the mean over all values, whole groups drawn with replacement.
+    """Compute the 95 % percentile interval of the mean over all values, whole groups drawn with replacement.
 
     Args:
         groups: Values that belong together: rooms of one sample are not independent of each other, and neither are
@@ -33,7 +33,7 @@ def bootstrap(groups: Sequence[FloatArray], resamples: int, name: str) -> Interv
 
 
 def described(groups: Sequence[FloatArray], worlds: Sequence[str], resamples: int, name: str) -> dict[str, Any]:
-    """Mean, median, standard deviation over all values, and two 95 % intervals of the mean.
+    """Compute mean, median, standard deviation over all values, and two 95 % intervals of the mean.
 
     ``low`` and ``high`` draw samples: what other doors in the same buildings would give. ``world_low`` and
     ``world_high`` draw buildings with all their samples: what other buildings would give, the wider one as a rule.
@@ -59,7 +59,7 @@ def described(groups: Sequence[FloatArray], worlds: Sequence[str], resamples: in
 
 
 def by_world(groups: Sequence[FloatArray], worlds: Sequence[str]) -> list[FloatArray]:
-    """Values of the samples of each building in one array, buildings by name."""
+    """Group the values of the samples by building, one array each, buildings by name."""
     collected: defaultdict[str, list[FloatArray]] = defaultdict(list)
     for world, group in zip(worlds, groups, strict=True):
         collected[world].append(group)
@@ -67,7 +67,7 @@ def by_world(groups: Sequence[FloatArray], worlds: Sequence[str]) -> list[FloatA
 
 
 def rounded(value: Any) -> float:
-    """Return a figure as it stands in tables: six decimals."""
+    """Round a figure as it stands in tables: six decimals."""
     return round(float(value), 6) + 0.0
 
 
@@ -77,7 +77,7 @@ LEAST_WORLDS = 6
 
 @dataclass(frozen=True, slots=True)
 class PairedTest:
-    """A method against another on the same samples.
+    """Test of a method against another on the same samples.
 
     Attributes:
         samples: Samples that both have.
@@ -102,7 +102,7 @@ class PairedTest:
 def paired(
     first: Mapping[str, float], second: Mapping[str, float], worlds: Mapping[str, str], resamples: int, name: str
 ) -> PairedTest | None:
-    """Tell whether two methods differ, on the samples that both have; ``None`` without any.
+    """Test whether two methods differ, on the samples that both have; ``None`` without any.
 
     Args:
         first: Figure by sample.
@@ -126,7 +126,7 @@ def paired(
 
 
 def _wilcoxon(differences: FloatArray) -> float:
-    """Two-sided p of Wilcoxon's signed-rank test with Pratt's treatment of ties at zero; 1 when all are zero."""
+    """Compute the two-sided p of Wilcoxon's signed-rank test with Pratt's treatment of zeros; 1 when all are zero."""
     from scipy.stats import wilcoxon
 
     if not np.abs(differences).max() > 0.0:

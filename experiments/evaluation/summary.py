@@ -29,7 +29,7 @@ WITHOUT_PREDICTION = ("closed", "baseline")
 
 
 def grouped(scores: Sequence[Scores], key: str) -> dict[Any, list[Scores]]:
-    """Scores by one of their fields, in its order."""
+    """Group scores by one of their fields, in its order."""
     groups: defaultdict[Any, list[Scores]] = defaultdict(list)
     for score in scores:
         groups[score[key]].append(score)
@@ -37,12 +37,12 @@ def grouped(scores: Sequence[Scores], key: str) -> dict[Any, list[Scores]]:
 
 
 def headline(scores: Sequence[Scores]) -> str:
-    """Tell which measure heads the report: matched rooms on the authors' maps, whose truth has rooms without a door."""
+    """Choose the headline measure: of authors' maps, whose truth has rooms without a door, the matched rooms."""
     return "matched" if any("agreement" in score for score in scores) else "by_door"
 
 
 def subset(scores: Sequence[Scores], config: EvaluateConfig) -> list[Scores]:
-    """Scores of the subset of section 5.3: 15 environments, 10 repetitions of each.
+    """Select the scores of the subset of section 5.3: 15 environments, 10 repetitions of each.
 
     The paper does not say which. Environments are spread evenly over all in the order of their names, so that every
     kind of building is in it; repetitions are the first ones.
@@ -58,7 +58,7 @@ def subset(scores: Sequence[Scores], config: EvaluateConfig) -> list[Scores]:
 
 
 def iou_rows(scores: Sequence[Scores], config: EvaluateConfig) -> list[Row]:
-    """IoU of every method: over all samples (``closed_doors`` is ``all``), then by number of closed doors."""
+    """Summarise IoU by method: over all samples (``closed_doors`` is ``all``), then by number of closed doors."""
     rows = [_iou_row(method, "all", own, config) for method, own in grouped(scores, "method").items()]
     for method, own in grouped(scores, "method").items():
         rows += [_iou_row(method, doors, group, config) for doors, group in grouped(own, "closed_doors").items()]
@@ -79,7 +79,7 @@ def _iou_row(method: str, doors: int | str, scores: Sequence[Scores], config: Ev
 
 
 def coverage_rows(scores: Sequence[Scores], config: EvaluateConfig, part: str) -> list[Row]:
-    """Errors of every estimate of the coverage cost in percent, over all samples and by number of closed doors.
+    """Summarise the errors of every estimate of the coverage cost [%], over all and by number of closed doors.
 
     Args:
         scores: Of all methods.
@@ -99,7 +99,7 @@ def coverage_rows(scores: Sequence[Scores], config: EvaluateConfig, part: str) -
 
 
 def estimates(scores: Sequence[Scores]) -> dict[str, list[Scores]]:
-    """Scores with tours by estimate: ``closed`` and ``baseline`` (once a sample), then the methods."""
+    """Group scores with tours by estimate: ``closed`` and ``baseline`` (once a sample), then the methods."""
     toured = grouped([score for score in scores if "tour" in score], "method")
     ordered = {method: toured[method] for method in in_order(toured)}
     if not ordered:
@@ -109,7 +109,7 @@ def estimates(scores: Sequence[Scores]) -> dict[str, list[Scores]]:
 
 
 def world_rows(scores: Sequence[Scores]) -> list[Row]:
-    """Return a row a building and method: largest number of closed doors (paper, table 1), IoU and coverage error."""
+    """Summarise each building and method: largest number of closed doors (paper, table 1), IoU, coverage error."""
     rows = []
     for world, own in grouped(scores, "world").items():
         for method, group in grouped(own, "method").items():
@@ -123,7 +123,7 @@ def world_rows(scores: Sequence[Scores]) -> list[Row]:
 
 
 def paired_rows(scores: Sequence[Scores], config: EvaluateConfig) -> list[Row]:
-    """Paired tests of every method against the first of paper, best and rose: IoU and coverage error."""
+    """Compare every method with the first of paper, best and rose in paired tests: IoU and coverage error."""
     methods = grouped(scores, "method")
     reference = next((method for method in REFERENCES if method in methods), None)
     if reference is None:
@@ -140,7 +140,7 @@ def paired_rows(scores: Sequence[Scores], config: EvaluateConfig) -> list[Row]:
 
 
 def _figure(scores: Sequence[Scores], name: str) -> dict[str, float]:
-    """One figure a sample: the mean IoU of its rooms, or the coverage error of the prediction in percent."""
+    """Compute one figure a sample: the mean IoU of its rooms, or the coverage error of the prediction in percent."""
     if name == "error":
         return {score["sample"]: score["tour"]["error_predicted"] for score in scores if "tour" in score}
     figures: dict[str, float] = {}
@@ -152,7 +152,7 @@ def _figure(scores: Sequence[Scores], name: str) -> dict[str, float]:
 
 
 def room_rows(scores: Sequence[Scores]) -> list[Row]:
-    """Return a row a room and measure; a hidden room whose door was not seen counts 0 in a measure of its own."""
+    """List the IoU by room and measure; a hidden room whose door was not seen counts 0 in a measure of its own."""
     rows: list[Row] = []
     for score in scores:
         head = {name: score[name] for name in ("method", "sample", "world", "repetition", "closed_doors")}
@@ -166,7 +166,7 @@ def room_rows(scores: Sequence[Scores]) -> list[Row]:
 
 
 def sample_rows(scores: Sequence[Scores]) -> list[Row]:
-    """Return a row a sample and method."""
+    """List the figures of each sample and method."""
     rows: list[Row] = []
     for score in scores:
         names = ("method", "sample", "world", "repetition", "closed_doors", "doors", "hidden_share")

@@ -26,7 +26,7 @@ FOUND, BINS = 0.5, 10
 
 
 def cells_asked(observed: OccupancyGrid, doors: Sequence[ClosedDoor]) -> BoolArray:
-    """Unknown cells within :data:`ASKED` of a closed door, shape of the grid."""
+    """Find the unknown cells within :data:`ASKED` of a closed door, shape of the grid."""
     near = np.zeros(observed.frame.shape, dtype=np.uint8)
     reach = round(ASKED / observed.frame.resolution)
     for door in doors:
@@ -42,7 +42,7 @@ def score_sureness(
     truth: OccupancyGrid,
     true_rooms: Sequence[Room],
 ) -> Scores:
-    """Scores of one sample.
+    """Score how sure a method was on one sample.
 
     Args:
         prediction: With confidences, alternatives and probabilities.
@@ -78,13 +78,13 @@ def score_sureness(
 
 
 def _log_score(chance: FloatArray, free: FloatArray) -> FloatArray:
-    """Logarithm of the probability that was given to what is there."""
+    """Compute the logarithm of the probability that was given to what is there."""
     clipped = np.clip(chance, SUREST, 1.0 - SUREST)
     return np.asarray(np.log(np.where(free > 0.5, clipped, 1.0 - clipped)))
 
 
 def sureness_rows(scores: Sequence[Scores]) -> list[Row]:
-    """Return a row a method: how confidence and IoU agree, what the best of several guesses has, scores a cell."""
+    """Summarise each method: how confidence and IoU agree, what the best of several guesses has, scores a cell."""
     rows = []
     for method in dict.fromkeys(score["method"] for score in scores):
         own = [score["sure"] for score in scores if score["method"] == method and "sure" in score]
@@ -112,7 +112,7 @@ def sureness_rows(scores: Sequence[Scores]) -> list[Row]:
 
 
 def reliability_rows(scores: Sequence[Scores]) -> list[Row]:
-    """Return a row a method and group of equally many rooms: mean confidence and mean IoU."""
+    """Compare mean confidence and mean IoU, a row a method and group of equally many rooms."""
     rows = []
     for method in dict.fromkeys(score["method"] for score in scores):
         own = [room for score in scores if score["method"] == method for room in score.get("sure", {}).get("rooms", [])]
@@ -133,7 +133,7 @@ def reliability_rows(scores: Sequence[Scores]) -> list[Row]:
 
 
 def calibration_error(confidence: FloatArray, iou: FloatArray) -> float:
-    """Expected calibration error: mean distance of confidence from IoU over groups of equally many rooms.
+    """Compute the expected calibration error: mean distance of confidence from IoU over groups of equal size.
 
     Rooms of one confidence count with their mean IoU each: which of them fall into a group says nothing.
     """
@@ -146,7 +146,7 @@ def calibration_error(confidence: FloatArray, iou: FloatArray) -> float:
 
 
 def _groups(confidence: FloatArray, iou: FloatArray) -> list[Any]:
-    """Rooms in groups of equal size by their confidence, those of one confidence by their IoU."""
+    """Split rooms into groups of equal size by their confidence, those of one confidence by their IoU."""
     if not len(confidence):
         return []
     order = np.lexsort((iou, confidence))
@@ -154,7 +154,7 @@ def _groups(confidence: FloatArray, iou: FloatArray) -> list[Any]:
 
 
 def auroc(confidence: FloatArray, found: BoolArray) -> float | None:
-    """Probability that a room that was found is surer than one that was not; ``None`` where all are alike."""
+    """Compute the probability that a room found is surer than one that was not; ``None`` where all are alike."""
     from scipy.stats import rankdata
 
     hits, misses = int(found.sum()), int((~found).sum())
@@ -165,7 +165,7 @@ def auroc(confidence: FloatArray, found: BoolArray) -> float | None:
 
 
 def spearman(confidence: FloatArray, iou: FloatArray) -> float | None:
-    """Rank correlation of confidence and IoU; ``None`` where one of them is the same for all rooms."""
+    """Compute the rank correlation of confidence and IoU; ``None`` where one is the same for all rooms."""
     from scipy.stats import rankdata
 
     ranks = [rankdata(values) for values in (confidence, iou)]

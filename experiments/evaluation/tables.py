@@ -42,7 +42,7 @@ def _parquet(names: Sequence[str], rows: Sequence[Row]) -> bytes:
 
 
 def _typed(values: list[Any]) -> Any:
-    """A column of whole numbers, of numbers, or of text: what holds all its values."""
+    """Convert a column to whole numbers, numbers, or text: what holds all its values."""
     import pyarrow as pa
 
     present = [value for value in values if value is not None]

@@ -26,7 +26,7 @@ Tour = dict[str, Any]
 
 
 def plan_tour(grid: OccupancyGrid, doors: Sequence[ClosedDoor] = (), *, start: Point = START) -> CoverageTour:
-    """Return the tour on a map, which depends on its known cells only.
+    """Plan the tour on a map, which depends on its known cells only.
 
     Raises:
         InvalidInputError: A map without free space.
@@ -37,7 +37,7 @@ def plan_tour(grid: OccupancyGrid, doors: Sequence[ClosedDoor] = (), *, start: P
 
 
 def cropped(grid: OccupancyGrid) -> OccupancyGrid:
-    """Return the known part of a map with a margin of 1 m."""
+    """Crop a map to its known part with a margin of 1 m."""
     window = grid.known_bounds()
     if window is None:
         return grid
@@ -47,10 +47,10 @@ def cropped(grid: OccupancyGrid) -> OccupancyGrid:
 
 
 def kept_tour(out: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor] = (), *, start: Point = START) -> Tour:
-    """Figures of the tour on a map, planned once for all samples that share the map.
+    """Read or plan the tour on a map, once for all samples that share the map.
 
-    Kept in ``out/tours`` under the hash of what it depends on; two processes that plan the same tour write the same
-    bytes.
+    It is kept in ``out/tours`` under the hash of what it depends on; two processes that plan the same tour write the
+    same bytes.
 
     Raises:
         InvalidInputError: A map without free space.
@@ -70,7 +70,7 @@ def kept_tour(out: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor] = (), 
 
 
 def tour_figures(tour: CoverageTour) -> Tour:
-    """Length, lower bound [m] and size of a tour."""
+    """Measure length, lower bound [m] and size of a tour."""
     return {
         "length_m": round(float(tour.length), 6),
         "lower_bound_m": round(float(tour.lower_bound), 6),
@@ -91,7 +91,7 @@ def _key(grid: OccupancyGrid, doors: Sequence[ClosedDoor], start: Point) -> str:
 
 @lru_cache(maxsize=1)
 def tour_code() -> str:
-    """Digest of the code that a tour depends on."""
+    """Compute the digest of the code that a tour depends on."""
     root = Path(__file__).parents[2]
     files = [
         *(root / "coverage").rglob("*.py"),
@@ -102,7 +102,7 @@ def tour_code() -> str:
 
 
 def code_digest(files: Sequence[Path]) -> str:
-    """Digest of the names and contents of some files."""
+    """Compute the digest of the names and contents of some files."""
     content = hashlib.sha256()
     for path in sorted(files):
         content.update(path.name.encode() + digest(path).encode())

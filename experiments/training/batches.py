@@ -22,7 +22,7 @@ POCKETS, POCKET = 6, 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Batch:
-    """Patches and what the network should say of them.
+    """Patches, and what the network should say of them.
 
     Attributes:
         patches: Shape (n, 5, SIZE, SIZE).
@@ -36,7 +36,7 @@ class Batch:
 
 
 def draw_batches(examples: Examples, of: IntArray, size: int, seed: int, epoch: int) -> Iterator[Batch]:
-    """Go through examples once: each in its turn, as it is or mirrored, with pockets in known space.
+    """Draw batches in random order, each example as it is or mirrored, with pockets in known space.
 
     Args:
         examples: All.
@@ -60,7 +60,7 @@ def draw_batches(examples: Examples, of: IntArray, size: int, seed: int, epoch: 
 
 
 def still_batches(examples: Examples, of: IntArray, size: int) -> Iterator[Batch]:
-    """Go through examples in their order, as they are."""
+    """Yield the examples in their order, as they are."""
     for first in range(0, len(of), size):
         chosen = of[first : first + size]
         yield make_batch(examples.shown[chosen], examples.masks[chosen], examples.sides[chosen])
@@ -75,7 +75,7 @@ def make_batch(shown: Bytes, masks: Bytes, sides: FloatArray) -> Batch:
 
 
 def blur(at: FloatArray, length: int) -> Floats:
-    """Return probabilities of ``length`` cells around distances [m] of shape (n,), shape (n, length)."""
+    """Compute probabilities of ``length`` cells around distances [m] of shape (n,), shape (n, length)."""
     centres = (np.arange(length) + 0.5) * CELL
     inside = np.clip(at, centres[0], centres[-1])
     weight = np.exp(-0.5 * ((centres - inside[:, None]) / BLUR) ** 2)

@@ -42,13 +42,13 @@ class Group:
 
 @cache
 def read_groups() -> tuple[Group, ...]:
-    """Return all groups of real and bundled buildings, in the order of the file."""
+    """Read all groups of real and bundled buildings, in the order of the file."""
     data = read_json(BUILDINGS, what="the uses of buildings")
     return tuple(Group(use, tuple(names)) for use in USES for names in data[use])
 
 
 def use_of(building: str) -> Use:
-    """Tell what a building is used for.
+    """Look up what a building is used for.
 
     Args:
         building: The name of its file without suffix, or ``<kind>-g<version>-<seed>`` of a generated world.
@@ -66,7 +66,7 @@ def use_of(building: str) -> Use:
 
 
 def generated_use(version: int, seed: int) -> Use:
-    """Tell what a generated world is used for: by seed, those of later generators are reported."""
+    """Decide what a generated world is used for: by seed, those of later generators are reported."""
     if version > 1:
         return "report"
     return "fit" if seed < FIRST_CHOOSE else "choose"
@@ -96,11 +96,11 @@ def note_report(rows: list[dict[str, str]], path: Path = LEDGER) -> None:
 
 
 def group_of(building: str) -> str:
-    """Return the name of the group that a building stands in: itself where it stands in none."""
+    """Find the name of the group that a building stands in: itself where it stands in none."""
     return next((group.buildings[0] for group in read_groups() if building in group.buildings), building)
 
 
 def may_train(building: str) -> bool:
-    """Tell whether a building may be learned from: it is of the use ``fit``, or nobody has sorted it."""
+    """Check whether a building may be learned from: it is of the use ``fit``, or nobody has sorted it."""
     known = GENERATED.fullmatch(building) or any(building in group.buildings for group in read_groups())
     return not known or use_of(building) == "fit"

@@ -11,7 +11,7 @@ from closedrooms.core.runtime.options import check_least
 
 @dataclass(frozen=True, kw_only=True)
 class TrainConfig:
-    """What the network of the method ``learned`` is trained on, and how."""
+    """Options of a training: what the network of the method ``learned`` is trained on, and how."""
 
     datasets: tyro.conf.Positional[tuple[Path, ...]]
     """Folders written by ``closedrooms dataset``, or any with samples that hold truth_rooms.geojson."""

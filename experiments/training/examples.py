@@ -51,11 +51,11 @@ class Examples:
     names: tuple[str, ...]
 
     def __len__(self) -> int:
-        """How many doors."""
+        """Count the doors."""
         return len(self.groups)
 
     def digest(self) -> str:
-        """SHA-256 of everything."""
+        """Compute the SHA-256 of names and arrays."""
         total = hashlib.sha256(repr(self.names).encode())
         for part in (self.shown, self.masks, self.sides, self.groups):
             total.update(np.ascontiguousarray(part).tobytes())
@@ -64,7 +64,7 @@ class Examples:
 
 @dataclass(slots=True, eq=False)
 class Gathered:
-    """What became of the samples.
+    """Outcome of reading samples.
 
     Attributes:
         examples: Doors with their rooms.

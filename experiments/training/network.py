@@ -22,7 +22,7 @@ class _Convolution(nn.Sequential):  # type: ignore[misc]
 
 
 class _Residual(nn.Module):  # type: ignore[misc]
-    """Two convolutions beside a straight way."""
+    """Two convolutions beside a shortcut."""
 
     def __init__(self, width: int) -> None:
         super().__init__()
@@ -34,7 +34,7 @@ class _Residual(nn.Module):  # type: ignore[misc]
 
 
 class _Profile(nn.Module):  # type: ignore[misc]
-    """From features to a number for each part of every column, or of every row."""
+    """Layers from features to a number for each part of every column, or of every row."""
 
     def __init__(self, width: int, *, columns: bool) -> None:
         super().__init__()
@@ -52,7 +52,7 @@ class _Profile(nn.Module):  # type: ignore[misc]
 
 
 class RoomNetwork(nn.Module):  # type: ignore[misc]
-    """A U-shaped network.
+    """U-shaped network from patches to rooms.
 
     Takes patches of shape (n, 5, 128, 128). Returns logits: of the cells to be in the room, (n, 1, 128, 128); of the
     columns to hold a side of it, (n, 4, 32); of the rows to hold its back, (n, 4, 32). Number ``k`` of group ``g`` is
@@ -73,7 +73,7 @@ class RoomNetwork(nn.Module):  # type: ignore[misc]
         self.columns, self.rows = _Profile(a, columns=True), _Profile(a, columns=False)
 
     def forward(self, patches: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Return the logits of cells, columns and rows."""
+        """Compute the logits of cells, columns and rows."""
         near = self.to_quarter(patches)
         wide = self.to_eighth(near)
         x = self.to_sixteenth(wide)

@@ -41,7 +41,7 @@ DOOR_SD = 0.03
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnMap:
-    """A map, its closed doors and the truth, on one frame.
+    """Map, closed doors and truth, on one frame.
 
     Attributes:
         observed: The map with closed doors.
@@ -81,7 +81,7 @@ def draw_map(plan: FloorPlan, closed: Sequence[str], rng: np.random.Generator, *
 
 
 def _observe(reached: BoolArray, rng: np.random.Generator) -> CellArray:
-    """Cells of the map where ``reached`` is the floor that can be reached, both of shape (rows, cols)."""
+    """Draw the cells of a map whose reachable floor is ``reached``, both of shape (rows, cols)."""
     shape = reached.shape
     field = [_smooth_field(shape, BEND_LENGTH, rng) * BEND / RESOLUTION for _ in range(2)]
     y, x = np.indices(shape, dtype=np.float32)
@@ -103,7 +103,7 @@ def _observe(reached: BoolArray, rng: np.random.Generator) -> CellArray:
 
 
 def _smooth_field(shape: tuple[int, int], length: float, rng: np.random.Generator) -> FloatArray:
-    """Smooth noise of mean 0 and standard deviation 1 that changes over about ``length`` [m], of a shape."""
+    """Draw noise of a shape, mean 0 and standard deviation 1, that changes over about ``length`` [m]."""
     step = max(int(length / RESOLUTION), 1)
     coarse = rng.standard_normal((shape[0] // step + 3, shape[1] // step + 3))
     fine = cv2.resize(coarse, (coarse.shape[1] * step, coarse.shape[0] * step), interpolation=cv2.INTER_LINEAR)
@@ -114,7 +114,7 @@ def _smooth_field(shape: tuple[int, int], length: float, rng: np.random.Generato
 def _sight_doors(
     plan: FloorPlan, closed: Sequence[str], map_T_world: Pose2, observed: OccupancyGrid, rng: np.random.Generator
 ) -> list[ClosedDoor]:
-    """The closed doors with reached floor before them, as a robot tells where they are."""
+    """Find the closed doors with reached floor before them, as a robot tells where they are."""
     doors = []
     near = cv2.dilate(observed.free.view(np.uint8), np.ones((2 * round(0.3 / RESOLUTION) + 1,) * 2, np.uint8)) > 0
     for door in plan.doors:

@@ -53,7 +53,7 @@ def train(config: TrainConfig, *, progress: Progress | None = None) -> Report:
 
 
 def _train(gathered: Gathered, config: TrainConfig, progress: Progress) -> Report:
-    """Learn, then write model, card, curves and manifest."""
+    """Train, then write model, card, curves and manifest."""
     from closedrooms.experiments.training.card import FILE as CARD
     from closedrooms.experiments.training.card import write_card
     from closedrooms.experiments.training.curves import PICTURE, TABLE, write_curves
@@ -131,7 +131,7 @@ def split_buildings(examples: Examples, config: TrainConfig) -> tuple[IntArray, 
 
 
 def _fingerprint(examples: Examples, config: TrainConfig) -> str:
-    """Changes with the options, the data, the versions of libraries and the code."""
+    """Digest the options, the data, the versions of libraries and the code."""
     root = Path(__file__).parents[2]
     files: Sequence[Path] = [
         *Path(__file__).parent.glob("*.py"),

@@ -61,7 +61,7 @@ class Epoch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trained:
-    """The outcome.
+    """Outcome of a training.
 
     Attributes:
         network: With the weights of the best epoch.
@@ -75,7 +75,7 @@ class Trained:
 
 
 class Training:
-    """One training and its state.
+    """Training in progress and its state.
 
     Args:
         config: Options.
@@ -97,7 +97,7 @@ class Training:
 
     @property
     def best_epoch(self) -> Epoch:
-        """The one with the smallest loss on the buildings held out, the first of several."""
+        """Epoch with the smallest loss on the buildings held out, the first of several."""
         return min(self.epochs, key=lambda epoch: epoch.held_loss)
 
     @property
@@ -107,7 +107,7 @@ class Training:
         return late or len(self.epochs) >= self.config.epochs
 
     def resume(self, path: Path, key: str) -> bool:
-        """Go on from a checkpoint of the same training; tell whether there was one."""
+        """Load a checkpoint of the same training to go on from; tell whether there was one."""
         if not path.is_file():
             return False
         try:
@@ -165,13 +165,13 @@ class Training:
         return epoch
 
     def finish(self) -> Trained:
-        """Return the network of the best epoch."""
+        """Restore the network of the best epoch."""
         self.network.load_state_dict(self.best)
         self.network.eval()
         return Trained(self.network, tuple(self.epochs), self.best_epoch.number)
 
     def _rate_at(self, step: int) -> float:
-        """Rate of learning: straight up, then down along a cosine."""
+        """Compute the rate of learning: straight up, then down along a cosine."""
         share = step / (self.steps * self.config.epochs)
         if share < WARM_UP:
             return self.config.rate * (share + 1 / (self.steps * self.config.epochs)) / WARM_UP
@@ -184,7 +184,7 @@ class Training:
         return mask.float(), columns.float(), rows.float()
 
     def _look_at_held(self) -> tuple[float, float, float]:
-        """Losses of cells and sides, and the overlap of the most probable rectangle, over all that is held out."""
+        """Measure losses and the overlap of the most probable rectangle over all that is held out."""
         self.network.eval()
         totals = np.zeros(3)
         with torch.no_grad():
@@ -198,12 +198,12 @@ class Training:
 
 
 def has_bfloat16() -> bool:
-    """Tell whether this processor multiplies in bfloat16 itself: that is twice as quick, elsewhere it is slower."""
+    """Check whether this processor multiplies in bfloat16 itself: twice as quick there, slower elsewhere."""
     return bool(torch.cpu._is_avx512_bf16_supported())
 
 
 def read_sides(columns: Tensor, rows: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """Return logits of left, right and back by cell, as ``predictor.learned.sides`` reads them."""
+    """Split logits into left, right and back by cell, as ``predictor.learned.sides`` reads them."""
     across, ahead = (part.transpose(1, 2).flatten(1) for part in (columns, rows))
     return across[:, :ASIDE_CELLS].flip(1), across[:, ASIDE_CELLS:], ahead[:, DOOR_ROW:]
 
@@ -223,7 +223,7 @@ def measure_loss(answer: tuple[Tensor, Tensor, Tensor], batch: Batch) -> tuple[T
 
 
 def _overlap(sides: Sequence[IntArray], batch: Batch) -> float:
-    """Mean IoU of rectangles with the true ones, the door's wall as the front of both."""
+    """Measure the mean IoU of rectangles with the true ones, the door's wall as the front of both."""
     found = np.stack(sides) + 0.5
     true = np.stack([side.argmax(axis=1) for side in batch.sides]) + 0.5
     low: FloatArray = np.minimum(found, true)

@@ -21,7 +21,7 @@ HALF_VIEW = math.radians(55.0) / 2
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """What a recording holds by now; tabs and views are made of nothing else.
+    """Parts that a recording holds by now; tabs and views are made of nothing else.
 
     Attributes:
         building: A simulated building (tab ``Building``).
@@ -60,14 +60,14 @@ class Contents:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """What a recording holds, and where: ``bounds`` are ``x_min, y_min, x_max, y_max`` [m] in the map frame."""
+    """Parts of a recording, and their place: ``bounds`` are ``x_min, y_min, x_max, y_max`` [m] in the map frame."""
 
     holds: Contents
     bounds: Bounds
 
 
 def arrange(holds: Contents, bounds: Bounds | None) -> rrb.Blueprint:
-    """Return the blueprint of a recording.
+    """Build the blueprint of a recording.
 
     Args:
         holds: What the recording holds.
@@ -160,7 +160,7 @@ def _mapping(layout: Layout) -> rrb.Container:
 
 
 def _evidence(layout: Layout) -> rrb.Container:
-    """What was seen, what was weighed, what came of it."""
+    """Arrange what was seen, what was weighed, what came of it."""
     plain = ["+ /prediction/input", "+ /prediction/doors/**"]
     aspect = 1.9
     return rrb.Grid(
@@ -184,7 +184,7 @@ def _evidence(layout: Layout) -> rrb.Container:
 
 
 def _weighing(layout: Layout) -> rrb.Container:
-    """For each room a bar chart of the terms of the chosen candidate against the runner-up, and their names."""
+    """Arrange a bar chart a room: terms of the chosen candidate against the runner-up, with their names."""
     rooms = layout.holds.weighed
     pages = [
         rrb.Grid(*(_weighed(room) for room in rooms[at : at + CHARTS]), grid_columns=2, name=_page(rooms, at))
@@ -240,7 +240,7 @@ def _expansion(layout: Layout) -> rrb.Container:
 
 
 def _rooms(layout: Layout) -> rrb.Container:
-    """Prediction and truth, one above the other where the building is wide; beside them how the prediction grew."""
+    """Arrange prediction and truth, one above the other in a wide building; beside them how the prediction grew."""
     holds, wide = layout.holds, _is_wide(layout)
     aspect = 2.2 if wide else 0.6
     views = []
@@ -259,7 +259,7 @@ def _rooms(layout: Layout) -> rrb.Container:
 
 
 def _sureness(layout: Layout) -> rrb.Container:
-    """What every cell and every room may be."""
+    """Arrange what every cell and every room may be."""
     contents = ["+ /sureness/grid", "+ /rooms/predicted/**", "- /rooms/predicted/grid", "+ /prediction/doors/bars"]
     title = "Probability to be floor, from grey (0) to blue (1); rooms fainter where less sure, dashed what else"
     table = rrb.TextDocumentView(origin="/sureness/table", name="Rooms by confidence")
@@ -318,7 +318,7 @@ def _log() -> rrb.View:
 
 
 def _series(name: str, title: str, *, top: float | None = None) -> rrb.View:
-    """Curves over the whole run, whatever the cursor; along the axis the time [s], or the stage where that is shown."""
+    """Plot curves over the whole run, whatever the cursor; along the axis time [s], or the stage where it is shown."""
     always = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
     return rrb.TimeSeriesView(
         origin=f"/metrics/{name}",
@@ -335,7 +335,7 @@ def _is_wide(layout: Layout) -> bool:
 
 
 def _from_above(layout: Layout, name: str, contents: Sequence[str], aspect: float = 1.5) -> rrb.View:
-    """A map seen from above; ``aspect`` is the width of the view by its height when the window is 1.5 times as wide."""
+    """Show a map from above; ``aspect`` is the view's width by its height in a window 1.5 times as wide."""
     x0, y0, x1, y1 = layout.bounds
     cx, cy = (x0 + x1) / 2, (y0 + y1) / 2
     height = 1.04 * max((y1 - y0) / 2, (x1 - x0) / 2 / aspect) / math.tan(HALF_VIEW)

@@ -28,7 +28,7 @@ GLASS_ALPHA = 90
 
 
 class RecordedBuilding:
-    """Draws a plan once and its doors whenever they move."""
+    """Plan in a recording, drawn once, its doors whenever they move."""
 
     def __init__(self, stream: RecordingStream, plan: FloorPlan, map_T_world: Pose2, closed: Collection[str]) -> None:
         self._stream = stream
@@ -105,7 +105,7 @@ class RecordedBuilding:
             )
 
     def _lift(self, places: Sequence[Point], z: float) -> FloatArray:
-        """Places of the building frame in the map frame, at a height [m], shape (n, 3)."""
+        """Convert places of the building frame to the map frame, at a height [m], shape (n, 3)."""
         flat = self._map_T_world.transform(shapely.get_coordinates(np.asarray(places, dtype=object)))
         return np.column_stack((flat, np.full(len(flat), z)))
 
@@ -124,7 +124,7 @@ class RecordedBuilding:
         self._stream.log(path, drawables.solid(self._in_map(vertices), triangles, colour, alpha=alpha), static=True)
 
     def _draw_open_doors(self, doors: Collection[str]) -> None:
-        """Doors that stay open are one mesh: a large floor has hundreds."""
+        """Draw doors that stay open as one mesh: a large floor has hundreds."""
         parts = [_mesh(leaf, 1.0) for door in doors for leaf in self._leaves[door]]
         if parts:
             counts = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
@@ -150,5 +150,5 @@ class RecordedBuilding:
 
 
 def _mesh(leaf: Leaf, opening: float) -> tuple[FloatArray, IntArray]:
-    """Vertices and triangles of a leaf when its door is open by ``opening``, 0 to 1."""
+    """Build vertices and triangles of a leaf when its door is open by ``opening``, 0 to 1."""
     return extrude(Polygon(leaf.at(opening * leaf.travel)), height=DOOR_HEIGHT)

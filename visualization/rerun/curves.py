@@ -16,7 +16,7 @@ ROW = 11
 
 
 class Curves:
-    """Keeps what belongs into curves and sends it as whole columns: many times cheaper than one call a value."""
+    """Store of what belongs into curves, sent as whole columns: many times cheaper than one call a value."""
 
     def __init__(self, stream: RecordingStream) -> None:
         self._stream = stream
@@ -40,7 +40,7 @@ class Curves:
         self._poses.append((stamp, float(stage), *odometry.as_tuple(), *estimate.as_tuple(), *third))
 
     def set_reference(self, poses: FloatArray) -> None:
-        """True poses of every scan, where they come afterwards."""
+        """Set the true poses of every scan, where they come afterwards."""
         self._poses = [(*row[:8], *map(float, pose)) for row, pose in zip(self._poses, poses, strict=True)]
 
     def add(
@@ -105,7 +105,7 @@ class Curves:
             self._stream.columns("building/robot", drawables.pose_columns(truth), stamps=stamps, stages=steps)
 
     def send_errors(self) -> None:
-        """Errors against the true poses, once they are all known."""
+        """Send the errors against the true poses, once they are all known."""
         if not self.has_reference:
             return
         stamps, _, odometry, estimate, truth = _split(self._poses)
@@ -129,19 +129,19 @@ class Curves:
 
 
 def _split(rows: list[tuple[float, ...]]) -> tuple[FloatArray, list[int], FloatArray, FloatArray, FloatArray]:
-    """Stamps, stages, and the poses by odometry, estimate and truth."""
+    """Split the poses by odometry, estimate and truth, with stamps and stages."""
     table = np.array(rows).reshape(-1, ROW)
     stamps, stages, odometry, estimate, truth = np.split(table, [1, 2, 5, 8], axis=1)
     return stamps[:, 0], stages[:, 0].astype(int).tolist(), odometry, estimate, truth
 
 
 def _apart(poses: FloatArray, true: FloatArray) -> FloatArray:
-    """Distance [m] of positions, shape (n,)."""
+    """Measure the distance [m] of positions, shape (n,)."""
     distance: FloatArray = np.hypot(poses[:, 0] - true[:, 0], poses[:, 1] - true[:, 1])
     return distance
 
 
 def _turned(poses: FloatArray, true: FloatArray) -> FloatArray:
-    """Angle [deg] between headings, 0 to 180, shape (n,)."""
+    """Measure the angle [deg] between headings, 0 to 180, shape (n,)."""
     angle: FloatArray = np.degrees(np.abs((poses[:, 2] - true[:, 2] + np.pi) % (2 * np.pi) - np.pi))
     return angle

@@ -25,7 +25,7 @@ DASH = 0.25
 
 
 def _grey_values() -> np.ndarray[tuple[int], np.dtype[np.uint8]]:
-    """Grey of each of the 256 values of a cell."""
+    """Compute the grey of each of the 256 values of a cell."""
     values = np.arange(256, dtype=np.uint8).view(np.int8)
     grid = OccupancyGrid(GridFrame(1.0, 0.0, 0.0, 1, 256), values[None])
     grey = np.full(256, colours.UNKNOWN, dtype=np.uint8)
@@ -38,13 +38,13 @@ GREY = _grey_values()
 
 
 def lifted(points: FloatArray, z: float) -> FloatArray:
-    """Points in the plane, shape (..., 2), at height ``z``, shape (..., 3)."""
+    """Lift points in the plane, shape (..., 2), to height ``z``, shape (..., 3)."""
     points = np.asarray(points, dtype=np.float64)
     return np.concatenate((points, np.full((*points.shape[:-1], 1), z)), axis=-1)
 
 
 def grid_map(grid: OccupancyGrid) -> rr.GridMap:
-    """Return a map, cropped to what is known; unknown has the background's colour.
+    """Draw a map, cropped to what is known; unknown has the background's colour.
 
     rerun draws the first row at the top and places the lower-left corner, so that the rows are turned.
     """
@@ -54,7 +54,7 @@ def grid_map(grid: OccupancyGrid) -> rr.GridMap:
 
 
 def picture(pixels: npt.NDArray[np.uint8], frame: GridFrame) -> rr.GridMap:
-    """Return the cells of a frame in grey, shape (rows, cols), or in colour, shape (rows, cols, 3)."""
+    """Draw the cells of a frame in grey, shape (rows, cols), or in colour, shape (rows, cols, 3)."""
     model: Literal["L", "RGB"] = "L" if pixels.ndim == 2 else "RGB"
     return rr.GridMap(
         data=pixels[::-1].tobytes(),
@@ -66,7 +66,7 @@ def picture(pixels: npt.NDArray[np.uint8], frame: GridFrame) -> rr.GridMap:
 
 
 def fill(shapes: Sequence[BaseGeometry], colour: Colour, *, alpha: int = 110, z: float = Z_FILL) -> rr.Mesh3D:
-    """Polygons filled with one colour; ``alpha`` from 0 to 255."""
+    """Fill polygons with one colour; ``alpha`` from 0 to 255."""
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(np.asarray(list(shapes), dtype=object)))
     corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
     return rr.Mesh3D(
@@ -83,14 +83,14 @@ def outlines(
     radius: float = MEDIUM,
     z: float = Z_LINE,
 ) -> rr.LineStrips3D:
-    """Return the rings of polygons."""
+    """Draw the rings of polygons."""
     rings = shapely.get_rings(shapely.get_parts(np.asarray(list(shapes), dtype=object)))
     strips = [lifted(shapely.get_coordinates(ring), z) for ring in rings]
     return rr.LineStrips3D(strips, colors=[colour], radii=[radius])
 
 
 def dashed(shapes: Sequence[BaseGeometry], colour: Colour, *, z: float = Z_LINE) -> rr.LineStrips3D:
-    """Return the rings of polygons in dashes."""
+    """Draw the rings of polygons in dashes."""
     pieces = [lifted(piece, z) for shape in shapes for piece in cut_dashes(shape, DASH)]
     return rr.LineStrips3D(pieces, colors=[colour], radii=[MEDIUM])
 
@@ -101,7 +101,7 @@ def strips(
     radius: float = MEDIUM,
     z: float = Z_LINE,
 ) -> rr.LineStrips3D:
-    """Polylines, each of shape (k, 2); one colour for all, or one each."""
+    """Draw polylines, each of shape (k, 2); one colour for all, or one each."""
     return rr.LineStrips3D([lifted(line, z) for line in lines], colors=list(colour), radii=[radius])
 
 
@@ -113,7 +113,7 @@ def points(
     z: float = Z_POINT,
     labels: Sequence[str] | None = None,
 ) -> rr.Points3D:
-    """Points of shape (n, 2), with labels where given."""
+    """Draw points of shape (n, 2), with labels where given."""
     return rr.Points3D(
         lifted(np.asarray(places, dtype=np.float64).reshape(-1, 2), z),
         colors=[colour],
@@ -124,7 +124,7 @@ def points(
 
 
 def pose(at: Pose2, z: float = 0.0) -> rr.Transform3D:
-    """Return a planar pose as a transform of the parent's frame."""
+    """Convert a planar pose to a transform of the parent's frame."""
     return rr.Transform3D(
         translation=[at.x, at.y, z],
         quaternion=rr.Quaternion(xyzw=[0.0, 0.0, np.sin(at.theta / 2), np.cos(at.theta / 2)]),
@@ -132,7 +132,7 @@ def pose(at: Pose2, z: float = 0.0) -> rr.Transform3D:
 
 
 def pose_columns(poses: FloatArray) -> rr.ComponentColumnList:
-    """Planar poses ``(x, y, theta)``, shape (n, 3), as columns of transforms."""
+    """Convert planar poses ``(x, y, theta)``, shape (n, 3), to columns of transforms."""
     half = poses[:, 2] / 2
     zeros = np.zeros(len(poses))
     return rr.Transform3D.columns(
@@ -142,7 +142,7 @@ def pose_columns(poses: FloatArray) -> rr.ComponentColumnList:
 
 
 def solid(vertices: FloatArray, triangles: IntArray, colour: Colour, *, alpha: int = 255) -> rr.Mesh3D:
-    """Return a mesh with flat shading: corners are not shared, so that every triangle has its own normal."""
+    """Build a mesh with flat shading: corners are not shared, so that every triangle has its own normal."""
     corners = np.asarray(vertices, dtype=np.float64)[np.asarray(triangles)]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)

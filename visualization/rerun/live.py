@@ -67,7 +67,7 @@ def _end(viewer: "subprocess.Popen[bytes]") -> None:
 
 
 def _program() -> str:
-    """The viewer that came with this Python's rerun-sdk, whatever the search path."""
+    """Find the viewer that came with this Python's rerun-sdk, whatever the search path."""
     beside = Path(sys.executable).with_name("rerun")
     return str(beside) if beside.exists() else "rerun"
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def open_recording(
     path: Path | None, robot: RobotConfig, *, name: str, viewer: str | None = None
 ) -> Iterator["Recorder"]:
-    """Return the recorder of one run in a building.
+    """Open the recorder of one run in a building.
 
     Args:
         path: The file to write (``.rrd``), or ``None`` for a recorder that does nothing.

@@ -26,7 +26,7 @@ LINE_COLOURS: dict[str, Colour] = {"wall": (0, 114, 178), "border": (110, 110, 1
 
 
 def draw_doors(stream: RecordingStream, root: str, doors: Sequence[ClosedDoor]) -> None:
-    """Closed doors with their ids: a bar from jamb to jamb where known, a dot in the middle."""
+    """Draw closed doors with their ids: a bar from jamb to jamb where known, a dot in the middle."""
     places = np.array([door.midpoint for door in doors], dtype=np.float64).reshape(-1, 2)
     bars = [np.asarray(door.segment) for door in doors if door.segment is not None]
     labels = [door.id for door in doors]
@@ -43,7 +43,7 @@ def draw_input(stream: RecordingStream, grid: OccupancyGrid, doors: Sequence[Clo
 def draw_trace(
     stream: RecordingStream, trace: "PredictionTrace", palette: Mapping[str, Colour], *, staged: bool
 ) -> None:
-    """Segments, lines, faces, initial faces and the expansion level by level, each a stage of its own if ``staged``."""
+    """Draw segments, lines, faces, initial faces and the expansion level by level, a stage each if ``staged``."""
     _draw_segments(stream, trace, staged=staged)
     _draw_lines(stream, trace, staged=staged)
     _draw_faces(stream, trace, staged=staged)
@@ -101,7 +101,7 @@ def draw_rooms(
 
 
 def draw_tours(stream: RecordingStream, tours: Mapping[str, "CoverageTour"]) -> None:
-    """Topological graphs and the tours over them."""
+    """Draw topological graphs and the tours over them."""
     stream.at(stage=Stage.COVERAGE)
     lengths = ", ".join(f"{name} {tour.length:.1f} m" for name, tour in tours.items())
     stream.say("Coverage", f"tours: {lengths or 'none'} (section 5)")
@@ -123,7 +123,7 @@ def draw_tours(stream: RecordingStream, tours: Mapping[str, "CoverageTour"]) -> 
 
 
 def _draw_segments(stream: RecordingStream, trace: "PredictionTrace", *, staged: bool) -> None:
-    """Segments coloured by the line that they belong to; those of none in grey."""
+    """Draw segments coloured by the line that they belong to; those of none in grey."""
     if staged:
         stream.at(stage=Stage.SEGMENTS)
     segments = np.asarray(trace.segments).reshape(-1, 2, 2)
@@ -153,7 +153,7 @@ def _draw_lines(stream: RecordingStream, trace: "PredictionTrace", *, staged: bo
 
 
 def _draw_faces(stream: RecordingStream, trace: "PredictionTrace", *, staged: bool) -> None:
-    """Unknown faces filled, those at the border paler; the edges of all."""
+    """Draw unknown faces filled, those at the border paler; the edges of all."""
     if staged:
         stream.at(stage=Stage.FACES)
     unknown, border = np.asarray(trace.unknown, dtype=bool), np.asarray(trace.border, dtype=bool)
@@ -172,7 +172,7 @@ def _draw_faces(stream: RecordingStream, trace: "PredictionTrace", *, staged: bo
 
 
 def _draw_scores(stream: RecordingStream, trace: "PredictionTrace", palette: Mapping[str, Colour]) -> None:
-    """A row a level, a column a door; and how the curves look."""
+    """Write the scores as a table, a row a level and a column a door; say how their curves look."""
     doors = sorted({door for level in trace.levels for door in level.scores})
     rows = [
         [str(level.k), *(f"{level.scores[door]:.2f}" if door in level.scores else "" for door in doors)]
@@ -210,5 +210,5 @@ def _label(room: Room, iou: Mapping[str, float]) -> str:
 
 
 def _alpha(room: Room) -> int:
-    """How strongly a room is filled, 0 to 255."""
+    """Compute how strongly a room is filled, 0 to 255."""
     return USUAL if room.confidence is None else round(FAINTEST + (STRONGEST - FAINTEST) * room.confidence)

@@ -58,7 +58,7 @@ LEGEND = """| colour | what |
 
 
 class Recorder:
-    """Writes one ``.rrd``; a context manager.
+    """Writer of one ``.rrd``; a context manager.
 
     All coordinates in the map frame [m] unless a name says otherwise; stamps [s] by the clock of the simulation or log.
     Timelines: ``sim_time``, a duration [s] by the simulation's or the log's clock, and ``stage``, a sequence over
@@ -121,7 +121,7 @@ class Recorder:
             self._stream.__exit__(kind, error, trace)
 
     def _last_stage(self) -> int:
-        """Tell how far it got on the timeline of stages."""
+        """Find how far the recording got on the timeline of stages."""
         holds = self._holds
         reached = {Stage.DRIVING: holds.driving, Stage.COVERAGE: bool(holds.tours), Stage.ROOMS: holds.rooms}
         return next((stage for stage, held in reached.items() if held), Stage.MAPPING)
@@ -135,7 +135,7 @@ class Recorder:
         self._stream.property("configuration", {key: json.dumps(value, default=str) for key, value in kept.items()})
 
     def building(self, plan: "FloorPlan", map_T_world: Pose2, closed: Collection[str]) -> None:
-        """Walls, floors and doors in three dimensions."""
+        """Record walls, floors and doors in three dimensions."""
         from closedrooms.visualization.rerun.building import RecordedBuilding
         from closedrooms.worlds.truth import truth_bounds
 
@@ -152,7 +152,7 @@ class Recorder:
         self._hold(building=True, door_states=bool(closed), active="Building")
 
     def door_states(self, states: Mapping[str, float], stamp: float) -> None:
-        """Doors that move."""
+        """Record doors that move."""
         if self._building is not None:
             self._stream.at(stamp, self._stage)
             self._building.move(states)
@@ -197,7 +197,7 @@ class Recorder:
                 self._send_scans()
 
     def _begin_mapping(self, stamp: float) -> None:
-        """The first scan still belongs to the stage before, so that every view of it holds a map."""
+        """Begin mapping; the first scan still belongs to the stage before, so that every view of it holds a map."""
         if self._stage == Stage.BUILDING:
             self._stage = Stage.MAPPING
         self._stream.at(stamp, self._stage)
@@ -205,7 +205,7 @@ class Recorder:
         self._hold(active="Mapping")
 
     def wants_map(self, stamp: float) -> bool:
-        """Tell whether enough time has passed since the last map."""
+        """Check whether enough time has passed since the last map."""
         return stamp >= self._last_map + MAP_PERIOD - 1e-6
 
     def map(self, grid: OccupancyGrid, stamp: float, *, final: bool = False) -> None:
@@ -239,14 +239,14 @@ class Recorder:
         draw_nothing_yet(self._stream, grid)
 
     def _note_share(self, area: float) -> None:
-        """A line of the log whenever another quarter of the floor is known."""
+        """Log a line whenever another quarter of the floor is known."""
         quarters = 0 if not self._floor else min(int(4 * area / self._floor), 3)
         if self._stage == Stage.MAPPING and quarters > self._quarters:
             self._quarters = quarters
             self.note(f"{25 * quarters} % of the floor is known, {area:.0f} m²")
 
     def frontiers(self, points: FloatArray, goal: Point | None, path: FloatArray | None, stamp: float) -> None:
-        """Frontiers, the goal and the way there."""
+        """Record frontiers, the goal and the path there."""
         self._stream.at(stamp, self._stage)
         self._stream.log("map/frontiers", drawables.points(points, colours.FRONTIER, radius=drawables.MEDIUM))
         goals = NOTHING if goal is None else np.array([goal])
@@ -255,7 +255,7 @@ class Recorder:
         self._stream.log("map/plan", drawables.strips(ways, colours.GOAL, z=drawables.Z_PATH))
 
     def doors(self, doors: Sequence[ClosedDoor], stamp: float) -> None:
-        """Closed doors in the map."""
+        """Record closed doors in the map."""
         self._stream.at(stamp, self._stage)
         draw_doors(self._stream, "map/doors", doors)
         new = {door.id for door in doors} - self._seen
@@ -264,7 +264,7 @@ class Recorder:
             self._building.seen(new)
 
     def loops(self, pairs: FloatArray, stamp: float) -> None:
-        """Loops that were closed, as bars between the two poses."""
+        """Record loops that were closed, as bars between the two poses."""
         self._stream.at(stamp, self._stage)
         bars = list(np.asarray(pairs, dtype=np.float64).reshape(-1, 2, 2))
         self._stream.log("map/loops", drawables.strips(bars, colours.LOOP, radius=drawables.THICK, z=drawables.Z_PATH))
@@ -279,7 +279,7 @@ class Recorder:
             self._curves.corrected = (np.asarray(stamps, dtype=np.float64), np.asarray(poses, dtype=np.float64))
 
     def reference(self, stamps: FloatArray, poses: FloatArray) -> None:
-        """Poses to compare with, where the scans came without any."""
+        """Record poses to compare with, where the scans came without any."""
         if len(stamps) != len(self._curves) or not len(stamps):
             return
         self._curves.set_reference(poses)
@@ -381,7 +381,7 @@ class Recorder:
             self._curves.add_iou(iou, self._palette, stamp=None, stage=stage)
 
     def tours(self, tours: Mapping[str, "CoverageTour"]) -> None:
-        """Graphs and tours."""
+        """Record graphs and tours."""
         draw_tours(self._stream, tours)
         for name in tours:
             grid = self._grids.get(name)
@@ -431,7 +431,7 @@ class Recorder:
         )
 
     def _send_scans(self) -> None:
-        """The scans that were kept since the last time, in one call: many times cheaper than one call each."""
+        """Send the scans kept since the last time in one call: many times cheaper than one call each."""
         self._curves.send_poses()
         if not self._scans:
             return
@@ -450,7 +450,7 @@ def _known_bounds(grid: OccupancyGrid) -> Bounds | None:
 
 
 def _rooms_table(prediction: "Prediction") -> str:
-    """What stands under ``result`` until the run's own table comes."""
+    """Write the table that stands under ``result`` until the run's own comes."""
     rows = [
         [", ".join(room.doors), room.kind or "", f"{room.polygon.area:.1f} m²", "cut" if room.bounded else ""]
         for room in prediction.rooms
@@ -462,7 +462,7 @@ def _rooms_table(prediction: "Prediction") -> str:
 
 
 def _room_said(room: Room, iou: Mapping[str, float]) -> str:
-    """One line of the log on a predicted room."""
+    """Describe a predicted room in one line of the log."""
     known = [iou[door] for door in room.doors if door in iou]
     held = f", IoU with the true room {min(known):.2f}" if known else ""
     sure = "" if room.confidence is None else f", confidence {room.confidence:.2f}"

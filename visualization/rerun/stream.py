@@ -48,7 +48,7 @@ class Stage(IntEnum):
 
 
 class RecordingStream:
-    """A rerun file that is being written; a context manager, whole only after it ends.
+    """Rerun file that is being written; a context manager, whole only after it ends.
 
     Two timelines: ``sim_time``, a duration [s] by the simulation's (or the log's) clock, and ``stage``, a sequence
     over the steps of :class:`Stage`. Everything of a run carries both; a prediction without a run only ``stage``.

@@ -63,7 +63,7 @@ def probability_map(observed: OccupancyGrid, prediction: "Prediction") -> rr.Gri
 
 
 def _table(prediction: "Prediction", iou: Mapping[str, float]) -> str:
-    """A row a room, the least sure one first."""
+    """Write a table of rooms, the least sure one first."""
     head = ["doors", "confidence", "IoU with the true room", "area [m²]", "or else, with its probability"]
     rooms = sorted(prediction.rooms, key=lambda room: (room.confidence or 0.0, room.doors))
     rows = [_row(room, iou) for room in rooms] or [["none", "", "", "", ""]]

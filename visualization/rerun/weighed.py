@@ -26,14 +26,14 @@ BAR_COLOURS: dict[str, Colour] = {CHOSEN: colours.ESTIMATE, RUNNER_UP: colours.L
 
 
 def room_name(room: "WeighedRoom") -> str:
-    """Tell what a room is called in entity paths."""
+    """Name a room for entity paths."""
     return rr.escape_entity_path_part("+".join(room.doors))
 
 
 def draw_weighed(
     stream: RecordingStream, trace: "WeighedTrace", palette: Mapping[str, Colour], *, staged: bool
 ) -> None:
-    """Wall faces, candidates and choice, each a stage of its own where ``staged``."""
+    """Draw wall faces, candidates and choice, each a stage of its own where ``staged``."""
     _draw_faces(stream, trace, staged=staged)
     if staged:
         stream.at(stage=Stage.INITIAL)
@@ -64,7 +64,7 @@ LEVELS = (
 
 
 def _draw_faces(stream: RecordingStream, trace: "WeighedTrace", *, staged: bool) -> None:
-    """Wall faces, a colour for each way that they face."""
+    """Draw wall faces, a colour for each direction that they face."""
     faces = np.asarray(trace.faces).reshape(-1, 2, 2)
     ways = np.round(np.degrees(trace.directions)).astype(int) % 360
     distinct = sorted(set(ways.tolist()))
@@ -76,7 +76,7 @@ def _draw_faces(stream: RecordingStream, trace: "WeighedTrace", *, staged: bool)
 
 
 def _draw_candidates(stream: RecordingStream, room: "WeighedRoom", palette: Mapping[str, Colour]) -> None:
-    """The best candidates as thin outlines with their joint scores, the chosen one filled, the runner-up in violet."""
+    """Draw the best candidates as thin outlines with joint scores, the chosen one filled, the runner-up in violet."""
     root = f"prediction/candidates/{room_name(room)}"
     colour = palette[room.doors[0]]
     shapes = np.asarray(shapely.polygons(room.corners))
@@ -96,12 +96,12 @@ def _draw_candidates(stream: RecordingStream, room: "WeighedRoom", palette: Mapp
 
 
 def _corner(corners: FloatArray, number: int) -> FloatArray:
-    """A place a little inside one corner of a rectangle."""
+    """Find a place a little inside one corner of a rectangle."""
     return np.asarray(0.8 * corners[number] + 0.2 * corners.mean(axis=0))
 
 
 def _draw_bars(stream: RecordingStream, room: "WeighedRoom") -> None:
-    """A pair of bars a term, those first in which the chosen candidate and the runner-up differ most."""
+    """Draw a pair of bars a term, those first in which the chosen candidate and the runner-up differ most."""
     terms = sorted(room.terms.items(), key=lambda item: (-abs(item[1][0] - item[1][1]), item[0]))[:BARS]
     at = np.arange(1.0, len(terms) + 1)
     pairs = np.array([pair for _, pair in terms]).reshape(-1, 2)
@@ -125,7 +125,7 @@ def _draw_bars(stream: RecordingStream, room: "WeighedRoom") -> None:
 
 
 def _candidates_table(rooms: Sequence["WeighedRoom"]) -> str:
-    """The chosen candidate and the best others of each room."""
+    """Write a table of the chosen candidate and the best others of each room."""
     lines = ["| doors | candidate | size [m] | score by itself | beside its neighbours |"]
     lines.append("| --- | --- | ---: | ---: | ---: |")
     for room in rooms:
