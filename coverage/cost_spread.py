@@ -9,11 +9,11 @@ room with several doors.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 import shapely
-from scipy.special import ndtri
 
 from closedrooms.core.arrays import FloatArray, handed_over
 from closedrooms.core.door import ClosedDoor
@@ -116,7 +116,7 @@ def spread_cost(
         ]
     )
     # As evenly spread as can be: a few random numbers would make another interval of every seed.
-    normal = ndtri((rng.permutation(count) + 0.5) / count)
+    normal = np.array([NormalDist().inv_cdf(share) for share in (rng.permutation(count) + 0.5) / count])
     return summarise(np.maximum(predicted + drawn - begun + noise * predicted * normal, 0.0))
 
 

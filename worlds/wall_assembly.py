@@ -201,8 +201,9 @@ def without_gaps(
     closed = union.buffer(width / 2, join_style="mitre").buffer(-width / 2, join_style="mitre")
     narrow = [part for part in shapely.get_parts(areal(closed.difference(union))) if _is_narrow(part, width)]
     gaps = [piece for part in narrow for piece in (_branches(part, width) if branches else [part])]
-    # What a ring-shaped gap goes around are rooms and courtyards, not gaps.
-    gaps = [gap for gap in gaps if _is_narrow(gap, width, 0.0) and not union.contains(gap.representative_point())]
+    # What a ring-shaped gap goes around are rooms and courtyards, not gaps. A point of the gap would not tell: it may
+    # lie in a sliver that rounding leaves along a room.
+    gaps = [gap for gap in gaps if _is_narrow(gap, width, 0.0) and union.intersection(gap).area < 0.5 * gap.area]
     rooms = list(polygons)
     tree = STRtree(rooms)
     filled = []

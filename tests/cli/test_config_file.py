@@ -26,6 +26,7 @@ REQUIRED = {
     "dataset": ("office-01", "--out", "o"),
     "evaluate": ("d", "--out", "o"),
     "robustness": ("office-01", "--out", "o"),
+    "train": ("d", "--out", "o"),
 }
 
 

@@ -15,7 +15,7 @@ USAGE = {
     ("run", "--no-recrod"): "unknown option --no-recrod; did you mean --record?",
     ("run", "--sim.nois.turn", "1"): "unknown option --sim.nois.turn; did you mean --sim.noise.turn?",
     ("predict", "--predictor.phi", "x"): "does not read --predictor.phi; closedrooms predict --help-all lists",
-    ("predict", "--predictor.symetry", "x"): "does not read --predictor.symetry; did you mean --predictor.symmetry?",
+    ("predict", "--predictor.shortlst", "9"): "does not read --predictor.shortlst; did you mean --predictor.shortlist?",
     ("run", "--xyzzy"): "unknown option --xyzzy; closedrooms run --help-all lists what there is",
     ("worlds", "show", "a", "b", "--out", "x.png"): "unexpected argument 'b'",
     ("run", "--noise", "hihg"): "--noise: unknown value 'hihg'; did you mean high?",

@@ -78,7 +78,7 @@ def test_a_process_that_does_not_stop_is_ended_in_time_and_quietly(what: str, nu
 
 def test_a_process_whose_library_waits_for_ever_ends_all_the_same_with_its_status() -> None:
     code = (
-        "import atexit, sys, time; from closedrooms.core import stopping\n"
+        "import atexit, sys, time; from closedrooms.core.runtime import stopping\n"
         "atexit.register(time.sleep, 1000); stopping.leave_if_stuck(2); print('said', end='')\n"
         "stopping.wait_for_nothing(); stopping.leave_if_stuck(3)"
     )
