@@ -140,7 +140,10 @@ def convert_world(src: str, dst: str | Path, to: str, *, level: str | None = Non
         raise InvalidInputError(f"unknown format {to!r}", expected=f"one of {', '.join(formats)}")
     with new_files([Path(dst), *beside(Path(dst), to)], force=force, sources=[Path(src)]):
         plan = read_world(src, level=level)
-        formats[to](Path(dst), plan)
+        try:
+            formats[to](Path(dst), plan)
+        except InvalidInputError as error:
+            raise InvalidInputError(str(error), where=src) from error
     return plan
 
 

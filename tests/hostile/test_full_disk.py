@@ -5,6 +5,7 @@ Needs a small file system of its own, which only root may mount; elsewhere the t
 
 import importlib.util
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -125,3 +126,41 @@ def test_a_full_disk_is_one_line_and_leaves_nothing_half_written(
     assert room > 4 or left <= {"out/.lock"}
     (disk / "full").unlink()
     assert main([*words, "-q"]) == 0
+
+
+@pytest.mark.parametrize("command", [command for command in COMMANDS | GO_ON if command not in RECORDING])
+def test_a_place_that_may_not_be_written_is_one_line_before_the_work(
+    command: str, disk: Path, given: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(given)
+    fill(disk, 1000)
+    before = contents(disk)
+    subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
+    try:
+        status = main([word.replace("DISK", str(disk)) for word in (COMMANDS | GO_ON)[command][0]])
+    finally:
+        subprocess.run(["mount", "-o", "remount,rw", str(disk)], check=True)
+    said = capfd.readouterr().err
+    assert status == 1
+    assert len([line for line in said.splitlines() if not line.endswith(" ...")]) == 1
+    assert f"cannot write (Read-only file system): {disk}" in said
+    assert contents(disk) == before
+
+
+SAYING = [sys.executable, "-m", "closedrooms.cli", "worlds", "list"]
+
+
+@pytest.mark.parametrize(
+    ("redirected", "status", "said"),
+    [
+        ("> /dev/full", 1, "closedrooms: cannot write (No space left on device): standard output\n"),
+        (">&-", 0, ""),
+        ("2>&- >&-", 0, ""),
+        ("2> /dev/full > /dev/full", 1, ""),
+        ("< /dev/null | head -1", 0, ""),
+    ],
+)
+def test_nobody_who_reads_what_is_said_is_no_failure(redirected: str, status: int, said: str) -> None:
+    script = f"set -o pipefail; {' '.join(map(shlex.quote, SAYING))} {redirected}"
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (status, said)

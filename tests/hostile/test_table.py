@@ -114,6 +114,19 @@ COMMANDS = {
     "convert-stage": ("pyrobosim", ["worlds", "convert", "w.yaml", "out.world", "--to", "stage"]),
     "convert-rosmap": ("kth", ["worlds", "convert", "k.xml", "out", "--to", "rosmap"]),
 }
+
+
+def test_a_plan_that_makes_no_mesh_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("trimesh")  # its import takes longer than any answer on a busy machine
+    inputs.spoil(tmp_path / "map.png", FORMATS["picture"].content, "doubled")
+    words = ["worlds", "convert", "map.png", "out.obj", "--to", "obj"]
+    status, complaints, new = answered(words, tmp_path, monkeypatch, capfd)
+    assert (status, len(complaints), new) == (1, 1, set())
+    assert complaints[0].endswith(": map.png")
+
+
 QUICKLY = ["--repetitions", "1", "--workers", "1", "--out", "out"]
 # These simulate where a file can still be read, so each sees few mutations: of the file, which ones, the command.
 LONG = {
