@@ -47,14 +47,18 @@ class CostSpread:
     Attributes:
         lengths: Of a tour over each completion [m], shape (n,), in the order drawn.
         mean: Their mean [m].
-        low: Lower end of the interval that holds the true length with the probability :data:`HELD` [m].
+        low: Lower end of the interval [m].
         high: Upper end [m].
+        held: Probability that the interval holds the true length: :data:`HELD`, less for fewer than 19 draws.
+        without_room: Ids of doors behind which nothing is predicted: they add nothing.
     """
 
     lengths: FloatArray
     mean: float
     low: float
     high: float
+    held: float
+    without_room: tuple[str, ...] = ()
 
     def figures(self, true_length: float | None = None) -> dict[str, Any]:
         """Tell it in numbers for ``run.json``.
@@ -65,11 +69,13 @@ class CostSpread:
         figures: dict[str, Any] = {
             "count": len(self.lengths),
             "mean_m": round(self.mean, 4),
-            "interval": HELD,
+            "interval": round(self.held, 4),
             "low_m": round(self.low, 4),
             "high_m": round(self.high, 4),
             "lengths_m": [round(length, 4) for length in self.lengths.tolist()],
         }
+        if self.without_room:
+            figures["doors_without_room"] = list(self.without_room)
         if true_length is not None:
             figures["true_within"] = self.low <= true_length <= self.high
         return figures
@@ -117,7 +123,9 @@ def spread_cost(
     )
     # As evenly spread as can be: a few random numbers would make another interval of every seed.
     normal = np.array([NormalDist().inv_cdf(share) for share in (rng.permutation(count) + 0.5) / count])
-    return summarise(np.maximum(predicted + drawn - begun + noise * predicted * normal, 0.0))
+    found = {door for room in rooms for door in room.doors}
+    spread = summarise(np.maximum(predicted + drawn - begun + noise * predicted * normal, 0.0))
+    return replace(spread, without_room=tuple(door.id for door in doors if door.id not in found))
 
 
 def _measure_possibilities(
@@ -130,11 +138,13 @@ def _measure_possibilities(
 def summarise(lengths: FloatArray) -> CostSpread:
     """Summarise lengths that were drawn as the true one might have been.
 
-    The next draw lies between the ends with the probability :data:`HELD`, whatever their number: quantiles by order
-    statistics of which the true length is taken to be one more (Weibull's plotting positions).
+    The next draw lies between the ends with the probability :data:`HELD`: quantiles by order statistics of which the
+    true length is taken to be one more (Weibull's plotting positions). Between the least and the largest of a few it
+    lies less often.
     """
+    count = len(lengths)
     low, high = np.quantile(lengths, [(1.0 - HELD) / 2, (1.0 + HELD) / 2], method="weibull")
-    return CostSpread(lengths, float(lengths.mean()), float(low), float(high))
+    return CostSpread(lengths, float(lengths.mean()), float(low), float(high), min(HELD, (count - 1) / (count + 1)))
 
 
 def measure_excursion(shape: Shape, door: ClosedDoor, frame: GridFrame, config: CoverageConfig) -> float:

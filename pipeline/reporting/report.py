@@ -97,8 +97,11 @@ def spread_rows(spread: Mapping[str, Any] | None) -> Rows:
     if spread is None:
         return []
     share, low, high = 100 * spread["interval"], spread["low_m"], spread["high_m"]
-    told = f"{spread['mean_m']:.1f} m ({share:.0f} %: {low:.1f} to {high:.1f} m)"
-    rows = [(f"tour, {spread['count']} completions", told)]
+    interval = f" ({share:.0f} %: {low:.1f} to {high:.1f} m)" if share else ""
+    plural = "" if spread["count"] == 1 else "s"
+    rows = [(f"tour, {spread['count']} completion{plural}", f"{spread['mean_m']:.1f} m{interval}")]
+    if "doors_without_room" in spread:
+        rows.append(("no room to draw behind", ", ".join(spread["doors_without_room"])))
     if "true_within" in spread:
         rows.append(("true tour within", "yes" if spread["true_within"] else "no"))
     return rows

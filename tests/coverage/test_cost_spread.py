@@ -104,9 +104,26 @@ def test_the_next_draw_lies_in_the_interval_as_often_as_it_says_however_few_ther
         assert np.mean(held) == pytest.approx(HELD, abs=0.02)
 
 
+def test_a_few_draws_hold_less_and_say_so():
+    rng = np.random.default_rng(6)
+    lengths = rng.normal(0.0, 1.0, (4000, 5))
+    spreads = [summarise(row[:4]) for row in lengths]
+    held = np.mean([spread.low <= row[4] <= spread.high for spread, row in zip(spreads, lengths, strict=True)])
+    assert spreads[0].held == pytest.approx(0.6)
+    assert held == pytest.approx(0.6, abs=0.03)
+    assert summarise(np.arange(19.0)).held == HELD
+
+
+def test_doors_without_a_room_are_named(plain):
+    spread = _spread([_room(0, 1, 5, 4)], plain)
+    assert spread.without_room == ("d1",)
+    assert spread.figures()["doors_without_room"] == ["d1"]
+    assert "doors_without_room" not in _spread([_room(0, 1, 5, 4), _room(1, 7, 11, 4)], plain).figures()
+
+
 def test_figures_tell_every_draw_and_the_truth_only_where_it_is_known():
     spread = summarise(np.array([3.0, 1.0, 2.0]))
     assert spread.figures() == {
-        "count": 3, "mean_m": 2.0, "interval": HELD, "low_m": 1.0, "high_m": 3.0, "lengths_m": [3.0, 1.0, 2.0],
+        "count": 3, "mean_m": 2.0, "interval": 0.5, "low_m": 1.0, "high_m": 3.0, "lengths_m": [3.0, 1.0, 2.0],
     }  # fmt: skip
     assert spread.figures(3.5)["true_within"] is False
