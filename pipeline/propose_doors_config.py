@@ -22,7 +22,7 @@ class DoorsConfig:
     """Also write a picture of the map with the proposals (PNG)."""
 
     force: bool = False
-    """Replace files that is there already."""
+    """Replace files that are there already."""
 
     allow_outside: bool = False
     """Open the picture that the map's ``image:`` names also outside the folder of the YAML."""
