@@ -121,24 +121,21 @@ class Floor:
         return [start]
 
 
-class Person:
-    """Somebody who walks to a place, rests, and walks on, and waits for the robot."""
+class _Bystander:
+    """A body on the floor of a building, begun at a place drawn by its own random stream."""
 
-    def __init__(self, number: int, floor: Floor, physics: PhysicsWorld, obstacles: Obstacles, seed: int) -> None:
-        angles = np.arange(CORNERS) * 2.0 * math.pi / CORNERS
-        ring = PERSON_RADIUS * np.column_stack((np.cos(angles), np.sin(angles)))
-        self._rng = stream(seed, "people", str(number))
+    _rng: np.random.Generator
+
+    def __init__(
+        self, corners: FloatArray, name: tuple[str, int], floor: Floor, physics: PhysicsWorld, obstacles: Obstacles
+    ) -> None:
         self._floor = floor
         room = np.array([floor.point((0, 0)), floor.point(floor.free.shape)])
-        self._body = _Body(ring, ("person", number), physics, obstacles, room)
-        self._cell = floor.draw(self._rng)
-        self._path: list[tuple[int, int]] = []
-        self._rest = self._waited = 0.0
-        self._body.put(*floor.point(self._cell))
+        self._body = _Body(corners, name, physics, obstacles, room)
 
     @property
     def outline(self) -> Polygon:
-        """Where the person stands."""
+        """Where it stands."""
         return self._body.outline
 
     def keep_off(self, x: float, y: float, distance: float) -> None:
@@ -146,8 +143,24 @@ class Person:
         for _ in range(TRIES):
             if math.dist(self._body.place, (x, y)) >= distance:
                 return
-            self._cell = self._floor.draw(self._rng)
-            self._body.put(*self._floor.point(self._cell))
+            self._begin()
+
+    def _begin(self) -> None:
+        self._cell = self._floor.draw(self._rng)
+        self._body.put(*self._floor.point(self._cell))
+
+
+class Person(_Bystander):
+    """Somebody who walks to a place, rests, and walks on, and waits for the robot."""
+
+    def __init__(self, number: int, floor: Floor, physics: PhysicsWorld, obstacles: Obstacles, seed: int) -> None:
+        angles = np.arange(CORNERS) * 2.0 * math.pi / CORNERS
+        ring = PERSON_RADIUS * np.column_stack((np.cos(angles), np.sin(angles)))
+        super().__init__(ring, ("person", number), floor, physics, obstacles)
+        self._rng = stream(seed, "people", str(number))
+        self._path: list[tuple[int, int]] = []
+        self._rest = self._waited = 0.0
+        self._begin()
 
     def advance(self, duration: float, x: float, y: float, radius: float) -> None:
         """Walk on, wait for the robot, or rest."""
@@ -177,30 +190,16 @@ class Person:
                 self._rest = float(self._rng.uniform(*REST))
 
 
-class MovedBox:
+class MovedBox(_Bystander):
     """A box that stands somewhere until somebody puts it elsewhere, far from the robot."""
 
     def __init__(self, number: int, floor: Floor, physics: PhysicsWorld, obstacles: Obstacles, seed: int) -> None:
         half = BOX / 2.0
         corners = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
+        super().__init__(corners, ("box", number), floor, physics, obstacles)
         self._rng = stream(seed, "clutter", str(number))
-        self._floor = floor
-        room = np.array([floor.point((0, 0)), floor.point(floor.free.shape)])
-        self._body = _Body(corners, ("box", number), physics, obstacles, room)
         self._stays = float(self._rng.exponential(MOVED_EVERY))
-        self._body.put(*floor.point(floor.draw(self._rng)))
-
-    @property
-    def outline(self) -> Polygon:
-        """Where the box stands."""
-        return self._body.outline
-
-    def keep_off(self, x: float, y: float, distance: float) -> None:
-        """Begin somewhere at least ``distance`` [m] from the robot's start."""
-        for _ in range(TRIES):
-            if math.dist(self._body.place, (x, y)) >= distance:
-                return
-            self._body.put(*self._floor.point(self._floor.draw(self._rng)))
+        self._begin()
 
     def advance(self, duration: float, x: float, y: float, radius: float) -> None:  # noqa: ARG002
         """Stay, or be put elsewhere when the time has come and the robot is far from both places."""
