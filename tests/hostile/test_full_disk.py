@@ -3,7 +3,6 @@
 Needs a small file system of its own, which only root may mount; elsewhere the tests are skipped.
 """
 
-import importlib.util
 import os
 import shlex
 import shutil
@@ -11,25 +10,12 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
 
+import inputs
 import pytest
 
 from closedrooms.cli.commands import main
 
-
-def _beside(name: str) -> ModuleType:
-    """A module of this folder: test folders are no packages."""
-    spec = importlib.util.spec_from_file_location(f"hostile_disk_{name}", Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-inputs = _beside("inputs")
 SIZE = 3_000_000
 ONE = ["--repetitions", "1", "--max-closed", "1", "--workers", "1"]
 FEW = ["--workers", "1", "--no-tours", "--resamples", "20"]

@@ -5,7 +5,6 @@ A few examples with fixed seeds in the default tests; ``make fuzz`` looks for ne
     python tests/hostile/test_fuzz.py [SECONDS] [FORMAT...]
 """
 
-import importlib.util
 import json
 import random
 import sys
@@ -15,28 +14,15 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
+import inputs
 import pytest
 from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 
 from closedrooms.core.errors import ClosedroomsError
 
-
-def _beside(name: str) -> ModuleType:
-    """A module of this folder: test folders are no packages."""
-    spec = importlib.util.spec_from_file_location(f"hostile_fuzz_{name}", Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-inputs = _beside("inputs")
 FORMATS = inputs.FORMATS
 EXAMPLES = 15
 # A reader answers within this time on a busy machine [s].

@@ -3,33 +3,18 @@
 Any exception that is not ours fails. ``cases.py`` beside this runs folders of such cases as processes.
 """
 
-import importlib.util
 import json
 import signal
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
 
+import inputs
 import pytest
 
 from closedrooms.cli.commands import main
 from closedrooms.core.errors import ClosedroomsError
 
-
-def _beside(name: str) -> ModuleType:
-    """A module of this folder: test folders are no packages."""
-    spec = importlib.util.spec_from_file_location(f"hostile_{name}", Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-inputs = _beside("inputs")
 FORMATS, MUTATIONS = inputs.FORMATS, inputs.MUTATIONS
 # In no format can these be read.
 REFUSED = {*inputs.PLACES, "empty", "zeros", "brackets", "tags"}
