@@ -100,7 +100,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
     """
     progress, watch = progress or Silent(), Stopwatch()
     if config.sim.robot_urdf is not None:
-        from closedrooms.sim.robot_urdf import with_own_robot
+        from closedrooms.sim.robot.robot_urdf import with_own_robot
 
         config = replace(config, sim=with_own_robot(config.sim))
     with watch.stage("world"):
