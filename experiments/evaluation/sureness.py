@@ -10,8 +10,8 @@ from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
+from closedrooms.core.shapes import polygon_iou
 from closedrooms.experiments.evaluation.statistics import rounded
-from closedrooms.pipeline.reporting.scores import polygon_iou
 from closedrooms.predictor.prediction import Prediction
 
 Scores = dict[str, Any]
