@@ -37,7 +37,7 @@ from closedrooms.predictor.confidence.belief import Belief
 from closedrooms.predictor.confidence.calibration import FILE
 from closedrooms.predictor.confidence.judge import join_spreads
 from closedrooms.predictor.confidence.room_features import NAMES, measure_rooms
-from closedrooms.predictor.confidence.variants import FACTORS, RoomVariants
+from closedrooms.predictor.confidence.shape_variants import FACTORS, RoomVariants
 from closedrooms.predictor.methods import METHODS, find_method
 from closedrooms.predictor.prediction import Prediction
 

@@ -20,7 +20,7 @@ from closedrooms.experiments.evaluation.listing import find_samples
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
 from closedrooms.experiments.training.buildings import read_groups, use_of
 from closedrooms.predictor.best.hypotheses import propose_rectangles
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.best.scene import prepare
 from closedrooms.predictor.best.shared_rooms import FEATURES, measure_shared
 from closedrooms.predictor.config import BestConfig

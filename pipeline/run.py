@@ -32,6 +32,7 @@ from closedrooms.pipeline.reporting.run_directory import Finding, run_figures, s
 from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.pipeline.reporting.scores import room_iou
 from closedrooms.pipeline.reporting.stopwatch import Stopwatch
+from closedrooms.pipeline.reporting.story import describe_robot, sum_up
 from closedrooms.pipeline.survey import Survey, survey_building, true_building
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction
@@ -100,6 +101,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
     ):
         recorder.configuration(manifest["configuration"])
         recorder.building(sim.plan, sim.world_T_map.inverse(), closed)
+        recorder.note(describe_robot(config))
         log, mapper = RunLog(sim, progress, keep_scans=config.keep_scans or config.bag), Mapper(config.mapper)
         found = _find_out(config, closed, log, mapper, recorder, progress, watch)
         remarks = [
@@ -109,6 +111,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
         ]
         manifest |= run_figures(plan, closed, sim.world_T_map.inverse(), found)
         manifest["remarks"] = [remark.as_json() for remark in remarks]
+        recorder.note(sum_up(manifest["metrics"]))
         with watch.stage("write"):
             progress.stage("write")
             write_run_files(staging, found, manifest["metrics"])

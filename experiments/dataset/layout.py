@@ -21,12 +21,11 @@ from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.sample import FORMAT, NOT_CONTENT
 from closedrooms.experiments.dataset.shard import DATA, PARTS
 from closedrooms.experiments.dataset.survey_store import SURVEYS
-from closedrooms.experiments.dataset.variants import SPLITS, Variant, World, find_variants, in_order
+from closedrooms.experiments.dataset.variants import SPLITS, Variant, World, find_variants, sort_buildings
 from closedrooms.experiments.places import Url
-from closedrooms.experiments.stores import Store, file_digest, open_store, read_file, write_file
+from closedrooms.experiments.stores import DATASET_MANIFEST, Store, file_digest, open_store, read_file, write_file
 from closedrooms.pipeline.reporting.manifest import resolved, versions
 
-DATASET_MANIFEST = "manifest.json"
 CARD = "README.md"
 SUMS = "SHA256SUMS"
 METADATA = "metadata.parquet"
@@ -59,7 +58,7 @@ class Count:
     size: int
 
 
-def claim(config: DatasetConfig, worlds: Sequence[World]) -> None:
+def claim_dataset(config: DatasetConfig, worlds: Sequence[World]) -> None:
     """Claim the place before the work, or check that it holds a part of this very dataset.
 
     Raises:
@@ -241,7 +240,7 @@ def write_manifest(config: DatasetConfig, worlds: Sequence[World], failed: Mappi
         file.write(json_bytes(head).removesuffix(empty) + b"[")
         between = b"\n"
         for variant in (
-            v for split in sorted(SPLITS) for w in in_order(worlds, split) for v in find_variants(w, config)
+            v for split in sorted(SPLITS) for w in sort_buildings(worlds, split) for v in find_variants(w, config)
         ):
             entry = {
                 "id": variant.id,

@@ -134,7 +134,7 @@ def count_variants(worlds: Sequence[World], config: DatasetConfig) -> int:
     return config.repetitions * sum(min(config.max_closed, len(world.closable)) for world in worlds)
 
 
-def in_order(worlds: Sequence[World], split: Split) -> list[World]:
+def sort_buildings(worlds: Sequence[World], split: Split) -> list[World]:
     """Sort the buildings of a split by their samples' ids."""
     return sorted((world for world in worlds if world.split == split), key=lambda world: f"{world.name}/")
 

@@ -11,9 +11,9 @@ from closedrooms.core.files.outgoing import MANIFEST
 from closedrooms.core.numbers import repr_of
 from closedrooms.experiments.evaluation.shard_rows import ShardRow, list_rows
 from closedrooms.experiments.places import Url
+from closedrooms.experiments.stores import DATASET_MANIFEST
 
 FILES = ("map.yaml", "doors.geojson", "truth.yaml")
-DATASET_MANIFEST = "manifest.json"
 MAX_REPETITION = 1_000_000
 
 

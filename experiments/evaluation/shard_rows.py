@@ -10,7 +10,7 @@ from typing import Any
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.experiments.places import Url
-from closedrooms.experiments.stores import file_digest, open_store
+from closedrooms.experiments.stores import DATASET_MANIFEST, file_digest, open_store
 
 COLUMNS = ("id", "world", "repetition")
 
@@ -64,7 +64,6 @@ def list_rows(dataset: Path | Url, manifest: Mapping[str, Any]) -> Iterator[List
     import pyarrow.parquet as pq
 
     from closedrooms.core.files.incoming import reading
-    from closedrooms.experiments.dataset.layout import DATASET_MANIFEST
     from closedrooms.experiments.dataset.packing import read_rows
     from closedrooms.experiments.dataset.shard import read_shard
 

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError, reason
 from closedrooms.core.files.incoming import read_json
@@ -18,7 +17,8 @@ from closedrooms.core.remarks import Remark
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.dataset.variants import remarks_on
-from closedrooms.experiments.evaluation.claimed_folder import claim
+from closedrooms.experiments.evaluation.claimed_folder import claim_folder
+from closedrooms.experiments.evaluation.tables import Row
 from closedrooms.experiments.evaluation.tours import code_digest
 from closedrooms.experiments.robustness.config import FACTORS, RobustnessConfig
 from closedrooms.experiments.robustness.levels import Case, Setting, cases
@@ -28,7 +28,6 @@ from closedrooms.pipeline.reporting.manifest import input_path, resolved, versio
 from closedrooms.pipeline.reporting.progress import Progress, Silent
 from closedrooms.worlds.library import bundled_names, distinct_names, load_world
 
-Row = dict[str, Any]
 ALL = "all"
 CELLS, RESULT = "cells", "rows.json"
 # How often it is looked how far the workers are [s].
@@ -53,7 +52,7 @@ def robustness(config: RobustnessConfig, *, progress: Progress | None = None) ->
     progress = progress or Silent()
     require("pyarrow", "matplotlib", by="closedrooms robustness")
     worlds, remarks = _worlds(config.worlds)
-    claim(config.out, "robustness")
+    claim_folder(config.out, "robustness")
     with only_writer(config.out):
         return _sweep(worlds, config, progress, remarks)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.structure.wall_faces import find_face_edges, lay_out
 
 # A face of a wall is free space with an occupied cell at most this far behind it [cells]: scan matching smears walls.
@@ -49,7 +49,7 @@ class Window:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Table:
+class SummedAreaTable:
     """Summed area table of a window of a raster, looked up by the raster's own rows and columns.
 
     Attributes:
@@ -85,9 +85,9 @@ class Table:
         return self.count(low, at, high, at + 1).astype(np.float64)
 
 
-def sum_up(mask: BoolArray, row: int = 0, col: int = 0) -> Table:
+def sum_up(mask: BoolArray, row: int = 0, col: int = 0) -> SummedAreaTable:
     """Sum up a mask whose first cell is ``(row, col)`` of the raster."""
-    return Table(np.asarray(cv2.integral(mask.astype(np.uint8))), row, col)
+    return SummedAreaTable(np.asarray(cv2.integral(mask.astype(np.uint8))), row, col)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

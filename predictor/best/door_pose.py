@@ -9,7 +9,7 @@ import numpy as np
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.predictor.best.door_frame import DoorFrame, TurnedMap, Window
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.structure.doorways import FacingDoor
 
 # Doors whose walls are closer than this belong to one wall [cells].

@@ -19,7 +19,7 @@ from closedrooms.predictor.best.candidates import FRONT
 from closedrooms.predictor.best.door_frame import DoorFrame
 from closedrooms.predictor.best.door_pose import Entry
 from closedrooms.predictor.best.evidence import NEAR_FACE, REACH, SLACK, Evidence
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 
 # So much wall in line with a side makes it sure by 1 - 1/e [cells].
 SURE = in_cells(3.0)
@@ -166,7 +166,7 @@ def log_proportion_squared(r: Rectangles) -> FloatArray:
     return np.asarray(np.log(r.width / r.depth) ** 2)
 
 
-def overlap(r: Rectangles) -> FloatArray:
+def taken_share(r: Rectangles) -> FloatArray:
     """Measure the share that known space and its walls take."""
     return np.asarray(r.taken / (r.width * r.depth))
 
@@ -294,7 +294,7 @@ FEATURES = (
     Feature("log area", log_area, weight=1.85),
     Feature("log area squared", log_area_squared, weight=-0.59),
     Feature("log proportion squared", log_proportion_squared, weight=-1.76),
-    Feature("overlap", overlap, weight=-1.71),
+    Feature("overlap", taken_share, weight=-1.71),
     Feature("door margin", door_margin, weight=-10.46),
     Feature("sides closed", lambda r: r.right.closed + r.left.closed, weight=0.68),
     Feature("sides tight", lambda r: r.right.tight + r.left.tight, weight=1.38),

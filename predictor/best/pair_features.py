@@ -10,7 +10,7 @@ import shapely
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.best.door_pose import SAME_WALL
 from closedrooms.predictor.best.hypotheses import Hypotheses
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 
 # Two sides that overlap by this still touch; slack of the thickness of the wall between two rooms [cells].
 TOUCHING, SLACK = in_cells(0.1), in_cells(0.3)

@@ -12,7 +12,7 @@ from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room, RoomKind
 from closedrooms.predictor.best.door_frame import TurnedMap
-from closedrooms.predictor.best.lattice import RESOLUTION, in_cells
+from closedrooms.predictor.best.resolution import RESOLUTION, in_cells
 from closedrooms.predictor.best.scene import Scene
 from closedrooms.predictor.best.selection import Choice
 from closedrooms.predictor.disjoint_rooms import NO_ROOM, part_rooms

@@ -8,8 +8,8 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.best.hypotheses import Doors, Hypotheses, Proposals, join_hypotheses
-from closedrooms.predictor.best.lattice import in_cells
 from closedrooms.predictor.best.pair_features import are_apart, score_pairs
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.best.scene import Scene
 from closedrooms.predictor.best.shared_rooms import LEAST, group_doors, rate_shared
 

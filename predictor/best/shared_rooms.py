@@ -9,8 +9,8 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.predictor.best import features
 from closedrooms.predictor.best.hypotheses import Doors, Hypotheses, Proposals, join_hypotheses
-from closedrooms.predictor.best.lattice import RESOLUTION
 from closedrooms.predictor.best.pair_features import score_pairs
+from closedrooms.predictor.best.resolution import RESOLUTION
 
 # Doors share a room from this probability on: on buildings of ``fit`` held out 28 sets were right and 1 wrong (36 and 6
 # from 0.7 on, 49 and 17 from 0.5 on). A shared room that is less likely than the other is not thought of.
@@ -94,7 +94,7 @@ def log_short_side(t: Together) -> float:
     return float(np.log(t.sides.min()))
 
 
-def open_share(t: Together) -> float:
+def shared_open_share(t: Together) -> float:
     """Measure the share of the room with nothing known beyond it."""
     return t.measured("open")
 
@@ -134,7 +134,7 @@ FEATURES = (
     SharedFeature("doors", count_doors, weight=-1.77),
     SharedFeature("wall filled", wall_filled, weight=4.84),
     SharedFeature("log short side", log_short_side, weight=1.1),
-    SharedFeature("open", open_share, weight=-2.18),
+    SharedFeature("open", shared_open_share, weight=-2.18),
     SharedFeature("corner closed", corner_closed, weight=-1.7),
 )
 WEIGHTS = np.array([feature.weight for feature in FEATURES])

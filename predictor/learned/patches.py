@@ -9,7 +9,7 @@ import numpy as np
 from closedrooms.core.arrays import BoolArray, CellArray, FloatArray, IntArray
 from closedrooms.predictor.best.door_frame import TurnedMap
 from closedrooms.predictor.best.door_pose import DoorPose
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.best.scene import Scene
 
 # Cells of a patch along each side, and their size [m]: 32 x 32 m, so that a room of 24 m fits.

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 # A map every so often: what the eye can follow [s].
 MAP_PERIOD = 2.0
 NOTHING = np.zeros((0, 2))
+MAPS = {"closed": "map with its closed doors", "predicted": "predicted map", "truth": "true map"}
 
 
 class Recorder:
@@ -78,7 +79,6 @@ class Recorder:
         self._palette: dict[str, colours.Colour] = {}
         self._stage: int = Stage.BUILDING
         self._seen: set[str] = set()
-        self._floor, self._quarters = 0.0, 0
         self._grids: dict[str, OccupancyGrid] = {}
         self._truth: dict[str, Shape] = {}
         self._last_map = -np.inf
@@ -128,7 +128,6 @@ class Recorder:
         self._stream.say("Building", text)
         self.note(f"{text}: {', '.join(sorted(closed)) or 'none'}")
         self._bounds = truth_bounds(plan, map_T_world)
-        self._floor = float(sum(room.polygon.area for room in plan.rooms))
         self._building = RecordedBuilding(self._stream, plan, map_T_world, closed)
         self._robot.draw_body("building/robot", colours.TRUTH)
         self._hold(building=True, door_states=bool(closed), active="Building")
@@ -195,7 +194,6 @@ class Recorder:
         area = float(np.count_nonzero(grid.known)) * grid.frame.resolution**2
         name, colour = "known area", colours.ESTIMATE
         self._curves.add("metrics/known_area/map", area, name, colour, stamp=stamp, stage=self._stage)
-        self._note_share(area)
         self._robot.draw_paths()
         self._hold(mapping=True)
 
@@ -203,13 +201,6 @@ class Recorder:
         """Draw what there is before the first prediction, so that no view is empty."""
         self._stream.log("rooms/predicted/grid", drawables.grid_map(grid))
         draw_nothing_yet(self._stream, grid)
-
-    def _note_share(self, area: float) -> None:
-        """Log a line whenever another quarter of the floor is known."""
-        quarters = 0 if not self._floor else min(int(4 * area / self._floor), 3)
-        if self._stage == Stage.MAPPING and quarters > self._quarters:
-            self._quarters = quarters
-            self.note(f"{25 * quarters} % of the floor is known, {area:.0f} m²")
 
     def frontiers(self, points: FloatArray, goal: Point | None, path: FloatArray | None, stamp: float) -> None:
         """Record frontiers, the goal and the path there."""
@@ -350,7 +341,7 @@ class Recorder:
             grid = self._grids.get(name)
             if grid is not None:
                 self._stream.log(f"coverage/{name}/grid", drawables.grid_map(grid), static=True)
-            self.note(f"tour on the {name} map: {tours[name].length:.1f} m")
+            self.note(f"tour on the {MAPS.get(name, name)}: {tours[name].length:.1f} m")
         self._stage = Stage.DRIVING
         self._hold(tours=tuple(tours))
 
