@@ -45,7 +45,7 @@ HEAD = (
 
 
 @dataclass(frozen=True)
-class Floor:
+class FloorToRun:
     """Floor to run, and its size [m]."""
 
     name: str
@@ -68,7 +68,7 @@ class Spent:
     error: str
 
 
-def find_floors(folder: Path) -> tuple[list[Floor], dict[str, str]]:
+def find_floors(folder: Path) -> tuple[list[FloorToRun], dict[str, str]]:
     """Find every floor below a folder, the largest first, and the unreadable files with the reason."""
     floors, broken = [], {}
     for path in sorted(p for p in folder.rglob("*") if p.suffix in {".xml", ".yaml", ".json"}):
@@ -81,7 +81,7 @@ def find_floors(folder: Path) -> tuple[list[Floor], dict[str, str]]:
                 continue
             x_min, y_min, x_max, y_max = wall_area(plan).bounds
             size = (round(x_max - x_min, 1), round(y_max - y_min, 1))
-            floors.append(Floor(name, str(path), level, *size, len(plan.rooms), len(closable_rooms(plan))))
+            floors.append(FloorToRun(name, str(path), level, *size, len(plan.rooms), len(closable_rooms(plan))))
     return sorted(floors, key=lambda floor: (-floor.width * floor.height, floor.name)), broken
 
 
@@ -124,7 +124,7 @@ def spend(words: list[str], limit: float) -> Spent:
     return Spent(process.returncode, time.perf_counter() - start, cpu, usage.ru_maxrss / 1024, error)
 
 
-def run_floor(floor: Floor, out: Path, options: argparse.Namespace) -> None:
+def run_floor(floor: FloorToRun, out: Path, options: argparse.Namespace) -> None:
     """Run both processes of a floor, where their results are not there yet; what they cost goes beside them."""
     folder, paper = out / floor.name, out / f"{floor.name}-paper"
     level = ["--level", floor.level] if floor.level else []
@@ -142,7 +142,7 @@ def note(out: Path, name: str, spent: Spent) -> None:
     (out / f"{name}.json").write_text(json.dumps(asdict(spent), indent=1) + "\n")
 
 
-def row(floor: Floor, out: Path) -> list[str]:
+def row(floor: FloorToRun, out: Path) -> list[str]:
     """Build the table's cells of one floor."""
     size = [floor.name, f"{floor.width:.0f} x {floor.height:.0f}", str(floor.rooms)]
     spent = Spent(**read(out / f"{floor.name}.json")) if (out / f"{floor.name}.json").exists() else None
@@ -176,7 +176,7 @@ def remark_of(status: str, doors: dict[str, Any], notes: list[str]) -> str:
     return "; ".join(remarks)
 
 
-def paper_iou(floor: Floor, out: Path, seen: set[str]) -> float | None:
+def paper_iou(floor: FloorToRun, out: Path, seen: set[str]) -> float | None:
     """Measure the mean IoU by door of the method ``paper`` on the map of the run."""
     predicted = out / f"{floor.name}-paper" / "rooms.geojson"
     if not predicted.exists():
@@ -215,7 +215,7 @@ def summary(rows: list[list[str]]) -> list[list[str]]:
     return lines
 
 
-def write_tables(floors: list[Floor], broken: dict[str, str], out: Path) -> None:
+def write_tables(floors: list[FloorToRun], broken: dict[str, str], out: Path) -> None:
     rows = [row(floor, out) for floor in floors]
     rows += [[name, *[""] * (len(HEAD) - 2), f"not read: {reason}"] for name, reason in broken.items()]
     with (out / "floors.csv").open("w", newline="") as file:

@@ -52,10 +52,10 @@ def main() -> None:
         folder = Path(scratch)
         with cluster(folder) as (address, pids):
             who = {"1 worker": ["--workers", "1"], "2 workers": ["--workers", "2"], CLUSTER: ["--scheduler", address]}
-            found[FIRST] = [make([*words, *who[CLUSTER]], folder / "first", pids)]
+            found[FIRST] = [make_dataset([*words, *who[CLUSTER]], folder / "first", pids)]
             for number in range(options.rounds):
                 for name, chosen in who.items():
-                    cost = make([*words, *chosen], folder / f"{number}-{name.replace(' ', '-')}", pids)
+                    cost = make_dataset([*words, *chosen], folder / f"{number}-{name.replace(' ', '-')}", pids)
                     found.setdefault(name, []).append(cost)
         samples = len(json.loads((folder / "first" / "manifest.json").read_text()).get("samples", ())) or None
     best = median(cost.cpu for cost in found["1 worker"])
@@ -66,7 +66,7 @@ def main() -> None:
         print(f"{name:<18}{cpu:>8.2f}{wall:>8.2f}{cpu / best:>20.2f}")
 
 
-def make(words: list[str], out: Path, pids: list[int]) -> Cost:
+def make_dataset(words: list[str], out: Path, pids: list[int]) -> Cost:
     """Make a dataset; whatever the cluster uses meanwhile counts."""
     own = resource.getrusage(resource.RUSAGE_CHILDREN)
     others = {pid: used(pid) for pid in everybody(pids)}

@@ -30,7 +30,7 @@ QUICK = 8
 
 
 @dataclass
-class Sample:
+class ProposedMap:
     """Proposals of one map, with the door that each hits (or ``None``)."""
 
     name: str
@@ -39,11 +39,11 @@ class Sample:
     found: list[tuple[DoorProposal, ClosedDoor | None]] = field(default_factory=list)
 
 
-def measure(folder: Path, tolerance: float) -> Sample:
+def measure(folder: Path, tolerance: float) -> ProposedMap:
     grid, doors = read_map(folder / "map.yaml"), read_doors(folder / "doors.geojson")
     start = time.process_time()
     proposals = propose_doors(grid, ProposalConfig(min_score=0.0))
-    sample = Sample(folder.name, len(doors), time.process_time() - start)
+    sample = ProposedMap(folder.name, len(doors), time.process_time() - start)
     left = list(doors)
     for proposal in proposals:
         near = [door for door in left if math.dist(door.midpoint, proposal.midpoint) <= tolerance]
@@ -54,7 +54,7 @@ def measure(folder: Path, tolerance: float) -> Sample:
     return sample
 
 
-def table(title: str, samples: list[Sample]) -> None:
+def print_table(title: str, samples: list[ProposedMap]) -> None:
     if not samples:
         print(f"\n{title}: no maps")
         return
@@ -78,7 +78,7 @@ def table(title: str, samples: list[Sample]) -> None:
     print(f"CPU {np.mean([s.seconds for s in samples]):.2f} s a map, at most {max(s.seconds for s in samples):.2f} s")
 
 
-def fit(samples: list[Sample]) -> None:
+def fit(samples: list[ProposedMap]) -> None:
     """Fit the regression whose coefficients stand in door_proposals.py."""
     from sklearn.linear_model import LogisticRegression
 
@@ -106,8 +106,8 @@ def main() -> None:
         samples = [measure(path, options.tolerance) for path in paths]
         if options.fit:
             fit(samples[::2])
-        table(f"{folder.name}, tuned half", samples[::2])
-        table(f"{folder.name}, held-out half", samples[1::2])
+        print_table(f"{folder.name}, tuned half", samples[::2])
+        print_table(f"{folder.name}, held-out half", samples[1::2])
         if options.misses:
             for sample in samples:
                 wrong = [f"({p.midpoint[0]:.1f}, {p.midpoint[1]:.1f}) {p.score:.2f}" for p, hit in sample.found

@@ -18,7 +18,7 @@ from sklearn.model_selection import GroupKFold
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.experiments.evaluation.listing import find_samples
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
-from closedrooms.experiments.training.buildings import read_groups, use_of
+from closedrooms.experiments.training.buildings import group_of, use_of
 from closedrooms.predictor.best.hypotheses import propose_rectangles
 from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.best.scene import prepare
@@ -26,13 +26,6 @@ from closedrooms.predictor.best.shared_rooms import FEATURES, measure_shared
 from closedrooms.predictor.config import BestConfig
 
 FOLDS = 8
-
-
-def group_of(building: str) -> str:
-    for group in read_groups():
-        if building in group.buildings:
-            return group.buildings[0]
-    return building
 
 
 def measure(sample: Sample) -> list[tuple[FloatArray, bool]]:

@@ -41,7 +41,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def mapped(run: RecordedRun, config: MapperConfig) -> Mapper:
+def map_run(run: RecordedRun, config: MapperConfig) -> Mapper:
     """Map all scans of a run."""
     mapper = Mapper(config)
     for scan, odometry in zip(run.scans, run.odometry, strict=True):
@@ -65,7 +65,7 @@ def measure(world: str, noise: str, options: argparse.Namespace) -> dict[str, ob
     write_scans(path, run, estimate=mapper.trajectory()[1], compressed=False)
     without = mapper
     if len(mapper.loops):
-        without = mapped(read_run(path), MapperConfig(loops=LoopConfig(enabled=False)))
+        without = map_run(read_run(path), MapperConfig(loops=LoopConfig(enabled=False)))
 
     def known(some: Mapper) -> float:
         map_T_world = start.inverse()

@@ -63,7 +63,7 @@ def since(start: tuple[float, float]) -> tuple[float, float]:
     return now[0] - start[0], now[1] - start[1]
 
 
-def mapped(run: RecordedRun, config: MapperConfig) -> tuple[Mapper, FloatArray, tuple[float, float]]:
+def time_mapping(run: RecordedRun, config: MapperConfig) -> tuple[Mapper, FloatArray, tuple[float, float]]:
     """Map a run: the mapper, the poses as estimated at the time, processor and wall-clock time [s]."""
     mapper = Mapper(config)
     start = clocks()
@@ -161,7 +161,7 @@ def with_gtsam(run: RecordedRun) -> FloatArray:
     own = graph_module.optimise
     graph_module.optimise = gtsam_optimise
     try:
-        return mapped(run, MapperConfig())[0].trajectory()[1]
+        return time_mapping(run, MapperConfig())[0].trajectory()[1]
     finally:
         graph_module.optimise = own
 
@@ -191,8 +191,8 @@ def bench_log(path: Path) -> list[str]:
             return "not installed"
         return f"{error(poses, run.reference)}; {speed(n, since(start))}"
 
-    without, _, seconds_without = mapped(run, WITHOUT_LOOPS)
-    mapper, online, seconds = mapped(run, MapperConfig())
+    without, _, seconds_without = time_mapping(run, WITHOUT_LOOPS)
+    mapper, online, seconds = time_mapping(run, MapperConfig())
     return [
         path.name.split(".")[0].removesuffix("-corrected"),
         f"{n}",
@@ -230,7 +230,7 @@ def bench_parts(run: RecordedRun) -> None:
 
 
 METHODS: dict[str, Callable[[RecordedRun], FloatArray]] = {
-    "closedrooms": lambda run: mapped(run, MapperConfig())[0].trajectory()[1],
+    "closedrooms": lambda run: time_mapping(run, MapperConfig())[0].trajectory()[1],
     "yag-slam": yag_slam,
     "small_gicp": gicp,
     "kiss-icp": kiss,

@@ -78,7 +78,7 @@ ROOMS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class ErasedCase:
     """Map with rooms erased: what the predictor gets, and the cells of each erased room by its door."""
 
     name: str
@@ -143,7 +143,7 @@ def large_parts(mask: BoolArray, resolution: float) -> BoolArray:
     return np.asarray(large[labels], dtype=np.bool_)
 
 
-def erase(grid: OccupancyGrid, rooms: Sequence[Erased], name: str) -> Case:
+def erase_rooms(grid: OccupancyGrid, rooms: Sequence[Erased], name: str) -> ErasedCase:
     """Erase some rooms of the map and shut their doors."""
     import cv2
 
@@ -166,21 +166,21 @@ def erase(grid: OccupancyGrid, rooms: Sequence[Erased], name: str) -> Case:
         a, b = (point_of(frame, pixel) for pixel in room.door)
         width = float(np.hypot(b[0] - a[0], b[1] - a[1]))
         doors.append(ClosedDoor(room.name, ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2), (a, b), width))
-    return Case(name, OccupancyGrid(frame, cells), tuple(doors), truth)
+    return ErasedCase(name, OccupancyGrid(frame, cells), tuple(doors), truth)
 
 
-def cases(folder: Path, names: Sequence[str]) -> Iterator[Case]:
+def erased_cases(folder: Path, names: Sequence[str]) -> Iterator[ErasedCase]:
     """Yield every room by itself, then all of a map at once."""
     for name in names:
         grid = open_map(folder, name)
         rooms = [room for room in ROOMS if room.map == name]
         for room in rooms:
-            yield erase(grid, [room], f"{name}: {room.name}")
+            yield erase_rooms(grid, [room], f"{name}: {room.name}")
         if len(rooms) > 1:
-            yield erase(grid, rooms, f"{name}: all {len(rooms)}")
+            yield erase_rooms(grid, rooms, f"{name}: all {len(rooms)}")
 
 
-def judge(case: Case, predicted: Sequence[Room]) -> dict[str, float]:
+def measure_rooms(case: ErasedCase, predicted: Sequence[Room]) -> dict[str, float]:
     """Measure the IoU of each erased room with the room predicted behind its door, 0 without one."""
     frame = case.grid.frame
     grown = frame
@@ -195,7 +195,7 @@ def judge(case: Case, predicted: Sequence[Room]) -> dict[str, float]:
     return figures
 
 
-def draw(path: Path, case: Case, predicted: dict[str, Sequence[Room]]) -> None:
+def draw_case(path: Path, case: ErasedCase, predicted: dict[str, Sequence[Room]]) -> None:
     """Draw the erased map, the truth (green) and what each method predicts (outlines)."""
     import cv2
     import shapely
@@ -237,13 +237,13 @@ def main() -> None:
         f"| map | erased | m2 | {' | '.join(heads)} | CPU s |\n| --- | --- | {'---: | ' * (len(heads) + 2)}", flush=True
     )
     totals: dict[bool, list[list[float]]] = {False: [], True: []}
-    for case in cases(options.folder, options.maps):
+    for case in erased_cases(options.folder, options.maps):
         start = time.process_time()
         tidy = filter_clutter(case.grid)
         outcomes = {}
         for head, (method, clean) in zip(heads, columns, strict=True):
             outcomes[head] = predict(tidy if clean else case.grid, case.doors, method)
-        scores = {head: judge(case, outcome.rooms) for head, outcome in outcomes.items()}
+        scores = {head: measure_rooms(case, outcome.rooms) for head, outcome in outcomes.items()}
         name, what = case.name.split(": ")
         several = len(case.doors) > 1
         for door, truth in case.truth.items():
@@ -258,7 +258,7 @@ def main() -> None:
                 print(f"<!-- {case.name}, {head}: {door} not predicted: {reason} -->")
         if options.pictures:
             options.pictures.mkdir(parents=True, exist_ok=True)
-            draw(options.pictures / f"{case.name.replace(': ', '-').replace(' ', '-')}.png", case,
+            draw_case(options.pictures / f"{case.name.replace(': ', '-').replace(' ', '-')}.png", case,
                  {head: outcome.rooms for head, outcome in outcomes.items()})  # fmt: skip
     for several, rows in totals.items():
         if rows:

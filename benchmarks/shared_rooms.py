@@ -102,7 +102,7 @@ def no_joining() -> Iterator[None]:
         yield
 
 
-def judge(tally: Tally, doors: Sequence[ClosedDoor], truth: Sequence[Room], joined: Sequence[Room],
+def tally_map(tally: Tally, doors: Sequence[ClosedDoor], truth: Sequence[Room], joined: Sequence[Room],
           apart: Sequence[Room]) -> None:  # fmt: skip
     """Add one map to the tally."""
     by_id = {door.id: door for door in doors}
@@ -156,7 +156,7 @@ def main() -> None:
                 apart = predict(grid, doors, "best").rooms
             joined = predict(grid, doors, "best").rooms
             for tally in (own, whole):
-                judge(tally, doors, truth, joined, apart)
+                tally_map(tally, doors, truth, joined, apart)
         print(own.row(plan.name), flush=True)
     print(whole.row("all"))
 

@@ -69,7 +69,7 @@ def call(source: Path, words: tuple[str, ...], out: Path) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def prepare(folder: Path) -> None:
+def prepare_inputs(folder: Path) -> None:
     """Make a map with proposed doors, and three samples to evaluate."""
     words = ("worlds", "convert", "office-02", str(folder / "truth.yaml"), "--to", "rosmap")
     call(HERE, words, folder / "none")
@@ -86,7 +86,7 @@ def main() -> None:
     sources = [HERE, *([options.baseline.resolve()] if options.baseline else [])]
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        prepare(folder)
+        prepare_inputs(folder)
         lines = {name: words for name, words in commands(folder).items() if not (options.quick and name in SIMULATED)}
         if "evaluate" in lines:
             call(HERE, (*lines["dataset"][:-1], str(folder / "data")), folder / "none")

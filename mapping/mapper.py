@@ -251,12 +251,12 @@ class Mapper:
             self._events.note(Event.RECOVERED, stamp)
         return match
 
-    def _far(self, pose: Pose2, patience: float = 1.0) -> bool:
+    def _far(self, pose: Pose2, stretch: float = 1.0) -> bool:
         """Check whether a pose is as far from the latest keyframe as keyframes are apart."""
         latest, config = self.keyframes[-1].pose, self._config
         return (
-            latest.distance(pose) >= patience * config.keyframe_distance
-            or abs(wrap_angle(latest.theta - pose.theta)) >= patience * config.keyframe_angle
+            latest.distance(pose) >= stretch * config.keyframe_distance
+            or abs(wrap_angle(latest.theta - pose.theta)) >= stretch * config.keyframe_angle
         )
 
     def _wants_keyframe(self) -> bool:
@@ -265,9 +265,9 @@ class Mapper:
             return True
         if self._lost:
             # A map should not be given up while the next scan may still find back.
-            far = self._travelled - self.keyframes[-1].travelled > recovery.patience_distance
-            return far or self._lost >= recovery.patience
-        return self._far(self._pose, 1.0 if self._trusted else self._config.patience)
+            far = self._travelled - self.keyframes[-1].travelled > recovery.lost_distance
+            return far or self._lost >= recovery.lost_scans
+        return self._far(self._pose, 1.0 if self._trusted else self._config.poor_spacing)
 
     def _insert(self, keyframe: Keyframe) -> None:
         if self.keyframes:

@@ -25,7 +25,7 @@ WITH_POSES = ("FLASER", "ROBOTLASER1", "ROBOTLASER2")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScanLine:
-    """One scan.
+    """One scan as a line has it; angles and range may be missing, unlike in a ``LaserScan``.
 
     Attributes:
         ranges: As written, shape (n,) [m].

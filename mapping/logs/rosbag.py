@@ -20,7 +20,7 @@ from closedrooms.mapping.logs.bag_messages import MAX_SCANS, BagMessages, choose
 from closedrooms.mapping.logs.bag_options import BagOptions
 from closedrooms.mapping.logs.bag_scans import ranges_of, scan_of, sector_of
 from closedrooms.mapping.logs.clocks import Times, forward, scan_and_odometry_times
-from closedrooms.mapping.logs.odometry import bridge_jumps, jump_remarks, odometry_at
+from closedrooms.mapping.logs.recorded_odometry import bridge_jumps, jump_remarks, odometry_at
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.mapping.logs.transform_tree import Mount, TransformTree, clean_name
 

@@ -7,8 +7,8 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.remarks import Remark
 from closedrooms.core.report import counted
+from closedrooms.core.shapes import polygon_iou
 from closedrooms.pipeline.config import RunConfig
-from closedrooms.pipeline.reporting.scores import polygon_iou
 from closedrooms.predictor.prediction import Prediction
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def describe_robot(config: RunConfig) -> str:
     )
 
 
-def sum_up(metrics: Mapping[str, Any]) -> str:
+def summarise_run(metrics: Mapping[str, Any]) -> str:
     """Sum up the figures of a run in one line.
 
     Args:

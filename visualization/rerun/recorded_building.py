@@ -115,7 +115,7 @@ class RecordedBuilding:
         if not glass.is_empty:
             self._draw_solid("building/glass", glass, WALL_HEIGHT, colours.GLASS, alpha=GLASS_ALPHA)
         floors = [Polygon(self._map_T_world.transform(np.asarray(room.polygon.exterior.coords))) for room in plan.rooms]
-        self._stream.log("building/floor", drawables.fill(floors, colours.FLOOR, alpha=255, z=-0.02), static=True)
+        self._stream.log("building/floor", drawables.filled(floors, colours.FLOOR, alpha=255, z=-0.02), static=True)
         if not furniture.is_empty:
             self._draw_solid("building/furniture", furniture, FURNITURE_HEIGHT, colours.FURNITURE)
 

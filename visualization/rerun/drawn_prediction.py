@@ -14,7 +14,7 @@ from closedrooms.core.room import Room
 from closedrooms.visualization import colours
 from closedrooms.visualization.colours import Colour
 from closedrooms.visualization.rerun import drawables
-from closedrooms.visualization.rerun.documents import markdown
+from closedrooms.visualization.rerun.documents import text_document
 from closedrooms.visualization.rerun.stream import RecordingStream, Stage
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def draw_trace(
         stream.say("Initial faces", f"{len(trace.initial)} doors, each with the unknown face behind it (section 3.3)")
     stream.clear("prediction/initial")
     for door, face in sorted(trace.initial.items()):
-        stream.log(f"prediction/initial/{door}", drawables.fill([trace.faces[face]], palette[door], alpha=170))
+        stream.log(f"prediction/initial/{door}", drawables.filled([trace.faces[face]], palette[door], alpha=170))
     stream.clear("prediction/layouts")
     for level in trace.levels if staged else trace.levels[-1:]:
         if staged:
@@ -168,7 +168,7 @@ def _draw_faces(stream: RecordingStream, trace: "PredictionTrace", *, staged: bo
     ):
         stream.log(
             f"prediction/faces/{name}",
-            drawables.fill([face for face, take in zip(trace.faces, chosen, strict=True) if take], colour, alpha=90),
+            drawables.filled([face for face, take in zip(trace.faces, chosen, strict=True) if take], colour, alpha=90),
         )
 
 
@@ -180,7 +180,7 @@ def _draw_scores(stream: RecordingStream, trace: "PredictionTrace", palette: Map
         for level in trace.levels
     ]
     lines = ["| " + " | ".join(row) + " |" for row in [["level", *doors], ["---:"] * (len(doors) + 1), *rows]]
-    stream.log("prediction/scores", markdown("\n".join(lines)), static=True)
+    stream.log("prediction/scores", text_document("\n".join(lines)), static=True)
     for door in doors:
         stream.log(
             f"metrics/score/{door}",
@@ -199,7 +199,7 @@ def _draw_room(
     static: bool = False,
     alpha: int = USUAL,
 ) -> None:
-    stream.log(root, drawables.fill([shape], colour, alpha=alpha), static=static)
+    stream.log(root, drawables.filled([shape], colour, alpha=alpha), static=static)
     stream.log(f"{root}/outline", drawables.outlines([shape], colour), static=static)
 
 
