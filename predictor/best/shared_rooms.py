@@ -116,7 +116,7 @@ class SharedFeature:
     Attributes:
         name: For people.
         measure: Of some doors.
-        weight: What it counts: logistic regression on ``fit`` (``benchmarks/fit_shared_rooms.py``).
+        weight: What it counts: logistic regression on ``fit`` (``benchmarks/fitting/fit_shared_rooms.py``).
     """
 
     name: str

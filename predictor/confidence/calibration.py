@@ -1,4 +1,4 @@
-"""The numbers that turn beliefs into probabilities, by method: found on ``fit`` by ``benchmarks/fit_confidence.py``."""
+"""The numbers that turn beliefs into probabilities, by method: from ``benchmarks/fitting/fit_confidence.py`` on ``fit``."""
 
 from dataclasses import dataclass
 from functools import cache

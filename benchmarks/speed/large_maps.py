@@ -1,6 +1,6 @@
 """Maps as large as one likes, tiled from mapped buildings: processor time and memory of whole processes.
 
-    python benchmarks/large_maps.py RUN... [--cells 4000 8000] [--doors 20] [--methods paper best]
+    python benchmarks/speed/large_maps.py RUN... [--cells 4000 8000] [--doors 20] [--methods paper best]
 
 A run is a folder with ``map.yaml`` and ``doors.geojson``. Every method reads the map, predicts and, where it is one of
 ``closedrooms predict``, writes its folder, in a process of its own.

@@ -1,6 +1,7 @@
 """What a dataset costs by who makes it: local workers, and a Dask cluster of this machine.
 
-    python benchmarks/dataset_throughput.py [WORLD ...] [--repetitions 6] [--rounds 3] [--format folders] [--quick]
+    python benchmarks/speed/dataset_throughput.py [WORLD ...] [--repetitions 6] [--rounds 3] [--format folders]
+                                                [--quick]
 
 Each round makes the same dataset once with each, in turn; figures are medians over the rounds. CPU time is user and
 system time of all processes that take part, of the cluster (scheduler, two workers with one thread each, their

@@ -1,6 +1,6 @@
 """Exploration side by side: known area, simulated time and the share of each step, on any worlds.
 
-    python benchmarks/exploration.py [WORLD ...] [--noise medium] [--close 5] [--seed 0] [--quick]
+    python benchmarks/speed/exploration.py [WORLD ...] [--noise medium] [--close 5] [--seed 0] [--quick]
 
 Prints one row a world: status, simulated seconds, travelled distance, plans, share of the reachable free cells that is
 known at the end, trajectory error, doors seen, and milliseconds a scan for sensing, mapping and navigating.

@@ -1,6 +1,6 @@
 """How well closed doors are found in maps alone: precision and recall against the doors that simulated runs closed.
 
-    python benchmarks/door_proposals.py RUN_FOLDER... [--tolerance 0.3] [--fit] [--quick]
+    python benchmarks/quality/door_proposals.py RUN_FOLDER... [--tolerance 0.3] [--fit] [--quick]
 
 A sample is any folder at any depth with ``map.yaml`` and ``doors.geojson`` (``closedrooms run`` leaves both). A
 proposal is right when its middle lies within the tolerance of a closed door's, one proposal a door; the others are

@@ -1,6 +1,6 @@
 """Trajectory error and mapped area on simulated worlds, with and without loop closure.
 
-    python benchmarks/loop_closure.py --out DIR [WORLD ...] [--noise medium high] [--seed 0] [--close 5]
+    python benchmarks/quality/loop_closure.py --out DIR [WORLD ...] [--noise medium high] [--seed 0] [--close 5]
 
 Each world (all bundled ones when none is named) is explored once at each level of noise by the mapper as it is, and its
 scans are kept in ``DIR/<world>-<noise>.npz``. Where that mapper closed a loop, the same scans are mapped again with

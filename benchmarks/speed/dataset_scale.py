@@ -1,6 +1,6 @@
 """Whether a large dataset costs more a sample, or more memory, than a small one: trivial work in place of maps.
 
-    python benchmarks/dataset_scale.py [--sizes 1000 10000 100000] [--workers 2] [--quick] [--csv FILE]
+    python benchmarks/speed/dataset_scale.py [--sizes 1000 10000 100000] [--workers 2] [--quick] [--csv FILE]
 
 All is as in ``closedrooms dataset --format shards`` (jobs handed out, parts written, shards filled, tables), only a
 sample is 2 kB of nothing. Each size is a process of its own. CPU time is that of the command and of its workers; memory

@@ -1,6 +1,6 @@
 """How fast the simulation senses: rays a second beside PyBullet's bare ``rayTestBatch``, from 20 m to 130 m.
 
-    python benchmarks/rays.py [WORLD ...] [--scans 300] [--repeats 5] [--quick]
+    python benchmarks/speed/rays.py [WORLD ...] [--scans 300] [--repeats 5] [--quick]
 
 Without a world it measures corridors with rooms on both sides, of growing length. Each world is crossed by a robot that
 turns away from what is near; the same poses are then cast by every way in turn, and the median of some repeats counts.

@@ -1,6 +1,6 @@
 """The whole job on buildings of growing size: seconds by stage, and how many times faster than real time it is.
 
-    python benchmarks/whole_run.py [WORLD ...] [--record] [--quick]
+    python benchmarks/speed/whole_run.py [WORLD ...] [--record] [--quick]
 
 Without arguments it takes bundled worlds from the smallest to the largest. Every world runs once with the same
 options, one after the other in one process, so that the figures can be compared with each other; they are this

@@ -1,6 +1,6 @@
 """Do erased maps agree with simulated ones? 40 samples made both ways, same doors closed, same start.
 
-    python benchmarks/erased.py OUT [--workers 2] [--quick]
+    python benchmarks/quality/erased.py OUT [--workers 2] [--quick]
 
 Ten bundled worlds, one order of closing each, with one door, a third, two thirds and all of the doors closed.
 Resumable: what OUT holds is not made again. ``--quick`` takes the first world only, four samples.

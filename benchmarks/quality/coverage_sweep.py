@@ -1,6 +1,6 @@
 """Errors of the tour estimates against the number of closed doors (paper, section 5.3 and figure 12).
 
-    python benchmarks/coverage_sweep.py --out DIR [WORLD ...] [--seeds 3] [--noise medium] [--picture PNG]
+    python benchmarks/quality/coverage_sweep.py --out DIR [WORLD ...] [--seeds 3] [--noise medium] [--picture PNG]
 
 Every world is explored once a seed with all doors open; the maps with a third, two thirds and all of the closable doors
 closed are redrawn from it (``closedrooms.experiments.dataset``). Rows go to ``DIR/sweep.csv`` as they come; what stands

@@ -1,6 +1,6 @@
 """Add the figures of an evaluation of reported buildings to the ledger, a line a figure.
 
-    python benchmarks/report_figures.py EVALUATION --dataset "the authors' eight"
+    python benchmarks/quality/report_figures.py EVALUATION --dataset "the authors' eight"
 
 EVALUATION is a folder that ``closedrooms evaluate`` wrote. It is done once a version, after all decisions: the ledger
 (``experiments/training/ledger.csv``) tells how often anybody looked.

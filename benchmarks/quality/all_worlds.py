@@ -1,6 +1,7 @@
 """Run the main job on many worlds and print one table, in Markdown: area mapped, trajectory error, doors, IoU, seconds.
 
-    python benchmarks/all_worlds.py [WORLD ...] [--noise medium] [--seed 0] [--close 5] [--method best] [--drive]
+    python benchmarks/quality/all_worlds.py [WORLD ...] [--noise medium] [--seed 0] [--close 5] [--method best]
+                                                [--drive]
 
 Without worlds it takes the 20 bundled ones. Nothing is recorded; one process, one world after the other.
 """

@@ -1,6 +1,6 @@
 """How long commands take on small inputs, most of it start-up: CPU seconds, and how many times quicker than before.
 
-    python benchmarks/start_up.py [--calls N] [--quick] [--baseline SOURCE]
+    python benchmarks/speed/start_up.py [--calls N] [--quick] [--baseline SOURCE]
 
 SOURCE is the source of another version of this program, its ``.typing`` folder included; both are called in turn, and
 the last column is the median of the ratios of neighbours, before / now: above 1 is quicker. The first row is an empty
@@ -19,7 +19,7 @@ from statistics import median
 
 from closedrooms.sim.config import SimConfig
 
-HERE = Path(__file__).resolve().parents[1]
+HERE = Path(__file__).resolve().parents[2]
 # The entry point moved since; the first that a source has is called.
 ENTRIES = ("cli/commands.py", "pipeline/commands.py")
 SIMULATED = ("run", "dataset", "evaluate")

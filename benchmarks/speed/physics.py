@@ -1,6 +1,6 @@
 """What bodies cost: processor time a simulated second, kinematic beside wheels beside bare ``stepSimulation``.
 
-    python benchmarks/physics.py [WORLD ...] [--seconds S]
+    python benchmarks/speed/physics.py [WORLD ...] [--seconds S]
 
 The robot drives the same commands in every row. Bare steps are those of the world with wheels, without commands,
 encoders or contacts being read. Rays are one sweep of 720 beams a tenth of a second. The figures are this machine's and

@@ -1,6 +1,6 @@
 """Predict rooms that were erased from maps of real, furnished places, and compare with what was erased.
 
-    python benchmarks/real_maps.py ../shared/data/maps [--pictures FOLDER] [--maps NAME ...]
+    python benchmarks/quality/real_maps.py ../shared/data/maps [--pictures FOLDER] [--maps NAME ...]
 
 The maps (goldleaf3i/declutter-reconstruct, MIT) are not part of this repository; no picture of them is either. What is
 erased stands in ``ROOMS``, in pixels of each picture (x to the right, y down), measured by eye on the maps:

@@ -1,6 +1,6 @@
 """Measure how often the interval of the cost of coverage holds the true cost, for several widths of its noise.
 
-    python benchmarks/completions.py SAMPLES [--method best] [--every 1] [--count 20]
+    python benchmarks/quality/completions.py SAMPLES [--method best] [--every 1] [--count 20]
 
 SAMPLES are folders of samples, as ``drawn_maps.py`` writes them. ``coverage/cost_spread.py`` has the noise that makes
 the interval hold what it says on the use ``fit``; the use ``choose`` tells what that is worth elsewhere. Intervals at

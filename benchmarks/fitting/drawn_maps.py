@@ -1,6 +1,6 @@
 """Draw maps with closed doors of the buildings of one use, as samples that ``closedrooms evaluate`` reads.
 
-    python benchmarks/drawn_maps.py PLANS --use fit|choose --out FOLDER [--maps 6] [--generated 20] [--bundled]
+    python benchmarks/fitting/drawn_maps.py PLANS --use fit|choose --out FOLDER [--maps 6] [--generated 20] [--bundled]
 
 PLANS is a folder of floor plans, searched with its sub-folders; buildings of another use are passed by. Of a building
 every map has its own doors closed, 1 to 12 rooms, those with several doors too in every third map; one map in five is

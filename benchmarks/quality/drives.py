@@ -1,6 +1,6 @@
 """Drive the planned tour on several worlds: the table and the picture of docs/results/tours.md.
 
-    python benchmarks/drives.py --out DIR [WORLD[:SEED] ...] [--noise medium] [--close 5] [--picture PNG]
+    python benchmarks/quality/drives.py --out DIR [WORLD[:SEED] ...] [--noise medium] [--close 5] [--picture PNG]
 
 Every run keeps its directory in DIR and is not repeated when that is there. One process, nothing recorded.
 """

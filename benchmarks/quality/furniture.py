@@ -1,6 +1,6 @@
 """What furniture costs the prediction, and what it brings to count it as free where walls are looked for.
 
-    python benchmarks/furniture.py [WORLD ...] [--sets 3] [--closed 6]
+    python benchmarks/quality/furniture.py [WORLD ...] [--sets 3] [--closed 6]
 
 Each world is explored twice, furnished and bare, all doors open; the drive is mapped with the noise ``medium``; sets of
 rooms are closed by redrawing the map (as ``closedrooms robustness`` does). Every map is predicted with

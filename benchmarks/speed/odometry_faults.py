@@ -1,4 +1,4 @@
-"""Mapping with odometry that fails, beside the peers: the part of ``benchmarks/mapping.py`` behind ``--faults``.
+"""Mapping with odometry that fails, beside the peers: the part of ``benchmarks/speed/mapping.py`` behind ``--faults``.
 
 Faults hit a share of the steps from scan to scan, drawn by the seed: ``dropped`` steps are lost for good, ``doubled``
 ones count twice, ``frozen`` ones repeat the reading before, which the next step makes up for. ``none`` is a run without
@@ -148,7 +148,7 @@ def bench_faults(logs: list[Path], methods: dict[str, Method], *, seeds: int, qu
         ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, cwd=folder, check=False
     ).stdout.strip()
     words = [Path(word).name if "/" in word else word for word in sys.argv[1:]]
-    print(f"# python benchmarks/mapping.py {' '.join(words)}", file=out)
+    print(f"# python benchmarks/speed/mapping.py {' '.join(words)}", file=out)
     print(f"# {datetime.date.today().isoformat()}, commit {commit or 'unknown'}", file=out)
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(COLUMNS)

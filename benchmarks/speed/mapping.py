@@ -1,13 +1,14 @@
 """How good and how fast the mapper is on recorded logs, beside its peers, in one run.
 
-    python benchmarks/mapping.py LOG ... [--parts]
-    python benchmarks/mapping.py LOG ... --faults [--quick] [--seeds 5] [--methods closedrooms yag-slam ...] [--out CSV]
+    python benchmarks/speed/mapping.py LOG ... [--parts]
+    python benchmarks/speed/mapping.py LOG ... --faults [--quick] [--seeds 5] [--methods closedrooms yag-slam ...]
+                                                [--out CSV]
 
 Every log is mapped with one set of parameters, the defaults, and compared with raw odometry; with ``small_gicp`` (scan
 to keyframe) and ``kiss-icp`` (without deskewing), both started from odometry, where they are installed; with the mapper
 without loops; and, where ``gtsam`` is installed, with the mapper whose pose graph gtsam solves. Errors are against
 the log's reference poses after SE(2) alignment. Speeds are scans a second of the process's own processor time, with
-wall-clock time in brackets, reading and importing left out. Simulated worlds: ``benchmarks/loop_closure.py``.
+wall-clock time in brackets, reading and importing left out. Simulated worlds: ``benchmarks/quality/loop_closure.py``.
 
 With ``--faults`` steps of the odometry fail (``odometry_faults.py``), ``yag-slam`` is measured too, and the result is a
 CSV; ``--quick`` takes less than a minute a log.

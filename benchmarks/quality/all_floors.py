@@ -1,7 +1,7 @@
 """Run the main job on every floor of a folder of floor plans, unattended and resumable, and make one table.
 
-    python benchmarks/all_floors.py ../shared/data/plans --out /tmp/floors [--noise medium] [--close 5] [--seed 0]
-                                    [--workers 1] [--limit 1200] [--smallest-first] [--only-table]
+    python benchmarks/quality/all_floors.py ../shared/data/plans --out /tmp/floors [--noise medium] [--close 5]
+                                    [--seed 0] [--workers 1] [--limit 1200] [--smallest-first] [--only-table]
 
 Every file below the folder that an importer knows is a floor; a file with several levels is one floor a level. A floor
 is two processes: ``closedrooms run`` with the method ``best``, then ``closedrooms predict`` with the method ``paper``

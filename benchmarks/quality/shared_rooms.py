@@ -1,6 +1,6 @@
 """Rooms with several closed doors: how often the method ``best`` tells that they lead to one room, and what it gains.
 
-    python benchmarks/shared_rooms.py [WORLD ...] [--close 10] [--draws 2]
+    python benchmarks/quality/shared_rooms.py [WORLD ...] [--close 10] [--draws 2]
 
 Worlds are names or files; the default are the bundled ones that have a room whose several doors can all be closed.
 All such rooms are closed, as far as that cuts nothing else off, and rooms with one door beside them, ``--close``

@@ -1,6 +1,6 @@
 """Find the weights of ``predictor/best/shared_rooms.py`` on samples of the use ``fit``: which doors share a room.
 
-    python benchmarks/fit_shared_rooms.py FIT [FIT ...] [--every 1]
+    python benchmarks/fitting/fit_shared_rooms.py FIT [FIT ...] [--every 1]
 
 FIT are folders of samples, as ``drawn_maps.py`` writes them; a building of another use is refused. Of every three maps
 those with rooms of several doors count all, of the others every ``--every``-th. What is printed beside the weights was

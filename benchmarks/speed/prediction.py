@@ -1,6 +1,6 @@
 """Speed, memory and agreement of the predictor, side by side with the authors' own completed maps.
 
-    python benchmarks/prediction.py ../shared/data/authors [--method best] [--quick]
+    python benchmarks/speed/prediction.py ../shared/data/authors [--method best] [--quick]
 
 A sample is any folder with ``map.yaml`` and ``doors.geojson``; with ``authors.yaml`` the area that the prediction adds
 (cells free in it and unknown in the map) is compared with the area that the authors' program added, with

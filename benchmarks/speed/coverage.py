@@ -1,8 +1,8 @@
 """Speed and quality of coverage planning: from map to graph, and tours beside other solvers.
 
-    python benchmarks/coverage.py                      # drawn offices only
-    python benchmarks/coverage.py MAP.yaml [MAP.yaml ...]   # these maps too
-    python benchmarks/coverage.py --quick              # the smallest office of each table
+    python benchmarks/speed/coverage.py                      # drawn offices only
+    python benchmarks/speed/coverage.py MAP.yaml [MAP.yaml ...]   # these maps too
+    python benchmarks/speed/coverage.py --quick              # the smallest office of each table
 
 Times are CPU seconds of this process, the best of three (of one where a run takes seconds). Tours are compared on the
 metric closure of the same graph, each solver for the whole graph at once; ``ours`` is what the default method does.

@@ -1,6 +1,6 @@
 """Find the numbers of ``predictor/confidence/calibration.json`` on samples of the use ``fit``, method by method.
 
-    python benchmarks/fit_confidence.py FIT [FIT ...] [--methods best paper ...] [--every 1] [--held-out MODEL]
+    python benchmarks/fitting/fit_confidence.py FIT [FIT ...] [--methods best paper ...] [--every 1] [--held-out MODEL]
 
 FIT are folders of samples, as ``drawn_maps.py`` writes them; a building of another use is refused. The curve of
 confidence is fitted on what other buildings gave (five folds over groups of buildings), so that a regression that knows

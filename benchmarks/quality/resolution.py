@@ -1,6 +1,7 @@
 """The same map in cells of another size, and turned: how far the predicted rooms agree with those of the map as it is.
 
-    python benchmarks/resolution.py ../shared/data/authors/*/0[15] [--methods paper best] [--cells 0.1] [--turn 30]
+    python benchmarks/quality/resolution.py ../shared/data/authors/*/0[15] [--methods paper best] [--cells 0.1]
+                                                [--turn 30]
 
 A sample is a folder with ``map.yaml`` and ``doors.geojson``. Three ways to write a cell from those it covers: ``most``,
 what most of its area is; ``any``, occupied where anything is; ``third``, occupied where 0.3 of it is.
