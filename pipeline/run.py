@@ -31,7 +31,7 @@ from closedrooms.pipeline.config import RunConfig
 from closedrooms.pipeline.drive import DriveResult, DriveSettings, drive_tour
 from closedrooms.pipeline.reporting.drive_report import draw_drive, drive_features, drive_metrics
 from closedrooms.pipeline.reporting.live_recording import GrowingPrediction
-from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
+from closedrooms.pipeline.reporting.manifest import resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
 from closedrooms.pipeline.reporting.report import markdown, run_report
 from closedrooms.pipeline.reporting.run_log import RunLog
@@ -44,7 +44,7 @@ from closedrooms.predictor.prediction import Prediction, free_probability
 from closedrooms.sim.simulation import Simulation
 from closedrooms.visualization.rerun.opening import open_recording
 from closedrooms.worlds.closing import check_closed, closable_rooms, draw_closed
-from closedrooms.worlds.library import load_world
+from closedrooms.worlds.library import load_world, world_source
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.truth import true_rooms
 
@@ -116,7 +116,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
     manifest: dict[str, Any] = {
         "command": "run",
         "configuration": resolved(config, leave_out=ASIDE),
-        "paths": {"world": input_path(config.world)},
+        "paths": {"world": world_source(config.world)},
         "world": plan.name,
         "seed": config.seed,
         "closed": list(closed),
