@@ -38,6 +38,7 @@ from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.pipeline.reporting.run_metrics import run_metrics
 from closedrooms.pipeline.reporting.scores import room_iou
 from closedrooms.pipeline.reporting.stopwatch import Stopwatch
+from closedrooms.pipeline.reporting.story import describe_robot, sum_up
 from closedrooms.pipeline.survey import Survey, Truth, survey_building, true_building
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction, free_probability
@@ -100,7 +101,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
     """
     progress, watch = progress or Silent(), Stopwatch()
     if config.sim.robot_urdf is not None:
-        from closedrooms.sim.robot_urdf import with_own_robot
+        from closedrooms.sim.robot.robot_urdf import with_own_robot
 
         config = replace(config, sim=with_own_robot(config.sim))
     with watch.stage("world"):
@@ -131,6 +132,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
     ):
         recorder.configuration(manifest["configuration"])
         recorder.building(sim.plan, sim.world_T_map.inverse(), closed)
+        recorder.note(describe_robot(config))
         log, mapper = RunLog(sim, progress, keep_scans=config.keep_scans or config.bag), Mapper(config.mapper)
         found = _find_out(config, closed, log, mapper, recorder, progress, watch)
         remarks = [
@@ -140,6 +142,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
         ]
         manifest |= _figures(plan, closed, sim.world_T_map.inverse(), found)
         manifest["remarks"] = [remark.as_json() for remark in remarks]
+        recorder.note(sum_up(manifest["metrics"]))
         with watch.stage("write"):
             progress.stage("write")
             _write(staging, found, manifest["metrics"])

@@ -11,12 +11,13 @@ from nicegui.events import KeyEventArguments, UploadEventArguments, ValueChangeE
 
 from closedrooms.core.door import Point
 from closedrooms.core.errors import ClosedroomsError
+from closedrooms.core.report import counted
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.predictor.methods import METHODS
 from closedrooms.web.door_list import DoorList
 from closedrooms.web.map_board import HandleEvent, MapBoard
 from closedrooms.web.map_layers import MapLayers
-from closedrooms.web.prompts import ask, count, icon_button, show_keys, switch, tell
+from closedrooms.web.prompts import ask, icon_button, show_keys, switch, tell
 from closedrooms.web.session import EditSession
 from closedrooms.web.settings_dialog import ask_settings
 
@@ -237,7 +238,9 @@ class EditPage:
         elif not doors:
             text = "click on a wall where a closed door is, or on a dashed proposal"
         else:
-            text = f"{count(len(outcome.rooms), 'room')} behind {count(len(doors), 'door')}, {outcome.seconds:.2f} s"
+            text = (
+                f"{counted(len(outcome.rooms), 'room')} behind {counted(len(doors), 'door')}, {outcome.seconds:.2f} s"
+            )
         if isinstance(self._tour, str):
             text += f"; {self._tour}"
         elif self._tour is not None:
@@ -280,7 +283,7 @@ class EditPage:
         if draft is None:
             return
         when = time.strftime("%d %B, %H:%M", time.localtime(draft.saved))
-        question = f"On {when} you left {count(len(draft.document.doors), 'door')} unsaved here. Go on with them?"
+        question = f"On {when} you left {counted(len(draft.document.doors), 'door')} unsaved here. Go on with them?"
         if await self._ask(question, "go on", "begin anew"):
             told = self._session.take(draft)
             if told:

@@ -32,7 +32,7 @@ from closedrooms.pipeline.survey import Truth, true_building
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.sim.config import FaultConfig
-from closedrooms.sim.robot_model import TRACK_SHARE
+from closedrooms.sim.robot.robot_model import TRACK_SHARE
 from closedrooms.worlds.closing import closable_rooms, draw_closed
 from closedrooms.worlds.geometry import door_leaf
 from closedrooms.worlds.library import load_world

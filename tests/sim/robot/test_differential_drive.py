@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
 from closedrooms.sim.contacts import Obstacles
-from closedrooms.sim.differential_drive import Drive, Motion
+from closedrooms.sim.robot.differential_drive import Drive, Motion
 
 
 def free_drive(config: RobotConfig | None = None) -> Drive:

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from closedrooms.core.robot import RobotConfig
 from closedrooms.sim.config import STEPS
-from closedrooms.sim.differential_drive import Motion, chord, towards
-from closedrooms.sim.physics_world import EVERYTHING, FLOOR, GRAVITY, ROBOT, WHEELS, PhysicsWorld, quiet
-from closedrooms.sim.robot_model import RobotModel, Wheel
+from closedrooms.sim.physics_world import EVERYTHING, FLOOR, GRAVITY, ROBOT, WHEELS, PhysicsWorld
+from closedrooms.sim.pybullet_process import quiet
+from closedrooms.sim.robot.differential_drive import Motion, chord, towards
+from closedrooms.sim.robot.robot_model import RobotModel, Wheel
 
 # Encoders are read every so many steps [steps]: the ticks of 20 ms, in which wheel speeds change by little.
 TICK = 4
