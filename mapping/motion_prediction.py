@@ -121,6 +121,7 @@ class MotionPrediction:
         return PredictedStep(motion)
 
     def _without_change(self, stamp: float) -> PredictedStep:
+        """Predict a step from odometry that repeats itself: a robot that drove may be driving on unseen."""
         moving = math.hypot(self._last.x, self._last.y) > MOVING[0] or abs(self._last.theta) > MOVING[1]
         if not moving:
             self._silent = False

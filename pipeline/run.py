@@ -25,7 +25,7 @@ from closedrooms.pipeline.bounds import check_size, check_width, too_narrow
 from closedrooms.pipeline.config import RunConfig
 from closedrooms.pipeline.drive import DriveSettings, drive_tour
 from closedrooms.pipeline.reporting.live_recording import GrowingPrediction
-from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
+from closedrooms.pipeline.reporting.manifest import resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
 from closedrooms.pipeline.reporting.report import markdown, run_report
 from closedrooms.pipeline.reporting.run_directory import Finding, run_figures, stopped_stages, write_run_files
@@ -39,7 +39,7 @@ from closedrooms.predictor.prediction import Prediction
 from closedrooms.sim.simulation import Simulation
 from closedrooms.visualization.rerun.opening import open_recording
 from closedrooms.worlds.closing import check_closed, closable_rooms, draw_closed
-from closedrooms.worlds.library import load_world
+from closedrooms.worlds.library import load_world, world_source
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.truth import true_rooms
 
@@ -86,7 +86,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
     manifest: dict[str, Any] = {
         "command": "run",
         "configuration": resolved(config, leave_out=ASIDE),
-        "paths": {"world": input_path(config.world)},
+        "paths": {"world": world_source(config.world)},
         "world": plan.name,
         "seed": config.seed,
         "closed": list(closed),

@@ -83,7 +83,7 @@ class TaskResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observed:
-    """Map, doors and poses that a sample's robot brought home, whichever way it was made.
+    """Map, doors and poses that a sample's robot brought home, whichever way it was made: not all were explored.
 
     Poses are those of all scans of an exploration, of an erased map those of the keyframes that make it.
     """

@@ -15,7 +15,7 @@ from closedrooms.experiments.dataset.layout import (
     description,
     json_bytes,
     read_stored_json,
-    said,
+    read_worlds,
 )
 from closedrooms.experiments.dataset.sample import Task, TaskResult
 from closedrooms.experiments.dataset.shard import DATA, PARTS, Shard, read_shard
@@ -261,7 +261,7 @@ def finish(config: DatasetConfig, worlds: Sequence[World], shards: Sequence[Shar
         **description(config, worlds),
         "complete": True,
         "shards": [shard.as_json() for shard in shards],
-        **said(worlds),
+        **read_worlds(config, worlds),
     }
     write_file(store, DATASET_MANIFEST, json_bytes(manifest))
     sums = {shard.name: shard.sha256 for shard in shards if shard.rows}

@@ -13,8 +13,8 @@ from closedrooms.core.files.geojson import read_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.names import plot_text
 from closedrooms.experiments.evaluation.curves import same_extent, same_scale, save_figure
-from closedrooms.experiments.evaluation.listing import SamplePath
 from closedrooms.experiments.evaluation.sample_evaluation import predict_with
+from closedrooms.experiments.evaluation.sample_path import SamplePath
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
 from closedrooms.experiments.evaluation.scores import Scores, hidden_area
 from closedrooms.experiments.evaluation.summary import MEASURES, estimates

@@ -12,8 +12,9 @@ from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.evaluation.claimed_folder import claim_folder
 from closedrooms.experiments.evaluation.config import EvaluateConfig
-from closedrooms.experiments.evaluation.listing import SamplePath, find_samples
+from closedrooms.experiments.evaluation.listing import find_samples
 from closedrooms.experiments.evaluation.sample_evaluation import SampleResult, evaluate_sample
+from closedrooms.experiments.evaluation.sample_path import SamplePath
 from closedrooms.experiments.evaluation.scores import Scores
 from closedrooms.experiments.workers import Crew, Lost
 from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions

@@ -7,9 +7,9 @@ from closedrooms.experiments.evaluation.cases import draw_extremes, draw_worst, 
 from closedrooms.experiments.evaluation.config import EvaluateConfig, sort_methods
 from closedrooms.experiments.evaluation.cost import cost_rows
 from closedrooms.experiments.evaluation.curves import draw_costs, draw_errors, draw_iou, draw_reliability
-from closedrooms.experiments.evaluation.listing import SamplePath
 from closedrooms.experiments.evaluation.numbers import number_rows
 from closedrooms.experiments.evaluation.page import Section, Table, write_page
+from closedrooms.experiments.evaluation.sample_path import SamplePath
 from closedrooms.experiments.evaluation.scores import Scores
 from closedrooms.experiments.evaluation.summary import (
     WITHOUT_PREDICTION,

@@ -18,7 +18,7 @@ from closedrooms.core.files.outgoing import write_json
 from closedrooms.core.files.rosmap import write_raw_map
 from closedrooms.experiments.dataset.checksums import digest
 from closedrooms.experiments.evaluation.cost import score_cost
-from closedrooms.experiments.evaluation.listing import SamplePath
+from closedrooms.experiments.evaluation.sample_path import SamplePath
 from closedrooms.experiments.evaluation.samples import Sample, at_hand, read_sample, renamed
 from closedrooms.experiments.evaluation.scores import (
     Scores,

@@ -176,6 +176,7 @@ def _raw_odometry(moves: list[OdometryLine], echoes: set[int]) -> list[Pose2]:
 
 
 def _array(poses: Sequence[Pose2]) -> FloatArray:
+    """List poses as an array, shape (n, 3) [m, rad]."""
     return np.array([pose.as_tuple() for pose in poses], dtype=np.float64).reshape(-1, 3)
 
 

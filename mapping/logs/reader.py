@@ -56,6 +56,7 @@ def read_run(
 
 
 def _read(path: Path, options: BagOptions) -> RecordedRun:
+    """Read a log by the reader that its first bytes ask for."""
     head = _head(path)
     version = OLD_BAG.match(head)
     if version and version[1] != ROSBAG:

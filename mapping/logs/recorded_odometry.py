@@ -86,6 +86,7 @@ def _durations(stamps: FloatArray) -> FloatArray:
 
 
 def _impossible(poses: FloatArray, steps: FloatArray, durations: FloatArray) -> BoolArray:
+    """Mark the steps that no robot can make in their time, and those that end exactly where the odometry began."""
     distances, turns = np.hypot(steps[:, 0], steps[:, 1]), np.abs(steps[:, 2])
     # With few steps, the jump itself must not count as usual.
     usual, usual_turn = (

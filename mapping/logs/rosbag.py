@@ -92,6 +92,7 @@ def _named(path: Path) -> Iterator[Path]:
 
 
 def _resolved(messages: BagMessages, options: BagOptions, remarks: list[Remark]) -> RecordedRun:
+    """Put scans, motion and mounting of the messages together to a run, on one clock."""
     remarks = [*remarks, *_reading_remarks(messages)]
     if not messages.scans:
         return RecordedRun((), np.empty((0, 3)), None, tuple(remarks))
@@ -157,6 +158,7 @@ def _run(
 
 
 def _reading_remarks(messages: BagMessages) -> list[Remark]:
+    """Say which messages were broken or too many."""
     remarks = [
         Remark(action="dropped", what=what, why="broken in the bag", count=count, loss=what == "scans")
         for what, count in messages.broken.items()

@@ -132,7 +132,7 @@ def face_door(door: ClosedDoor, turned: TurnedMap, *, reach: float) -> DoorPose 
         turned: The map along the direction of the door's wall.
         reach: A wall or free space must be nearer than this [m].
     """
-    at = turned.to_cells(np.array(door.midpoint))
+    at = turned.to_frame(np.array(door.midpoint))
     cells = round(reach / turned.resolution)
     col, row = (math.floor(v) for v in at)
     rows, cols = turned.known.shape

@@ -1,4 +1,4 @@
-"""The numbers that turn beliefs into probabilities, by method: from ``benchmarks/fitting/fit_confidence.py`` on ``fit``."""
+"""Numbers that turn beliefs into probabilities, by method: fitted by ``benchmarks/fitting/fit_confidence.py``."""
 
 from dataclasses import dataclass
 from functools import cache

@@ -139,6 +139,7 @@ def _draw_segments(stream: RecordingStream, trace: "PredictionTrace", *, staged:
 
 
 def _draw_lines(stream: RecordingStream, trace: "PredictionTrace", *, staged: bool) -> None:
+    """Draw lines coloured by their kind: along a wall, the border, or a split."""
     if staged:
         stream.at(stage=Stage.LINES)
     lines = np.asarray(trace.lines).reshape(-1, 2, 2)
@@ -199,11 +200,13 @@ def _draw_room(
     static: bool = False,
     alpha: int = USUAL,
 ) -> None:
+    """Draw a room filled, and its outline."""
     stream.log(root, drawables.filled([shape], colour, alpha=alpha), static=static)
     stream.log(f"{root}/outline", drawables.outlines([shape], colour), static=static)
 
 
 def _label(room: Room, iou: Mapping[str, float]) -> str:
+    """Write a room's doors with the IoU of the worst of them, or its area, and how sure it is."""
     known = [iou[door] for door in room.doors if door in iou]
     figure = f"IoU {min(known):.2f}" if known else f"{room.polygon.area:.1f} m²"
     sure = "" if room.confidence is None else f", confidence {room.confidence:.2f}"

@@ -110,6 +110,7 @@ class RecordedBuilding:
         return np.column_stack((flat, np.full(len(flat), z)))
 
     def _draw_shell(self, plan: FloorPlan, walls: Area, furniture: Area) -> None:
+        """Draw walls, panes, floors and furniture, which never move."""
         glass = glass_area(plan, walls)
         self._draw_solid("building/walls", areal(walls.difference(glass)), WALL_HEIGHT, colours.WALL)
         if not glass.is_empty:
@@ -120,6 +121,7 @@ class RecordedBuilding:
             self._draw_solid("building/furniture", furniture, FURNITURE_HEIGHT, colours.FURNITURE)
 
     def _draw_solid(self, path: str, area: Area, height: float, colour: colours.Colour, *, alpha: int = 255) -> None:
+        """Extrude an area, building frame [m], to a height [m] and draw it."""
         vertices, triangles = extrude(area, height=height)
         self._stream.log(path, drawables.solid(self._in_map(vertices), triangles, colour, alpha=alpha), static=True)
 
@@ -137,6 +139,7 @@ class RecordedBuilding:
             )
 
     def _draw_door(self, door: str) -> None:
+        """Draw the leaves of a door as far open as it is."""
         opening = self._states[door]
         colour = colours.DOOR_CLOSED if opening < 0.5 else colours.DOOR_OPEN
         for number, leaf in enumerate(self._leaves[door]):
@@ -146,6 +149,7 @@ class RecordedBuilding:
             )
 
     def _in_map(self, vertices: FloatArray) -> FloatArray:
+        """Transform vertices, shape (n, 3), from the building frame to the map frame."""
         return np.column_stack((self._map_T_world.transform(vertices[:, :2]), vertices[:, 2]))
 
 

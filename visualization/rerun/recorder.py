@@ -303,6 +303,7 @@ class Recorder:
         staged: bool = False,
         stamp: float | None = None,
     ) -> None:
+        """Draw a prediction and how it came about, each step at its stage where ``staged``; else at ``stamp`` [s]."""
         from closedrooms.predictor.prediction import WeighedTrace
 
         self._palette = colours.room_colours({*self._palette, *(door.id for door in doors)})
@@ -377,5 +378,6 @@ class Recorder:
 
 
 def _known_bounds(grid: OccupancyGrid) -> Bounds | None:
+    """Find the bounds of what a map knows [m], ``None`` where it knows nothing."""
     window = grid.known_bounds()
     return None if window is None else grid.frame.cropped(*window).bounds

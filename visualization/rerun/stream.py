@@ -131,6 +131,7 @@ class RecordingStream:
 
     @contextlib.contextmanager
     def _clear_errors(self) -> Iterator[None]:
+        """Say what cannot be written as rerun's own errors do not: with the path."""
         try:
             yield
         except RuntimeError as failure:

@@ -77,6 +77,7 @@ def _table(prediction: "Prediction", iou: Mapping[str, float]) -> str:
 
 
 def _row(room: Room, iou: Mapping[str, float]) -> list[str]:
+    """Make the row of a room."""
     known = [iou[door] for door in room.doors if door in iou]
     others = "; ".join(f"{other.polygon.area:.1f} m², {100 * other.probability:.0f} %" for other in room.alternatives)
     return [

@@ -11,7 +11,7 @@ from closedrooms.core.files.outgoing import output_folder
 from closedrooms.core.files.schema import SCHEMA, check_schema
 from closedrooms.experiments.dataset.layout import read_manifest
 from closedrooms.experiments.evaluation.claimed_folder import claim_folder
-from closedrooms.experiments.evaluation.listing import SamplePath
+from closedrooms.experiments.evaluation.sample_path import SamplePath
 from closedrooms.experiments.evaluation.samples import read_sample
 from closedrooms.pipeline.config import PredictConfig
 from closedrooms.pipeline.view import find_recording
