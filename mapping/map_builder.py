@@ -109,7 +109,7 @@ def build_map(
 
 
 def _empty_remarks(run: RecordedRun, config: MapperConfig) -> tuple[Remark, ...]:
-    """Why a map shows no wall: as a rule, ranges in another unit."""
+    """Say why a map shows no wall: as a rule, ranges are in another unit."""
     ranges = np.concatenate([scan.ranges[scan.hits] for scan in run.scans])
     seen = f"half of the echoes are farther than {np.median(ranges):.4g} m" if ranges.size else "no echo in any scan"
     why = f"{seen}; the map takes those up to {config.max_range:g} m"

@@ -115,11 +115,11 @@ class TourFollower(Decider):
         return self._prediction.now
 
     def doors_first(self) -> tuple[str, ...]:
-        """Doors of the unsure rooms with stops still to visit, the least sure one first."""
+        """List the doors of unsure rooms that hold stops still to visit, the least sure room first."""
         return tuple(door for room in self._unsure_rooms() for door in room.doors)
 
     def _unsure_rooms(self) -> list[Room]:
-        """Rooms that nobody is sure of and that still hold stops, the least sure one first."""
+        """List the rooms that nobody is sure of and that still hold stops, the least sure one first."""
         asked = [
             (room.confidence, room.doors, room)
             for room in self.prediction.rooms

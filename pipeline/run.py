@@ -233,7 +233,7 @@ def _spread(
     config: RunConfig,
     recorder: "Recorder",
 ) -> CostSpread | None:
-    """What covering the building may cost, where asked for and where there is a tour on the predicted map."""
+    """Estimate what covering the building may cost, where asked for and where there is a tour on the predicted map."""
     if not config.completions or "predicted" not in tours:
         return None
     spread = spread_cost(

@@ -83,7 +83,7 @@ def measure(world: str, noise: str, options: argparse.Namespace) -> dict[str, ob
     return dict(zip(COLUMNS, figures, strict=True))
 
 
-def read_rows(path: Path) -> list[dict[str, str]]:
+def read_csv_rows(path: Path) -> list[dict[str, str]]:
     if not path.exists():
         return []
     with path.open(newline="") as file:
@@ -134,7 +134,7 @@ def main() -> None:
     worlds = options.worlds or bundled_names()
     options.out.mkdir(parents=True, exist_ok=True)
     path = options.out / "loop_closure.csv"
-    done = {(row["world"], row["noise"]) for row in read_rows(path)}
+    done = {(row["world"], row["noise"]) for row in read_csv_rows(path)}
     for noise in reversed(options.noise):
         for world in worlds:
             if options.table or (world, noise) in done:
@@ -147,7 +147,7 @@ def main() -> None:
                     writer.writeheader()
                 writer.writerow(row)
             print(", ".join(f"{name} {value}" for name, value in row.items()), flush=True)
-    print(table(read_rows(path), worlds, options.noise))
+    print(table(read_csv_rows(path), worlds, options.noise))
 
 
 if __name__ == "__main__":

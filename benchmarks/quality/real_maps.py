@@ -180,7 +180,7 @@ def erased_cases(folder: Path, names: Sequence[str]) -> Iterator[ErasedCase]:
             yield erase_rooms(grid, rooms, f"{name}: all {len(rooms)}")
 
 
-def measure_rooms(case: ErasedCase, predicted: Sequence[Room]) -> dict[str, float]:
+def compare_rooms(case: ErasedCase, predicted: Sequence[Room]) -> dict[str, float]:
     """Measure the IoU of each erased room with the room predicted behind its door, 0 without one."""
     frame = case.grid.frame
     grown = frame
@@ -243,7 +243,7 @@ def main() -> None:
         outcomes = {}
         for head, (method, clean) in zip(heads, columns, strict=True):
             outcomes[head] = predict(tidy if clean else case.grid, case.doors, method)
-        scores = {head: measure_rooms(case, outcome.rooms) for head, outcome in outcomes.items()}
+        scores = {head: compare_rooms(case, outcome.rooms) for head, outcome in outcomes.items()}
         name, what = case.name.split(": ")
         several = len(case.doors) > 1
         for door, truth in case.truth.items():

@@ -24,7 +24,7 @@ SURE = {
 }
 
 
-def read_rows(path: Path) -> list[dict[str, str]]:
+def read_csv_rows(path: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(path.read_text().splitlines())) if path.is_file() else []
 
 
@@ -38,7 +38,7 @@ def main() -> None:
     head = {"date": datetime.date.today().isoformat(), "commit": commit, "dataset": args.dataset}
     rows = []
     for table, names in (("summary", IOUS), ("sureness", SURE)):
-        for row in read_rows(args.evaluation / f"{table}.csv"):
+        for row in read_csv_rows(args.evaluation / f"{table}.csv"):
             if row.get("closed_doors", "all") == "all" and row["method"] != "authors":
                 rows += [
                     head | {"method": row["method"], "figure": figure, "value": f"{float(row[name]):.3f}"}

@@ -165,7 +165,7 @@ class Terminal:
 
 
 def _bars() -> Any:
-    """Bars on a terminal, by rich, which is not imported where there is none."""
+    """Make bars for a terminal by rich, which is not imported where there is none."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 

@@ -16,7 +16,7 @@ ROW = 11
 
 
 class Curves:
-    """Store of what belongs into curves, sent as whole columns: many times cheaper than one call a value."""
+    """Store of what is plotted as curves, sent as whole columns: many times cheaper than one call a value."""
 
     def __init__(self, stream: RecordingStream) -> None:
         self._stream = stream
