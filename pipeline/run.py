@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import write_doors, write_features, write_rooms
-from closedrooms.core.files.outgoing import check_output_folder, output_folder
+from closedrooms.core.files.output_folders import check_output_folder, output_folder
 from closedrooms.core.files.rosmap import write_map, write_raw_map
 from closedrooms.core.files.tum import write_trajectory
 from closedrooms.core.grid import OccupancyGrid

@@ -199,6 +199,7 @@ def predict(
 
 @cache
 def _entries() -> tuple[Any, ...]:
+    """List the entry points by which other packages add methods."""
     # Only who names a method that is not ours, or asks for all, waits for this.
     from importlib.metadata import entry_points
 

@@ -195,6 +195,7 @@ def parse_json(content: bytes, *, what: str, where: Path | str) -> Any:
 
 
 def _parsed(text: str, path: Path | str, what: str) -> Any:
+    """Parse untrusted JSON: bounded in depth and in digits, without infinite numbers."""
     try:
         value = json.loads(text, parse_constant=_refuse_constant, parse_int=_whole, parse_float=_finite)
     except (ValueError, RecursionError) as error:
@@ -224,16 +225,19 @@ def check_depth(value: Any, path: Path | str, what: str) -> None:
 
 
 def _refuse_constant(name: str) -> float:
+    """Refuse ``NaN`` and ``Infinity``, which Python reads."""
     raise ValueError(f"{name} is no number of JSON")
 
 
 def _whole(digits: str) -> int:
+    """Read a whole number of a bounded number of digits: Python takes quadratic time for long ones."""
     if len(digits) > MAX_DIGITS:
         raise ValueError(f"a number of {len(digits)} digits, at most {MAX_DIGITS} are read")
     return int(digits)
 
 
 def _finite(digits: str) -> float:
+    """Read a number, and refuse one that becomes infinite."""
     value = float(digits)
     if value in {float("inf"), float("-inf")}:
         raise ValueError(f"{digits[:20]} is larger than any number")

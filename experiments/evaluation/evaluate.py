@@ -7,7 +7,8 @@ from functools import partial
 from statistics import median
 from typing import Any
 
-from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, only_writer, write_json
+from closedrooms.core.files.outgoing import write_json
+from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.claimed_folder import claim_folder

@@ -11,7 +11,8 @@ from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError, OutputError, reason
 from closedrooms.core.files.incoming import read_json
-from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, only_writer, write_json
+from closedrooms.core.files.outgoing import write_json
+from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer
 from closedrooms.core.names import file_name
 from closedrooms.core.remarks import Remark
 from closedrooms.core.report import Report

@@ -10,7 +10,8 @@ import numpy as np
 
 from closedrooms.core.arrays import IntArray
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, only_writer, write_bytes, write_json
+from closedrooms.core.files.outgoing import write_bytes, write_json
+from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer
 from closedrooms.core.random import stream
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require

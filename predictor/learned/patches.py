@@ -56,6 +56,7 @@ def cut_patches(scene: Scene) -> list[Patch]:
 
 
 def _cut_patch(turned: TurnedMap, pose: DoorPose, poses: tuple[DoorPose, ...]) -> Patch:
+    """Cut the patch of one door out of the map that is turned along its wall."""
     inward = np.array([(0, 1), (-1, 0), (0, -1), (1, 0)][pose.quarter])
     along = np.array([inward[1], -inward[0]])
     # To whole cells of the turned map, so that nothing is sampled between them.

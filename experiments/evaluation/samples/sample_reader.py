@@ -13,7 +13,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import read_doors, read_rooms
 from closedrooms.core.files.incoming import read_json
-from closedrooms.core.files.outgoing import MANIFEST
+from closedrooms.core.files.output_folders import MANIFEST
 from closedrooms.core.files.rosmap import read_map
 from closedrooms.core.files.schema import check_schema
 from closedrooms.core.grid import OccupancyGrid

@@ -9,13 +9,8 @@ from pathlib import Path
 import pytest
 
 from closedrooms.core.errors import OutputError
-from closedrooms.core.files.outgoing import (
-    check_new_files,
-    check_output_folder,
-    new_files,
-    output_folder,
-    write_bytes,
-)
+from closedrooms.core.files.outgoing import check_new_files, new_files, write_bytes
+from closedrooms.core.files.output_folders import check_output_folder, output_folder
 
 
 def test_an_output_folder_appears_whole_and_lists_its_files(tmp_path: Path) -> None:
@@ -198,7 +193,8 @@ def test_two_folders_side_by_side_are_written_at_once(tmp_path: Path) -> None:
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from closedrooms.core.files.outgoing import output_folder, write_bytes
+from closedrooms.core.files.outgoing import write_bytes
+from closedrooms.core.files.output_folders import output_folder
 with output_folder(Path(sys.argv[1]), {"command": "predict"}) as folder:
     write_bytes(folder / "a", b"half")
     os.kill(os.getpid(), signal.SIGKILL)

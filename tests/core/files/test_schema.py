@@ -7,7 +7,7 @@ import pytest
 
 from closedrooms.cli.config_file import read_settings
 from closedrooms.core.errors import InvalidInputError, OutputError
-from closedrooms.core.files.outgoing import output_folder
+from closedrooms.core.files.output_folders import output_folder
 from closedrooms.core.files.schema import SCHEMA, check_schema
 from closedrooms.experiments.claimed_folder import claim_folder
 from closedrooms.experiments.dataset.layout import read_manifest
