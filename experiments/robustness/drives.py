@@ -25,7 +25,7 @@ from closedrooms.pipeline.survey import survey_building
 from closedrooms.sim.config import NOISE_LEVELS, FaultConfig, NoiseConfig, SimConfig
 from closedrooms.sim.faults import Faults
 from closedrooms.sim.odometry import Odometry
-from closedrooms.sim.robot.differential_drive import Motion
+from closedrooms.sim.robot.driven_robot import Motion
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start_pose import start_pose

@@ -8,7 +8,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.robot import RobotConfig
 from closedrooms.sim.physics_world import PhysicsWorld
 from closedrooms.sim.pybullet_process import quiet
-from closedrooms.sim.robot.differential_drive import Motion
+from closedrooms.sim.robot.driven_robot import Motion
 from closedrooms.sim.robot.robot_model import RobotModel
 from closedrooms.sim.robot.wheeled_robot import WheeledRobot
 
