@@ -150,6 +150,11 @@ class Terminal:
         self._print(shown(line, longest=LONGEST_CELL), markup=False, highlight=False, soft_wrap=True)
 
     def _print(self, what: Any, **how: Any) -> None:
+        """Print by rich, 120 columns wide where there is no terminal.
+
+        Raises:
+            BrokenPipeError: Nobody reads any more.
+        """
         from rich.console import Console
 
         out = Console(file=sys.stdout, soft_wrap=False, width=None if sys.stdout.isatty() else 120)
