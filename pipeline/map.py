@@ -18,7 +18,7 @@ from closedrooms.mapping.map_builder import BuiltMap, build_map
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import align
 from closedrooms.pipeline.config import MapConfig
-from closedrooms.pipeline.reporting.log_observer import LogWatch
+from closedrooms.pipeline.reporting.log_observer import TRACKS, LogWatch
 from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
 from closedrooms.pipeline.reporting.stopwatch import Stopwatch
@@ -62,6 +62,7 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> Report:
     ):
         observer.configuration(manifest["configuration"])
         log_watch = LogWatch(observer, run)
+        log_watch.begin()
         progress.stage("map", len(run.scans))
 
         def step(number: int, map_T_robot: Pose2, mapper: Mapper) -> None:
@@ -89,15 +90,9 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> Report:
 
 def _rows(built: BuiltMap) -> list[tuple[str, str]]:
     """List the rows of the table for people."""
-    names = {
-        "odometry": "raw odometry",
-        "scans_alone": "scans alone",
-        "online": "as estimated on the way",
-        "final": "final",
-    }
     errors = {
         text: f"{built.errors[name][0]:.3f} m, {math.degrees(built.errors[name][1]):.2f} deg"
-        for name, text in names.items()
+        for name, text in TRACKS.items()
         if name in built.errors
     }
     gaps = find_gaps(built.stamps)

@@ -1,22 +1,23 @@
 """The page itself: what a session holds, drawn with NiceGUI; what somebody does, handed to the session."""
 
 import contextlib
-import math
 import time
 from collections.abc import Callable
 from typing import Any
 
 from nicegui import run, ui
-from nicegui.events import KeyEventArguments, UploadEventArguments, ValueChangeEventArguments
+from nicegui.events import UploadEventArguments, ValueChangeEventArguments
 
 from closedrooms.core.door import Point
 from closedrooms.core.errors import ClosedroomsError
+from closedrooms.core.report import counted
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.predictor.methods import METHODS
 from closedrooms.web.door_list import DoorList
+from closedrooms.web.keyboard import Keyboard
 from closedrooms.web.map_board import HandleEvent, MapBoard
 from closedrooms.web.map_layers import MapLayers
-from closedrooms.web.prompts import ask, count, icon_button, show_keys, switch, tell
+from closedrooms.web.prompts import ask, icon_button, show_keys, switch, tell
 from closedrooms.web.session import EditSession
 from closedrooms.web.settings_dialog import ask_settings
 
@@ -36,10 +37,6 @@ body { margin: 0; }
   .wide { display: none; }
 }
 """
-# What a door or the view moves at a press of an arrow, x to the right and y up.
-ARROWS = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, 1), "ArrowDown": (0, -1)}
-STEP, BIG_STEP, PAN = 0.05, 0.5, 80
-TURNS = {"[": math.radians(5), "]": -math.radians(5), "{": math.radians(45), "}": -math.radians(45)}
 # How long a browser may take to connect [s].
 PATIENCE = 30.0
 
@@ -61,7 +58,7 @@ class EditPage:
             with ui.column().classes("side"):
                 self._status = ui.label("").props("data-id=status role=status aria-live=polite")
                 self._list = DoorList(session, self._done, self._select)
-        self._keys = ui.keyboard(self._pressed, ignore=["input", "select", "textarea"])
+        self._keys = Keyboard(session, self._board, self._done, self._select, self._save)
 
     async def start(self) -> None:
         """Draw the map once the browser is there, offer the draft, predict."""
@@ -92,7 +89,7 @@ class EditPage:
             ui.label(session.config.map.name).classes("text-bold wide")
             self._undo = icon_button("undo", "undo (Ctrl+Z)", lambda: self._done(session.undo()))
             self._redo = icon_button("redo", "redo (Ctrl+Y)", lambda: self._done(session.redo()))
-            icon_button("add_location", "set a door in the middle of the view (N)", self._door_in_the_middle)
+            icon_button("add_location", "set a door in the middle of the view (N)", self._set_door)
             self._method = ui.select(list(METHODS), value=session.document.method, on_change=self._method_chosen)
             self._method.props("dense options-dense label=method data-id=method").classes("w-32")
             icon_button("tune", "settings of the method", self._ask_settings)
@@ -161,47 +158,12 @@ class EditPage:
         elif event.kind == "proposal" and event.type == "click" and event.name.isdecimal():
             await self._done(session.accept(int(event.name)))
 
-    async def _door_in_the_middle(self) -> None:
-        await self._done(self._session.point_at(self._board.middle))
+    async def _set_door(self) -> None:
+        await self._keys.set_door()
 
     def _select(self, name: str | None) -> None:
         self._session.selected = name
         self.draw()
-
-    async def _pressed(self, event: KeyEventArguments) -> None:
-        if not event.action.keydown:
-            return
-        session, key, held = self._session, event.key.name, event.modifiers
-        if held.ctrl or held.meta:
-            work = {"z": session.redo if held.shift else session.undo, "y": session.redo}.get(key.lower())
-            if work is not None:
-                await self._done(work())
-            elif key.lower() == "s":
-                await self._save()
-        elif key in ARROWS:
-            await self._arrow(*ARROWS[key], far=bool(held.shift))
-        elif key in TURNS and session.selected is not None:
-            name = session.selected
-            await self._done(session.change(lambda document: document.turned(name, TURNS[key])))
-        elif key in {"Delete", "Backspace"} and session.selected is not None:
-            name = session.selected
-            await self._done(session.change(lambda document: document.without_door(name)))
-        elif key == "Escape":
-            self._select(None)
-        elif key in {"+", "-"}:
-            self._board.zoom(1 if key == "+" else -1)
-        elif key.lower() == "n":
-            await self._door_in_the_middle()
-        elif key.lower() == "p" and session.open_proposals:
-            await self._done(session.accept(session.open_proposals[0][0]))
-
-    async def _arrow(self, right: int, up: int, *, far: bool) -> None:
-        name = self._session.selected
-        if name is None:
-            self._board.pan(right * PAN, -up * PAN)
-            return
-        step = BIG_STEP if far else STEP
-        await self._done(self._session.change(lambda document: document.shifted(name, (right * step, up * step))))
 
     # What comes of it
 
@@ -237,7 +199,9 @@ class EditPage:
         elif not doors:
             text = "click on a wall where a closed door is, or on a dashed proposal"
         else:
-            text = f"{count(len(outcome.rooms), 'room')} behind {count(len(doors), 'door')}, {outcome.seconds:.2f} s"
+            text = (
+                f"{counted(len(outcome.rooms), 'room')} behind {counted(len(doors), 'door')}, {outcome.seconds:.2f} s"
+            )
         if isinstance(self._tour, str):
             text += f"; {self._tour}"
         elif self._tour is not None:
@@ -280,7 +244,7 @@ class EditPage:
         if draft is None:
             return
         when = time.strftime("%d %B, %H:%M", time.localtime(draft.saved))
-        question = f"On {when} you left {count(len(draft.document.doors), 'door')} unsaved here. Go on with them?"
+        question = f"On {when} you left {counted(len(draft.document.doors), 'door')} unsaved here. Go on with them?"
         if await self._ask(question, "go on", "begin anew"):
             told = self._session.take(draft)
             if told:

@@ -57,8 +57,3 @@ def tell(text: str, *, bad: bool = False) -> None:
     """Show a message; a bad one stays until it is closed."""
     kind: Any = "negative" if bad else "info"
     ui.notify(shown(text, longest=600), type=kind, multi_line=True, close_button=True, timeout=0 if bad else 6000)
-
-
-def count(number: int, noun: str) -> str:
-    """Write a number with its noun."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
