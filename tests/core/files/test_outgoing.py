@@ -394,7 +394,7 @@ def test_a_folder_that_is_read_is_not_replaced(tmp_path: Path, source: str) -> N
 @pytest.mark.parametrize("name", ["circle", "circle/below"])
 def test_a_circle_of_links_is_one_line(tmp_path: Path, name: str) -> None:
     (tmp_path / "circle").symlink_to(tmp_path / "circle")
-    with pytest.raises(OutputError, match="a file; expected a folder|cannot write"):
+    with pytest.raises(OutputError, match=r"a file; expected a folder|cannot write"):
         check_output_folder(tmp_path / name, "predict", sources=[tmp_path])
     check_output_folder(tmp_path / "out", "predict", sources=[tmp_path / name])
 
