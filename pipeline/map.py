@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.files.geojson import write_doors
-from closedrooms.core.files.outgoing import check_output_folder, output_folder
+from closedrooms.core.files.output_folders import check_output_folder, output_folder
 from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.files.tum import write_trajectory
 from closedrooms.core.pose import Pose2

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.outgoing import check_output_folder, output_folder
+from closedrooms.core.files.output_folders import check_output_folder, output_folder
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.names import file_name
 from closedrooms.core.random import stream

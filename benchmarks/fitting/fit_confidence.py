@@ -28,10 +28,10 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.files.outgoing import write_json
 from closedrooms.core.grid import GridFrame
 from closedrooms.core.shapes import polygon_iou
-from closedrooms.experiments.evaluation.listing import find_samples
-from closedrooms.experiments.evaluation.sample_evaluation import Starts
-from closedrooms.experiments.evaluation.samples import Sample, read_sample
-from closedrooms.experiments.evaluation.sureness import cells_asked
+from closedrooms.experiments.evaluation.samples.listing import find_samples
+from closedrooms.experiments.evaluation.samples.sample_reader import Sample, read_sample
+from closedrooms.experiments.evaluation.scoring.sample_evaluation import Starts
+from closedrooms.experiments.evaluation.scoring.sureness import cells_asked
 from closedrooms.experiments.training.buildings import group_of, use_of
 from closedrooms.predictor.confidence.belief import Belief
 from closedrooms.predictor.confidence.calibration import FILE

@@ -16,8 +16,8 @@ from sklearn.linear_model import LogisticRegression
 from sklearn.model_selection import GroupKFold
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
-from closedrooms.experiments.evaluation.listing import find_samples
-from closedrooms.experiments.evaluation.samples import Sample, read_sample
+from closedrooms.experiments.evaluation.samples.listing import find_samples
+from closedrooms.experiments.evaluation.samples.sample_reader import Sample, read_sample
 from closedrooms.experiments.training.buildings import group_of, use_of
 from closedrooms.predictor.best.hypotheses import propose_rectangles
 from closedrooms.predictor.best.resolution import in_cells

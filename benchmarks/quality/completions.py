@@ -16,11 +16,11 @@ import numpy as np
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.cost_spread import COST_NOISE, spread_cost
-from closedrooms.experiments.evaluation.cost import SEED, find_start
-from closedrooms.experiments.evaluation.listing import find_samples
-from closedrooms.experiments.evaluation.sample_evaluation import predict_with
-from closedrooms.experiments.evaluation.samples import Sample, read_sample
-from closedrooms.experiments.evaluation.tours import plan_cropped_tour
+from closedrooms.experiments.evaluation.samples.listing import find_samples
+from closedrooms.experiments.evaluation.samples.sample_reader import Sample, read_sample
+from closedrooms.experiments.evaluation.scoring.cost import SEED, find_start
+from closedrooms.experiments.evaluation.scoring.sample_evaluation import predict_with
+from closedrooms.experiments.evaluation.scoring.tours import plan_cropped_tour
 
 NOISES = (0.0, 0.01, COST_NOISE, 0.02)
 

@@ -20,7 +20,7 @@ from closedrooms.core.files.rosmap import read_map
 from closedrooms.experiments.dataset.config import DatasetConfig, MapSource
 from closedrooms.experiments.dataset.sample import Task, TaskResult, make
 from closedrooms.experiments.dataset.variants import Variant, find_variants, find_worlds
-from closedrooms.experiments.evaluation.scores import iou
+from closedrooms.experiments.evaluation.scoring.scores import iou
 from closedrooms.experiments.workers import Crew
 from closedrooms.pipeline.reporting.scores import room_iou
 from closedrooms.predictor.methods import predict

@@ -31,7 +31,7 @@ from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.files.rosmap import read_map
 from closedrooms.core.grid import OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.experiments.evaluation.scores import iou, room_masks
+from closedrooms.experiments.evaluation.scoring.scores import iou, room_masks
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.structure.clutter import filter_clutter
 

@@ -12,7 +12,7 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import OutputError, reason
 from closedrooms.core.files.geojson import write_doors, write_rooms
-from closedrooms.core.files.outgoing import output_folder
+from closedrooms.core.files.output_folders import output_folder
 from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.files.tum import write_trajectory
 from closedrooms.core.grid import GridFrame, OccupancyGrid

@@ -22,7 +22,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.random import stream
-from closedrooms.experiments.evaluation.tables import Row
+from closedrooms.experiments.tables import Row
 
 STAGES = ("mapping", "doors", "structure", "prediction")
 # IoU with more and more stages repaired, in the order in which the stages work.

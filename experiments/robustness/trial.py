@@ -18,14 +18,14 @@ from closedrooms.core.random import stream
 from closedrooms.core.room import Room
 from closedrooms.experiments.dataset.erase import Eraser
 from closedrooms.experiments.dataset.open_survey import OpenSurvey
-from closedrooms.experiments.evaluation.scores import iou, room_masks
-from closedrooms.experiments.evaluation.tables import Row
-from closedrooms.experiments.evaluation.tours import cropped, kept_tour, plan_cropped_tour
+from closedrooms.experiments.evaluation.scoring.scores import iou, room_masks
+from closedrooms.experiments.evaluation.scoring.tours import cropped, kept_tour, plan_cropped_tour
 from closedrooms.experiments.robustness.clean_walls import sampled, with_clean_walls
 from closedrooms.experiments.robustness.config import RobustnessConfig
 from closedrooms.experiments.robustness.door_noise import disturbed_doors, phantom_doors, true_doors
 from closedrooms.experiments.robustness.drives import RecordedDrive, furnished, map_drive, odometry_noise, record_drive
 from closedrooms.experiments.robustness.levels import Setting, first_setting
+from closedrooms.experiments.tables import Row
 from closedrooms.mapping.trajectory import ate
 from closedrooms.pipeline.reporting.scores import room_iou, rooms_seen
 from closedrooms.pipeline.survey import Truth, true_building

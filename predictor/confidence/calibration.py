@@ -68,6 +68,7 @@ def read_calibrations() -> dict[str, Calibration]:
 
 
 def _parse(numbers: dict[str, Any]) -> Calibration:
+    """Make a calibration from its JSON object."""
     curves = {name: Curve(*np.array(numbers[name], dtype=np.float64).T) for name in ("confidence", "cells", "nearest")}
     return Calibration(
         np.array(numbers["mean"]),

@@ -11,9 +11,9 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import polygon_iou
-from closedrooms.experiments.evaluation.scores import Scores
-from closedrooms.experiments.evaluation.statistics import round_figure
-from closedrooms.experiments.evaluation.tables import Row
+from closedrooms.experiments.evaluation.scoring.scores import Scores
+from closedrooms.experiments.statistics import round_figure
+from closedrooms.experiments.tables import Row
 from closedrooms.predictor.prediction import Prediction
 
 # Cells are asked about where the map is unknown within this of a closed door [m], whatever a method predicts there and

@@ -4,7 +4,8 @@ from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files.incoming import read_json
-from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, write_json
+from closedrooms.core.files.outgoing import write_json
+from closedrooms.core.files.output_folders import MANIFEST, PROGRAM
 from closedrooms.core.files.schema import KEY, SCHEMA, check_schema
 
 

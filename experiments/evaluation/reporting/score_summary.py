@@ -9,9 +9,9 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.experiments.evaluation.config import EvaluateConfig, sort_methods
-from closedrooms.experiments.evaluation.scores import Scores
-from closedrooms.experiments.evaluation.statistics import compare_pairs, described, round_figure
-from closedrooms.experiments.evaluation.tables import Row
+from closedrooms.experiments.evaluation.scoring.scores import Scores
+from closedrooms.experiments.statistics import compare_pairs, described, round_figure
+from closedrooms.experiments.tables import Row
 
 # What is measured on rooms, and how it is taken from the scores of one sample.
 MEASURES: dict[str, Callable[[Scores], Sequence[float]]] = {

@@ -13,15 +13,15 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import read_doors, read_rooms
 from closedrooms.core.files.incoming import read_json
-from closedrooms.core.files.outgoing import MANIFEST
+from closedrooms.core.files.output_folders import MANIFEST
 from closedrooms.core.files.rosmap import read_map
 from closedrooms.core.files.schema import check_schema
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.numbers import repr_of
 from closedrooms.core.room import Room
 from closedrooms.experiments.dataset.checksums import check, digest
-from closedrooms.experiments.evaluation.sample_path import SamplePath
-from closedrooms.experiments.evaluation.shard_rows import unpacked
+from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
+from closedrooms.experiments.evaluation.samples.shard_rows import unpacked
 from closedrooms.predictor.structure.known_window import MAX_CELLS
 
 # Unknown cells kept around what is known when a sample is cropped [m].

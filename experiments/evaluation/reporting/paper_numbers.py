@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from closedrooms.experiments.evaluation.scores import Scores
-from closedrooms.experiments.evaluation.statistics import round_figure
-from closedrooms.experiments.evaluation.summary import REFERENCES, estimates, grouped, headline
-from closedrooms.experiments.evaluation.tables import Row
+from closedrooms.experiments.evaluation.reporting.score_summary import REFERENCES, estimates, grouped, headline
+from closedrooms.experiments.evaluation.scoring.scores import Scores
+from closedrooms.experiments.statistics import round_figure
+from closedrooms.experiments.tables import Row
 
 # Errors of the coverage cost in the text of section 5.3: mean and standard deviation [%].
 PRINTED: dict[str, tuple[float, float]] = {"closed": (21.37, 16.18), "baseline": (21.4, 23.38), "paper": (6.21, 9.06)}
@@ -22,7 +22,7 @@ def number_rows(scores: Sequence[Scores], chosen: Sequence[Scores], tests: Seque
     Args:
         scores: Of all methods and samples.
         chosen: Those of the subset of section 5.3.
-        tests: Of :func:`closedrooms.experiments.evaluation.summary.paired_rows`.
+        tests: Of :func:`closedrooms.experiments.evaluation.reporting.score_summary.paired_rows`.
     """
     method = next((name for name in REFERENCES if any(s["method"] == name for s in scores)), None)
     own = [score for score in scores if score["method"] == method]

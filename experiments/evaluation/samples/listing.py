@@ -6,10 +6,10 @@ from typing import Any
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import read_text
-from closedrooms.core.files.outgoing import MANIFEST
+from closedrooms.core.files.output_folders import MANIFEST
 from closedrooms.core.numbers import repr_of
-from closedrooms.experiments.evaluation.sample_path import SamplePath
-from closedrooms.experiments.evaluation.shard_rows import list_rows
+from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
+from closedrooms.experiments.evaluation.samples.shard_rows import list_rows
 from closedrooms.experiments.places import Url
 from closedrooms.experiments.stores import DATASET_MANIFEST
 

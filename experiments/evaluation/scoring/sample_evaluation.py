@@ -17,10 +17,10 @@ from closedrooms.core.files.incoming import read_json
 from closedrooms.core.files.outgoing import write_json
 from closedrooms.core.files.rosmap import write_raw_map
 from closedrooms.experiments.dataset.checksums import digest
-from closedrooms.experiments.evaluation.cost import score_cost
-from closedrooms.experiments.evaluation.sample_path import SamplePath
-from closedrooms.experiments.evaluation.samples import Sample, at_hand, read_sample, renamed
-from closedrooms.experiments.evaluation.scores import (
+from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
+from closedrooms.experiments.evaluation.samples.sample_reader import Sample, at_hand, read_sample, renamed
+from closedrooms.experiments.evaluation.scoring.cost import score_cost
+from closedrooms.experiments.evaluation.scoring.scores import (
     Scores,
     added_rooms,
     hidden_area,
@@ -30,8 +30,8 @@ from closedrooms.experiments.evaluation.scores import (
     split_hidden_area,
     union_of,
 )
-from closedrooms.experiments.evaluation.sureness import score_sureness
-from closedrooms.experiments.evaluation.tours import (
+from closedrooms.experiments.evaluation.scoring.sureness import score_sureness
+from closedrooms.experiments.evaluation.scoring.tours import (
     Tour,
     code_digest,
     kept_tour,
@@ -186,20 +186,17 @@ def _fingerprint(content: str, method: str, extras: Extras) -> str:
 
 @lru_cache(maxsize=1)
 def _code() -> str:
-    root, here = Path(__file__).parents[2], Path(__file__).parent
+    root, here = Path(__file__).parents[3], Path(__file__).parent
     files = [
         *(root / "predictor").rglob("*.py"),
         *(root / "predictor").rglob("*.json"),
         *(root / "predictor").rglob("*.onnx"),
         *(root / "core").rglob("*.py"),
         root / "pipeline" / "reporting" / "scores.py",
+        here.parent / "samples" / "sample_reader.py",
+        *(here / name for name in ("sample_evaluation.py", "scores.py", "sureness.py", "cost.py")),
     ]
-    return code_digest(
-        [
-            *files,
-            *(here / name for name in ("sample_evaluation.py", "samples.py", "scores.py", "sureness.py", "cost.py")),
-        ]
-    )
+    return code_digest(files)
 
 
 def _kept(path: Path, key: str) -> Scores | None:

@@ -33,7 +33,7 @@ class SamplePath:
         digest: SHA-256 of its run.json, empty where the dataset does not say.
         world: Building, empty where nothing names it.
         repetition: Repetition, -1 where nothing names it.
-        shard: Where it is a row of a shard, else ``None``; see :mod:`closedrooms.experiments.evaluation.shard_rows`.
+        shard: Where it is a row of a shard, else ``None``.
     """
 
     name: str

@@ -12,13 +12,13 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import read_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.names import plot_text
-from closedrooms.experiments.evaluation.curves import same_extent, same_scale, save_figure
-from closedrooms.experiments.evaluation.sample_evaluation import predict_with
-from closedrooms.experiments.evaluation.sample_path import SamplePath
-from closedrooms.experiments.evaluation.samples import Sample, read_sample
-from closedrooms.experiments.evaluation.scores import Scores, hidden_area
-from closedrooms.experiments.evaluation.summary import MEASURES, estimates
-from closedrooms.experiments.evaluation.tours import cropped, plan_cropped_tour
+from closedrooms.experiments.evaluation.reporting.figures import same_extent, same_scale, save_figure
+from closedrooms.experiments.evaluation.reporting.score_summary import MEASURES, estimates
+from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
+from closedrooms.experiments.evaluation.samples.sample_reader import Sample, read_sample
+from closedrooms.experiments.evaluation.scoring.sample_evaluation import predict_with
+from closedrooms.experiments.evaluation.scoring.scores import Scores, hidden_area
+from closedrooms.experiments.evaluation.scoring.tours import cropped, plan_cropped_tour
 from closedrooms.visualization.colours import DOOR_CLOSED, FREE, OCCUPIED, ROOM_COLOURS, UNKNOWN
 
 HIDDEN, OUTLINE = (255, 205, 130), "#1c5fb0"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from closedrooms.core.files.outgoing import write_bytes
-from closedrooms.experiments.evaluation.tables import Row
+from closedrooms.experiments.tables import Row
 from closedrooms.visualization.colours import ROOM_COLOURS, Colour
 
 # One colour a method or estimate in every figure.
@@ -32,7 +32,7 @@ def draw_iou(path: Path, rows: Sequence[Row], methods: Sequence[str], measures: 
 
     Args:
         path: The PNG.
-        rows: Of :func:`closedrooms.experiments.evaluation.summary.iou_rows`.
+        rows: Of :func:`closedrooms.experiments.evaluation.reporting.score_summary.iou_rows`.
         methods: Which to draw.
         measures: ``matched``, ``by_door``.
 
@@ -48,7 +48,7 @@ def draw_errors(path: Path, rows: Sequence[Row], names: Sequence[str]) -> bool:
 
     Args:
         path: The PNG.
-        rows: Of :func:`closedrooms.experiments.evaluation.summary.coverage_rows`; a panel a part.
+        rows: Of :func:`closedrooms.experiments.evaluation.reporting.score_summary.coverage_rows`; a panel a part.
         names: Estimates to draw.
 
     Returns:
@@ -111,7 +111,7 @@ def draw_reliability(path: Path, rows: Sequence[Row], methods: Sequence[str]) ->
 
     Args:
         path: The PNG.
-        rows: Of :func:`closedrooms.experiments.evaluation.sureness.reliability_rows`.
+        rows: Of :func:`closedrooms.experiments.evaluation.scoring.sureness.reliability_rows`.
         methods: Which to draw.
 
     Returns:

@@ -3,15 +3,11 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from closedrooms.experiments.evaluation.cases import draw_extremes, draw_worst, extreme_cases
 from closedrooms.experiments.evaluation.config import EvaluateConfig, sort_methods
-from closedrooms.experiments.evaluation.cost import cost_rows
-from closedrooms.experiments.evaluation.curves import draw_costs, draw_errors, draw_iou, draw_reliability
-from closedrooms.experiments.evaluation.numbers import number_rows
-from closedrooms.experiments.evaluation.page import Section, Table, write_page
-from closedrooms.experiments.evaluation.sample_path import SamplePath
-from closedrooms.experiments.evaluation.scores import Scores
-from closedrooms.experiments.evaluation.summary import (
+from closedrooms.experiments.evaluation.reporting.cases import draw_extremes, draw_worst, extreme_cases
+from closedrooms.experiments.evaluation.reporting.figures import draw_costs, draw_errors, draw_iou, draw_reliability
+from closedrooms.experiments.evaluation.reporting.paper_numbers import number_rows
+from closedrooms.experiments.evaluation.reporting.score_summary import (
     WITHOUT_PREDICTION,
     coverage_rows,
     headline,
@@ -22,8 +18,12 @@ from closedrooms.experiments.evaluation.summary import (
     subset,
     world_rows,
 )
-from closedrooms.experiments.evaluation.sureness import reliability_rows, sureness_rows
-from closedrooms.experiments.evaluation.tables import Row, write_table
+from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
+from closedrooms.experiments.evaluation.scoring.cost import cost_rows
+from closedrooms.experiments.evaluation.scoring.scores import Scores
+from closedrooms.experiments.evaluation.scoring.sureness import reliability_rows, sureness_rows
+from closedrooms.experiments.html_page import Section, Table, write_page
+from closedrooms.experiments.tables import Row, write_table
 
 INTERVALS = (
     "Intervals hold 95 %: low to high draws samples (other doors in the same buildings), world low to world high draws "

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.experiments.evaluation.sample_path import SamplePath, ShardRow
+from closedrooms.experiments.evaluation.samples.sample_path import SamplePath, ShardRow
 from closedrooms.experiments.places import Url
 from closedrooms.experiments.stores import DATASET_MANIFEST, file_digest, open_store
 

@@ -9,11 +9,11 @@ from closedrooms.core.door import Point
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.cost_spread import spread_cost
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
-from closedrooms.experiments.evaluation.samples import Sample
-from closedrooms.experiments.evaluation.scores import Scores
-from closedrooms.experiments.evaluation.statistics import bootstrap, by_world, round_figure
-from closedrooms.experiments.evaluation.tables import Row
-from closedrooms.experiments.evaluation.tours import START, kept_tour
+from closedrooms.experiments.evaluation.samples.sample_reader import Sample
+from closedrooms.experiments.evaluation.scoring.scores import Scores
+from closedrooms.experiments.evaluation.scoring.tours import START, kept_tour
+from closedrooms.experiments.statistics import bootstrap, by_world, round_figure
+from closedrooms.experiments.tables import Row
 from closedrooms.predictor.prediction import Prediction
 
 # Of the draws: an evaluation has no seed of its own.

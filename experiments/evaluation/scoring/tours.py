@@ -92,7 +92,7 @@ def _key(grid: OccupancyGrid, doors: Sequence[ClosedDoor], start: Point) -> str:
 @lru_cache(maxsize=1)
 def tour_code() -> str:
     """Compute the digest of the code that a tour depends on."""
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     files = [
         *(root / "coverage").rglob("*.py"),
         *(root / "core").rglob("*.py"),
