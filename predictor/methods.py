@@ -163,7 +163,9 @@ def find_method(name: str) -> Method:
         near = nearest(name, METHODS)
         meant = f" (did you mean {near}?)" if near else ""
         known = ", ".join(METHODS)
-        raise InvalidInputError(f"unknown method {shown(name, longest=80)!r}{meant}", expected=f"one of {known}") from None
+        raise InvalidInputError(
+            f"unknown method {shown(name, longest=80)!r}{meant}", expected=f"one of {known}"
+        ) from None
 
 
 def predict(
