@@ -15,7 +15,7 @@ from closedrooms.predictor.structure.doorways import FacingDoor
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Entrance:
-    """Where a door leads.
+    """Edge and face to which a door leads.
 
     Attributes:
         facing: The door, and the direction from its edge into the initial face.
