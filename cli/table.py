@@ -106,6 +106,7 @@ def _table(chosen: Command | None, options: type[Any] | None, *, completing: boo
 
 
 def _row(name: str, description: str, options: Any) -> Any:
+    """Make a row of tyro's table of subcommands."""
     about = tyro.conf.subcommand(
         name=name, description=description, prefix_name=False, constructor_factory=lambda: options
     )
@@ -113,6 +114,7 @@ def _row(name: str, description: str, options: Any) -> Any:
 
 
 def _description(command: Command, options: type[Any] | None) -> str:
+    """Write what ``--help`` says of a command, and which settings it hides."""
     if options is None or not options.about["hidden"]:
         return command.summary
     groups = ", ".join(f"--{name}.*" for name in options.about["hidden"])

@@ -122,6 +122,7 @@ def _strange(place: Place) -> list[str]:
 
 
 def _option(word: str) -> str:
+    """Write a word of the line as options are spelled: no dashes ahead, no value, dashes for underscores."""
     return word.lstrip("-").partition("=")[0].replace("_", "-")
 
 

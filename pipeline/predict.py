@@ -129,6 +129,7 @@ def _figures(room: Room) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def _recording(config: PredictConfig, grid: OccupancyGrid, path: Path) -> Iterator["Recorder"]:
+    """Open a recording that shows what is known of the map, or none."""
     if not config.record:
         yield no_recording()
         return

@@ -1,5 +1,6 @@
 """``closedrooms edit``: serves the page on this machine until it is stopped."""
 
+import contextlib
 import secrets
 import socket
 import sys
@@ -10,7 +11,7 @@ from contextlib import closing, contextmanager
 from functools import partial
 from typing import Any
 
-from closedrooms.core.errors import OutputError
+from closedrooms.core.errors import ClosedroomsError, OutputError, reason
 from closedrooms.core.files.incoming import check_regular
 from closedrooms.core.runtime.packages import require
 from closedrooms.pipeline.reporting.progress import Progress
@@ -57,17 +58,33 @@ class Desk:
         self._config, self._drafts = config, Drafts()
         self._sheet: MapSheet | None = None
         self._reading = threading.Lock()
+        self._told = ""
 
     def session(self, visitor: str) -> EditSession:
-        """Begin the session of a page.
+        """Begin the session of a page; what cannot be read is told on the page and in one line of the terminal.
 
         Raises:
             ClosedroomsError: The map cannot be read; the next visit tries again.
         """
-        with self._reading:
-            if self._sheet is None:
-                self._sheet = open_sheet(self._config)
-        return EditSession(self._config, self._sheet, self._drafts, visitor)
+        try:
+            with self._reading:
+                if self._sheet is None:
+                    self._sheet = open_sheet(self._config)
+        except Exception as error:
+            self._tell(reason(error))
+            raise ClosedroomsError(reason(error)) from error
+        session = EditSession(self._config, self._sheet, self._drafts, visitor)
+        if session.trouble:
+            self._tell(session.trouble)
+        return session
+
+    def _tell(self, trouble: str) -> None:
+        """Say it on the terminal, once for all visits in a row."""
+        if trouble != self._told:
+            self._told = trouble
+            with contextlib.suppress(OSError, ValueError):  # nobody listens
+                sys.stderr.write(f"closedrooms: {trouble}\n")
+                sys.stderr.flush()
 
 
 def _server(config: EditConfig, token: str, port: int) -> Any:

@@ -12,6 +12,7 @@ import json
 import os
 import stat
 from collections.abc import Iterator
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ MAX_DEPTH = 64
 """Deepest nesting of JSON, YAML and XML: the formats that are read have fewer than ten levels."""
 MAX_DIGITS = 100
 """Longest whole number: a float holds no more than 309 digits, a stamp in nanoseconds has 19."""
+READ: ContextVar[set[tuple[int, int]] | None] = ContextVar("read", default=None)
+"""Device and number of every file that was opened since somebody began to count: none of them is overwritten."""
 KINDS = {
     stat.S_ISDIR: "a folder",
     stat.S_ISFIFO: "a named pipe",
@@ -77,12 +80,16 @@ def opened(path: Path, what: str) -> Iterator[io.BufferedReader]:
         # Without O_NONBLOCK the opening of a FIFO waits for somebody to write into it.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
-            mode = os.fstat(descriptor).st_mode
+            status = os.fstat(descriptor)
+            mode = status.st_mode
             if not stat.S_ISREG(mode):
                 kind = next((name for is_kind, name in KINDS.items() if is_kind(mode)), "no regular file")
                 raise InvalidInputError(kind, expected=f"{what} in a regular file", where=path)
             # Some files of the kernel call themselves regular and have nothing to give: an error here, ``None`` later.
             os.pread(descriptor, 1, 0)
+            read = READ.get()
+            if read is not None:
+                read.add((status.st_dev, status.st_ino))
             file = os.fdopen(descriptor, "rb")
         except BaseException:
             os.close(descriptor)

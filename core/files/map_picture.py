@@ -125,8 +125,9 @@ def _check_size(size: tuple[int, int], file_bytes: int, path: Path) -> None:
 def _greys(image: Any) -> tuple[npt.NDArray[np.uint8], BoolArray | None]:
     """Convert a picture to greys, 0 to 255, and where it is not transparent (``None`` where it cannot be)."""
     if "A" in image.getbands() or "transparency" in image.info:
-        rgba = np.asarray(image.convert("RGBA"))
-        return np.asarray(image.convert("L")), rgba[..., 3] > 0
+        # By way of RGBA: of a palette with transparent colours Pillow makes no greys without a warning.
+        rgba = image.convert("RGBA")
+        return np.asarray(rgba.convert("L")), np.asarray(rgba)[..., 3] > 0
     if image.mode in {"I", "I;16", "I;16B", "I;16L"}:
         return _sixteen_bits(image), None
     return np.asarray(image if image.mode == "L" else image.convert("L")), None

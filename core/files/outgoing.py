@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from closedrooms.core.errors import OutputError
+from closedrooms.core.files.incoming import READ
 from closedrooms.core.files.unfinished import (
     clear_files,
     final_place,
@@ -101,6 +102,14 @@ def _check_unchanged(path: Path, before: tuple[int, ...] | None) -> None:
     raise OutputError(f"the output was changed meanwhile; expected the file that was there before: {path}")
 
 
+def _check_unread(path: Path) -> None:
+    # Beside the file that the command names, what that one leads to: the picture of a map.
+    with contextlib.suppress(FileNotFoundError):
+        status = path.stat()
+        if (status.st_dev, status.st_ino) in (READ.get() or ()):
+            raise OutputError(f"the output is a file that was read; expected another one: {path}")
+
+
 def _identity(path: Path) -> tuple[int, ...] | None:
     """Find what tells a file from another one in its place, ``None`` without one."""
     try:
@@ -156,19 +165,23 @@ def new_files(paths: Iterable[Path], *, force: bool = False, sources: Iterable[P
     Args:
         paths: Every file that the block is going to write; they are there when it has ended.
         force: Files that are there now may be replaced.
-        sources: Files that the command reads: never replaced.
+        sources: Files that the command reads: never replaced, and nothing else that the block reads is.
 
     Raises:
-        OutputError: See :func:`check_new_files`; a file has appeared or was changed since the block began.
+        OutputError: See :func:`check_new_files`; a file has appeared or was changed since the block began, or was read
+            in it.
     """
     paths = list(paths)
     check_new_files(paths, force=force, sources=sources)
     claims = _Claims({path.absolute(): _identity(path) for path in paths})
     with claims.open:
-        token = _CLAIMED.set(claims)
+        token, counted = _CLAIMED.set(claims), READ.set(set())
         try:
             yield
+            for path in paths:
+                _check_unread(path)
         finally:
+            READ.reset(counted)
             _CLAIMED.reset(token)
         _put(claims)
 

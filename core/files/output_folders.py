@@ -103,7 +103,7 @@ def _holds(folder: Path, source: Path) -> bool:
     """Check whether an output folder holds something that is read."""
     try:
         return source.exists() and source.resolve().is_relative_to(folder.resolve())
-    except (OSError, ValueError):  # a name that the system refuses is said where it is read
+    except (OSError, RuntimeError, ValueError):  # a name that the system refuses, a circle of links: said elsewhere
         return False
 
 

@@ -1,4 +1,4 @@
-"""The numbers that turn beliefs into probabilities, by method: found on ``fit`` by ``benchmarks/fit_confidence.py``."""
+"""Numbers that turn beliefs into probabilities, by method: fitted by ``benchmarks/fitting/fit_confidence.py``."""
 
 from dataclasses import dataclass
 from functools import cache
