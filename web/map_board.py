@@ -1,11 +1,11 @@
 """The map to pan and zoom: Leaflet in a flat coordinate system, its units metres of the grid's frame."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from nicegui import ui
-from shapely.geometry import LineString, mapping
+from shapely.geometry import MultiLineString, mapping
 from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.door import Point, Segment
@@ -34,7 +34,11 @@ map.on('layeradd', ({layer}) => {
   for (const type of ['click', 'dragend']) layer.on(type, () => tell(type));
   layer.on('keypress', ({originalEvent}) => originalEvent.key === 'Enter' && tell('click'));
 });
-document.addEventListener('keydown', e => (e.ctrlKey || e.metaKey) && e.key === 's' && e.preventDefault());
+document.addEventListener('keydown', e => {  // from within a field too
+  if (!(e.ctrlKey || e.metaKey) || e.key.toLowerCase() !== 's') return;
+  e.preventDefault();
+  if (!e.repeat) emitEvent('save');
+});
 true;
 """
 CSS = """
@@ -55,7 +59,7 @@ CSS = """
 .handle-proposal::after { border-style: dashed; }
 .handle-note { width: 0; height: 0; border: 0; background: none; pointer-events: none; }
 .handle-note::after { left: 0; bottom: 0; transform: translate(-50%, 50%); border: 0; font-weight: 600;
-  background: rgba(255, 255, 255, .8); }
+  white-space: pre; text-align: center; line-height: 15px; background: rgba(255, 255, 255, .8); }
 """
 
 
@@ -139,9 +143,10 @@ class MapBoard:
         options = {"style": style, "interactive": False}
         self._add(group, self._map.generic_layer(name="geoJSON", args=[mapping(geometry), options]))
 
-    def line(self, group: str, segment: Segment, **style: Any) -> None:
-        """Draw a segment [m]."""
-        self.shape(group, LineString(segment), **style)
+    def lines(self, group: str, segments: Sequence[Segment], **style: Any) -> None:
+        """Draw segments of one style [m]."""
+        if segments:
+            self.shape(group, MultiLineString(segments), **style)
 
     def handle(
         self,
