@@ -20,7 +20,7 @@ from closedrooms.experiments.evaluation.cost import SEED, find_start
 from closedrooms.experiments.evaluation.listing import find_samples
 from closedrooms.experiments.evaluation.sample_evaluation import predict_with
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
-from closedrooms.experiments.evaluation.tours import plan_tour
+from closedrooms.experiments.evaluation.tours import plan_cropped_tour
 
 NOISES = (0.0, 0.01, COST_NOISE, 0.02)
 
@@ -28,8 +28,8 @@ NOISES = (0.0, 0.01, COST_NOISE, 0.02)
 def measure(sample: Sample, method: str, count: int) -> list[tuple[bool, float]]:
     """Check whether the interval holds the true cost, and measure its width [percent of it], for each noise."""
     prediction, _ = predict_with(method, sample)
-    tour = plan_tour(prediction.grid)
-    truth = plan_tour(sample.truth, start=find_start(sample, tour)).length
+    tour = plan_cropped_tour(prediction.grid)
+    truth = plan_cropped_tour(sample.truth, start=find_start(sample, tour)).length
     found = []
     for noise in NOISES:
         spread = spread_cost(

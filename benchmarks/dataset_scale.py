@@ -23,21 +23,21 @@ from closedrooms.experiments.dataset import sharded
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.dataset import dataset
 from closedrooms.experiments.dataset.packing import as_bytes, sample_schema
-from closedrooms.experiments.dataset.sample import Outcome, Task
+from closedrooms.experiments.dataset.sample import Task, TaskResult
 from closedrooms.experiments.dataset.shard import part_name
-from closedrooms.experiments.dataset.shards import Filling, Part, fill
+from closedrooms.experiments.dataset.shards import Filling, Part, fill_shard
 from closedrooms.experiments.stores import open_store, write_file
 
 WORLD, CLOSED = "office-03", 10
 HEAD = ("samples", "shards", "CPU ms a sample", "wall s", "command MB", "worker MB", "ours / best known")
 
 
-def make_nothing(job: Task | Part | Filling) -> Outcome:
+def make_nothing(job: Task | Part | Filling) -> TaskResult:
     """Make a part with nothing in it; shards are filled as always."""
     import pyarrow as pa
 
     if isinstance(job, Filling):
-        return Outcome(shard=fill(job).shard)
+        return TaskResult(shard=fill_shard(job).shard)
     assert isinstance(job, Part), "nothing is surveyed"
     assert job.task.variant is not None, "a part is a sample"
     variant, config = job.task.variant, job.task.config
@@ -51,7 +51,7 @@ def make_nothing(job: Task | Part | Filling) -> Outcome:
     }
     content = as_bytes(pa.RecordBatch.from_pylist([row], schema=sample_schema(scans=False)))
     write_file(open_store(config.out), part_name(variant.world.split, job.index), content)
-    return Outcome(size=len(content))
+    return TaskResult(size=len(content))
 
 
 def measure(samples: int, workers: int) -> dict[str, Any]:

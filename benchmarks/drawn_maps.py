@@ -17,7 +17,7 @@ import numpy as np
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.random import stream
 from closedrooms.experiments.training.buildings import FIRST_CHOOSE, read_groups, use_of
-from closedrooms.experiments.training.synthetic_maps import draw_map, write_sample
+from closedrooms.experiments.training.synthetic_maps import synthesise_map, write_sample
 from closedrooms.worlds.closing import closable_rooms, draw_closed
 from closedrooms.worlds.generation.generator import GENERATOR_VERSION, generate
 from closedrooms.worlds.library import bundled_names, load_world
@@ -68,7 +68,7 @@ def main() -> None:
             except InvalidInputError:
                 continue  # rooms with several doors hinder each other
             angle = float(rng.uniform(0.0, np.pi)) if rng.random() < TURNED else 0.0
-            drawn = draw_map(plan, closed, rng, angle=angle)
+            drawn = synthesise_map(plan, closed, rng, angle=angle)
             if drawn.doors:
                 write_sample(args.out / name / f"{number:02d}", drawn, world=name, repetition=number)
         print(name, flush=True)

@@ -18,7 +18,7 @@ import numpy as np
 from closedrooms.core.files.geojson import read_doors, read_rooms
 from closedrooms.core.files.rosmap import read_map
 from closedrooms.experiments.dataset.config import DatasetConfig, MapSource
-from closedrooms.experiments.dataset.sample import Outcome, Task, make
+from closedrooms.experiments.dataset.sample import Task, TaskResult, make
 from closedrooms.experiments.dataset.variants import Variant, find_variants, find_worlds
 from closedrooms.experiments.evaluation.scores import iou
 from closedrooms.experiments.workers import Crew
@@ -47,10 +47,10 @@ def build(out: Path, maps: MapSource, workers: int, worlds: tuple[str, ...] = WO
     config = DatasetConfig(worlds=worlds, out=out.resolve() / maps, repetitions=1, maps=maps)
     variants = chosen(config)
     tasks = [Task(config, world) for world in find_worlds(config)] if maps == "erased" else []
-    crew: Crew[Task, Outcome] = Crew(workers)
+    crew: Crew[Task, TaskResult] = Crew(workers)
     for batch in (tasks, [Task(config, variant.world, variant) for variant in variants]):
         for task, outcome in crew.do(make, [task for task in batch if not task.folder.exists()]):
-            if outcome != Outcome():
+            if outcome != TaskResult():
                 print(task.folder, outcome)
     return [(variant, config.out / variant.id) for variant in variants if (config.out / variant.id).exists()]
 

@@ -27,17 +27,17 @@ from sklearn.model_selection import GroupKFold, cross_val_predict
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.files.outgoing import write_json
 from closedrooms.core.grid import GridFrame
+from closedrooms.core.shapes import polygon_iou
 from closedrooms.experiments.evaluation.listing import find_samples
 from closedrooms.experiments.evaluation.sample_evaluation import Starts
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
 from closedrooms.experiments.evaluation.sureness import cells_asked
 from closedrooms.experiments.training.buildings import group_of, use_of
-from closedrooms.pipeline.reporting.scores import polygon_iou
 from closedrooms.predictor.confidence.belief import Belief
 from closedrooms.predictor.confidence.calibration import FILE
 from closedrooms.predictor.confidence.judge import join_spreads
 from closedrooms.predictor.confidence.room_features import NAMES, measure_rooms
-from closedrooms.predictor.confidence.variants import FACTORS, RoomVariants
+from closedrooms.predictor.confidence.shape_variants import FACTORS, RoomVariants
 from closedrooms.predictor.methods import METHODS, find_method
 from closedrooms.predictor.prediction import Prediction
 

@@ -20,9 +20,9 @@ from closedrooms.experiments.evaluation.listing import find_samples
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
 from closedrooms.experiments.training.buildings import read_groups, use_of
 from closedrooms.predictor.best.hypotheses import propose_rectangles
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.best.scene import prepare
-from closedrooms.predictor.best.shared_rooms import FEATURES, measure_shared
+from closedrooms.predictor.best.shared_rooms import SHARED_FEATURES, measure_shared
 from closedrooms.predictor.config import BestConfig
 
 FOLDS = 8
@@ -62,8 +62,8 @@ def fit(values: FloatArray, shared: BoolArray, groups: list[str], counts: IntArr
     for least in (0.3, 0.4, 0.5, 0.6, 0.7):
         said = likely > least
         print(f"probability above {least}: {counts @ (said & shared)} right, {counts @ (said & ~shared)} wrong")
-    print(f"{FEATURES[0].name:16s} {model.intercept_[0]:.2f}")
-    for feature, weight in zip(FEATURES[1:], model.coef_[0] / scale, strict=True):
+    print(f"{SHARED_FEATURES[0].name:16s} {model.intercept_[0]:.2f}")
+    for feature, weight in zip(SHARED_FEATURES[1:], model.coef_[0] / scale, strict=True):
         print(f"{feature.name:16s} {weight:.2f}")
 
 

@@ -67,7 +67,7 @@ def _find_none(shape: Shape, probability: OccupancyGrid) -> float:
     return 1.0 - float(percent.max()) / 100.0 if percent.size else 0.0
 
 
-def draw_rooms(possible: Sequence[Possibilities], count: int, rng: np.random.Generator) -> Iterator[list[int]]:
+def sample_rooms(possible: Sequence[Possibilities], count: int, rng: np.random.Generator) -> Iterator[list[int]]:
     """Draw what all rooms together may be.
 
     Args:

@@ -6,7 +6,7 @@ from typing import Literal
 
 from closedrooms.core.errors import InvalidInputError
 
-Method = Literal["default", "ortools", "paper"]
+TourMethod = Literal["default", "ortools", "paper"]
 Parts = Literal["start", "all"]
 
 
@@ -69,7 +69,7 @@ class GraphConfig:
 class TourConfig:
     """How a tour is searched (paper, section 5.2)."""
 
-    method: Method = "default"
+    method: TourMethod = "default"
     """``default``: OR-Tools' Christofides, then Or-opt and 2-opt moves with restarts, bounded by moves.
     ``ortools``: OR-Tools' Christofides, then its tabu search, bounded by solutions. ``paper``: the same, stopped by
     convergence or after 60 s (not repeatable where the time stops it)."""

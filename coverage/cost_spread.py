@@ -22,7 +22,7 @@ from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyG
 from closedrooms.core.random import stream
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import Shape, fill_shape, trace_outline
-from closedrooms.coverage.completions import Possibilities, draw_rooms, list_possibilities
+from closedrooms.coverage.completions import Possibilities, list_possibilities, sample_rooms
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.graph.graph_builder import build_graph
 from closedrooms.coverage.tour.tour_planner import solve_tour
@@ -118,7 +118,7 @@ def spread_cost(
     drawn = np.array(
         [
             sum(float(cost[at]) for cost, at in zip(costs, state, strict=True))
-            for state in draw_rooms(possible, count, rng)
+            for state in sample_rooms(possible, count, rng)
         ]
     )
     # As evenly spread as can be: a few random numbers would make another interval of every seed.

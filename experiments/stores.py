@@ -19,6 +19,7 @@ from closedrooms.experiments.places import Url
 BLOCK = 1 << 20
 """Bytes that are hashed or sent at a time."""
 WHAT = "a file of a dataset"
+DATASET_MANIFEST = "manifest.json"
 
 
 class Store(Protocol):

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 Job = TypeVar("Job")
-Outcome = TypeVar("Outcome")
+Result = TypeVar("Result")
 
 # How often a job is handed out before it is given up: its worker may have been killed for another one's sake.
 TRIES = 3
@@ -48,7 +48,7 @@ class Lost:
 
 
 @dataclass(frozen=True, slots=True)
-class Crew(Generic[Job, Outcome]):
+class Crew(Generic[Job, Result]):
     """Workers who do the work, local or on a cluster.
 
     Attributes:
@@ -63,7 +63,7 @@ class Crew(Generic[Job, Outcome]):
     needs: tuple[str, ...] = ()
     by: str = "closedrooms"
 
-    def do(self, function: Callable[[Job], Outcome], jobs: Iterable[Job]) -> Iterator[tuple[Job, Outcome | Lost]]:
+    def do(self, function: Callable[[Job], Result], jobs: Iterable[Job]) -> Iterator[tuple[Job, Result | Lost]]:
         """Yield outcomes as they come, in no certain order.
 
         Jobs are taken one after the other, no more of them ahead than the workers can begin: a million cost no more
@@ -92,7 +92,7 @@ class Crew(Generic[Job, Outcome]):
             else:
                 yield from self._locally(work, jobs)
 
-    def _locally(self, work: Callable[[Job], Outcome], jobs: Iterator[Job]) -> Iterator[tuple[Job, Outcome | Lost]]:
+    def _locally(self, work: Callable[[Job], Result], jobs: Iterator[Job]) -> Iterator[tuple[Job, Result | Lost]]:
         # Jobs that were under way when a worker died are retried one at a time, to find the one that kills workers.
         suspects: deque[tuple[Job, int]] = deque()
         while True:
@@ -111,10 +111,10 @@ class Crew(Generic[Job, Outcome]):
                 return
 
     def _batch(
-        self, work: Callable[[Job], Outcome], jobs: Iterator[Job], begun: dict[int, Job], workers: int
-    ) -> Iterator[tuple[Job, Outcome]]:
+        self, work: Callable[[Job], Result], jobs: Iterator[Job], begun: dict[int, Job], workers: int
+    ) -> Iterator[tuple[Job, Result]]:
         """Hand out jobs, no more at a time than there are workers: ``begun`` names those under way when one dies."""
-        under_way: dict[Future[Outcome], int] = {}
+        under_way: dict[Future[Result], int] = {}
         numbers = count()
         with hire(workers) as pool:
             while True:
@@ -177,7 +177,7 @@ def _dismiss() -> None:
         child.kill()
 
 
-def _prepared(function: Callable[[Job], Outcome], needs: tuple[str, ...], by: str, job: Job) -> Outcome:
+def _prepared(function: Callable[[Job], Result], needs: tuple[str, ...], by: str, job: Job) -> Result:
     """Do one job on a worker of any kind, which is made ready once."""
     _make_ready(needs, by)
     try:
@@ -272,8 +272,8 @@ def _cluster(address: str) -> Iterator["Client"]:
 
 
 def _on_cluster(
-    address: str, work: Callable[[Job], Outcome], jobs: Iterator[Job]
-) -> Iterator[tuple[Job, Outcome | Lost]]:
+    address: str, work: Callable[[Job], Result], jobs: Iterator[Job]
+) -> Iterator[tuple[Job, Result | Lost]]:
     """Hand out jobs to a cluster, ``AHEAD`` times as many as it has threads at a time."""
     with _cluster(address) as client:
         from distributed import KilledWorker, as_completed
@@ -295,7 +295,7 @@ def _on_cluster(
             for future in completed:
                 job = begun.pop(future.key)
                 try:
-                    outcome: Outcome | Lost = future.result()
+                    outcome: Result | Lost = future.result()
                 except KilledWorker as error:
                     outcome = Lost(" ".join(str(error).split()))
                 future.release()

@@ -16,10 +16,10 @@ from closedrooms.core.observation import Observation
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
+from closedrooms.navigation.decider import Decider, Ending, Situation
 
-Outcome = Literal["complete", "stuck"]
 LoopStatus = Literal["complete", "stuck", "limit", "outside"]
-REASONS: dict[Outcome, str] = {"complete": "", "stuck": "the robot could not get free"}
+REASONS: dict[Ending, str] = {"complete": "", "stuck": "the robot could not get free"}
 
 
 class Robot(Protocol):
@@ -44,33 +44,6 @@ class MapMaker(Protocol):
 
     def grid(self) -> OccupancyGrid:
         """Draw the map so far."""
-
-
-class Decider(Protocol):
-    """What decides where to drive."""
-
-    @property
-    def status(self) -> Outcome | None:
-        """How it ended, ``None`` before."""
-
-    def command(
-        self,
-        pose: Pose2,
-        scan: LaserScan,
-        grid: Callable[[], OccupancyGrid],
-        bumps: Sequence[float] = (),
-    ) -> tuple[float, float]:
-        """Decide on speed [m/s] and turn rate [rad/s] for now.
-
-        Args:
-            pose: ``map_T_robot`` as estimated.
-            scan: What the robot sees now.
-            grid: Returns the map as estimated; only called when something is decided on it.
-            bumps: Directions from which something presses, robot frame [rad].
-
-        Returns:
-            The command; (0, 0) once ``status`` is set.
-        """
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,7 +139,7 @@ def run_loop(
         clock.lap("sense")
         pose = mapper.process(observation.scan, observation.odometry, observation.sightings)
         clock.lap("map")
-        v, w = decider.command(pose, observation.scan, limits.grid, observation.bumps)
+        v, w = decider.command(Situation(pose, observation.scan, limits.grid, observation.bumps))
         clock.lap("navigate")
         step = Step(observation, pose)
         stamps.append(step.stamp)

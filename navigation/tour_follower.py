@@ -1,7 +1,6 @@
 """Follows a coverage tour through opened doors while prediction and tour are revised (beyond section 5)."""
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +10,11 @@ from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
-from closedrooms.core.scan import LaserScan
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.control_loop import Outcome
 from closedrooms.navigation.costmap import NavigationMap
-from closedrooms.navigation.driver import Driver
+from closedrooms.navigation.decider import Decider, Situation
 from closedrooms.navigation.met_obstacles import touching_points
 from closedrooms.navigation.path_back import cells_near, path_back
 from closedrooms.navigation.path_check import fits_along
@@ -79,7 +76,7 @@ class TourOutcome:
     replans: int
 
 
-class TourFollower:
+class TourFollower(Decider):
     """Decides where to drive next on a coverage tour.
 
     Attributes:
@@ -96,15 +93,13 @@ class TourFollower:
             predictor: Predicts rooms anew.
             coverage: For tours that are solved again.
         """
-        self.config = config
-        self.status: Outcome | None = None
+        super().__init__(config)
         self.revisions: list[Revision] = []
         self._doors = plan.doors
         self._coverage = coverage
         self._prediction = RevisedPrediction(plan.prediction, plan.doors, predictor)
         self._unsure = plan.unsure
         self._stops = RemainingTour(plan.tour)
-        self._driver = Driver(config)
         self._map = NavigationMap(config)
         self._driven: list[Point] = []
         self._unreachable: list[Point] = []
@@ -145,35 +140,23 @@ class TourFollower:
         unreachable = np.array(self._unreachable).reshape(-1, 2)
         return TourOutcome(self.prediction, tuple(self.revisions), self._stops.visited, unreachable, self._replans)
 
-    def command(
-        self,
-        pose: Pose2,
-        scan: LaserScan,
-        grid: Callable[[], OccupancyGrid],
-        bumps: Sequence[float] = (),
-    ) -> tuple[float, float]:
-        """Decide on speed [m/s] and turn rate [rad/s] for now; see ``Decider.command``. It waits for doors first."""
-        now, driver = scan.stamp, self._driver
-        self._started_at = now if self._started_at is None else self._started_at
-        if self.status is not None or self.is_waiting(now):
-            return (0.0, 0.0)
-        self._note_place(pose)
-        if driver.state in {"stuck", "recovering"}:
-            return driver.command(pose, scan, now, bumps)
-        if now - self._checked_at >= CHECK_INTERVAL - 1e-9:
-            self._check(pose, grid(), now)
-        if self._goal is None and not self._next(pose, grid(), now):
-            return (0.0, 0.0)
-        command = driver.command(pose, scan, now, bumps)
-        if driver.state == "arrived":
-            self._arrive()
-        elif driver.state == "stuck":
-            self._map.add_obstacles(touching_points(pose, scan, self.config, bumps))
-            self._goal, self._going_back = None, False
-            self._attempts += 1
-            if driver.recoveries > self.config.max_recoveries:
-                self.status = "stuck"
-        return command
+    def _is_ready(self, now: Situation) -> bool:
+        """Wait for the doors first; then remember where the robot drives."""
+        self._started_at = now.stamp if self._started_at is None else self._started_at
+        if self.is_waiting(now.stamp):
+            return False
+        self._note_place(now.pose)
+        return True
+
+    def _has_goal(self, now: Situation) -> bool:
+        if now.stamp - self._checked_at >= CHECK_INTERVAL - 1e-9:
+            self._check(now.pose, now.grid(), now.stamp)
+        return self._goal is not None or self._next(now.pose, now.grid(), now.stamp)
+
+    def _get_stuck(self, now: Situation) -> None:
+        self._map.add_obstacles(touching_points(now.pose, now.scan, self.config, now.bumps))
+        self._goal, self._going_back = None, False
+        self._attempts += 1
 
     def _note_place(self, pose: Pose2) -> None:
         """Remember where the robot drove, and strike off the vertices that it comes past."""
@@ -184,7 +167,7 @@ class TourFollower:
         if self._stops.pass_by(here) and more and self._goal is not None and not self._going_back:
             self._goal, self._arrived = None, True
 
-    def _arrive(self) -> None:
+    def _arrive(self, now: Situation) -> None:  # noqa: ARG002
         """Count a vertex as visited at the end of a path: it is as near as one gets."""
         if self._going_back:
             self._going_back = False

@@ -7,7 +7,7 @@ import numpy as np
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.geojson import Feature, write_features
+from closedrooms.core.files.geojson import GeoFeature, write_features
 from closedrooms.core.files.outgoing import new_files
 from closedrooms.core.files.rosmap import RosMap, read_ros_map
 from closedrooms.core.report import Report
@@ -80,7 +80,7 @@ def _on_map(read: RosMap, door: DoorProposal) -> DoorProposal:
     return replace(door, segment=((x0, y0), (x1, y1)))
 
 
-def _feature(name: str, door: DoorProposal) -> Feature:
+def _feature(name: str, door: DoorProposal) -> GeoFeature:
     from shapely.geometry import LineString
 
     return LineString(door.segment), _properties(name, door)

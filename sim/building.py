@@ -9,11 +9,12 @@ from shapely.geometry import Polygon
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.sim.config import SimConfig
 from closedrooms.sim.contacts import Obstacles, edges_of
-from closedrooms.sim.differential_drive import Drive
 from closedrooms.sim.door_leaves import door_leaves
 from closedrooms.sim.doors import Door, HungDoor, PlacedDoor
 from closedrooms.sim.glass import glass_area
-from closedrooms.sim.physics_world import FURNITURE, PANE, WALLS, Colour, PhysicsWorld, upright
+from closedrooms.sim.physics_world import PhysicsWorld
+from closedrooms.sim.robot.differential_drive import Drive
+from closedrooms.sim.solids import FURNITURE, PANE, WALLS, Colour, upright
 from closedrooms.worlds.extrusion import extrude
 from closedrooms.worlds.geometry import areal, door_gap, wall_area
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor

@@ -12,7 +12,8 @@ from shapely.geometry import MultiPolygon, Polygon
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.random import stream
 from closedrooms.sim.contacts import Obstacles, leaf_edges
-from closedrooms.sim.physics_world import PERSON, PhysicsWorld, upright
+from closedrooms.sim.physics_world import PhysicsWorld
+from closedrooms.sim.solids import PERSON, upright
 from closedrooms.worlds.extrusion import extrude
 from closedrooms.worlds.plan import FloorPlan
 

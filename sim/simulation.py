@@ -20,15 +20,16 @@ from closedrooms.sim.building import Building, gap_from
 from closedrooms.sim.bystanders import Floor, MovedBox, Person
 from closedrooms.sim.config import FaultConfig, NoiseConfig, SimConfig
 from closedrooms.sim.contacts import SKIN, distance
-from closedrooms.sim.differential_drive import RAMP_SECONDS, Drive
 from closedrooms.sim.faults import Faults
 from closedrooms.sim.glass import glazed
 from closedrooms.sim.lidar import Lidar
 from closedrooms.sim.odometry import Odometry
 from closedrooms.sim.physics_world import PhysicsWorld
-from closedrooms.sim.robot_model import TRACK_SHARE, RobotModel, make_model
-from closedrooms.sim.robot_urdf import read_robot
-from closedrooms.sim.wheeled_robot import WheeledRobot
+from closedrooms.sim.robot.differential_drive import RAMP_SECONDS, Drive
+from closedrooms.sim.robot.driven_robot import DrivenRobot
+from closedrooms.sim.robot.robot_model import TRACK_SHARE, RobotModel, make_model
+from closedrooms.sim.robot.robot_urdf import read_robot
+from closedrooms.sim.robot.wheeled_robot import WheeledRobot
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start_pose import start_pose
@@ -73,7 +74,7 @@ class Simulation:
             self._building = Building(self.plan, self._closed, self.config, physics)
             start, robot = self.world_T_map, self.config.robot
             self._check_start()
-            self._drive: Drive | WheeledRobot = (
+            self._drive: DrivenRobot = (
                 WheeledRobot(
                     physics, self._model or make_model(robot, self.config.lidar.height), robot, start.as_tuple()
                 )

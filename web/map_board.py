@@ -19,6 +19,7 @@ attributionControl: false, keyboard: false, doubleClickZoom: false}"""
 SCRIPT = """
 const map = getElement(%d).map;
 L.control.scale({imperial: false, maxWidth: 160}).addTo(map);
+let focused = null;  // the door that has it; every change draws all doors anew
 map.on('layeradd', ({layer}) => {
   const handle = layer.options.handle;
   if (!handle || layer.told) return;
@@ -28,7 +29,13 @@ map.on('layeradd', ({layer}) => {
   shape.style.setProperty('--colour', handle.colour);
   shape.dataset.label = handle.label;
   layer.setIcon(L.divIcon({html: shape, className: '', iconSize: null}));
-  layer.getElement().setAttribute('aria-label', handle.kind + ' ' + handle.name);
+  const element = layer.getElement();
+  element.setAttribute('aria-label', handle.kind + ' ' + handle.name);
+  if (handle.kind === 'door' || handle.kind === 'chosen') {
+    if (focused === handle.name && document.activeElement === document.body) element.focus({preventScroll: true});
+    element.addEventListener('focus', () => { focused = handle.name; });
+    element.addEventListener('blur', () => setTimeout(() => { if (element.isConnected) focused = null; }));
+  }
   const tell = type => emitEvent('handle',
     {type, kind: handle.kind, name: handle.name, x: layer.getLatLng().lng, y: layer.getLatLng().lat});
   for (const type of ['click', 'dragend']) layer.on(type, () => tell(type));

@@ -2,14 +2,13 @@
 
 import asyncio
 import contextlib
-import math
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
 from nicegui import run, ui
-from nicegui.events import KeyEventArguments, UploadEventArguments, ValueChangeEventArguments
+from nicegui.events import UploadEventArguments, ValueChangeEventArguments
 
 from closedrooms.core.door import Point
 from closedrooms.core.errors import ClosedroomsError
@@ -17,6 +16,7 @@ from closedrooms.core.report import counted
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.predictor.methods import METHODS
 from closedrooms.web.door_list import DoorList
+from closedrooms.web.keyboard import Keyboard
 from closedrooms.web.map_board import HandleEvent, MapBoard
 from closedrooms.web.map_layers import MapLayers
 from closedrooms.web.prompts import ask, icon_button, show_keys, switch, tell
@@ -39,10 +39,6 @@ body { margin: 0; }
   .wide { display: none; }
 }
 """
-# What a door or the view moves at a press of an arrow, x to the right and y up.
-ARROWS = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, 1), "ArrowDown": (0, -1)}
-STEP, BIG_STEP, PAN = 0.05, 0.5, 80
-TURNS = {"[": math.radians(5), "]": -math.radians(5), "{": math.radians(45), "}": -math.radians(45)}
 # How long a browser may take to connect [s].
 PATIENCE = 30.0
 # Largest list of doors [bytes].
@@ -67,7 +63,7 @@ class EditPage:
             with ui.column().classes("side"):
                 self._status = ui.label("").props("data-id=status role=status aria-live=polite")
                 self._list = DoorList(session, self._done, self._select)
-        self._keys = ui.keyboard(self._pressed, ignore=["input", "select", "textarea"])
+        self._keys = Keyboard(session, self._board, self._done, self._select, self._layers.show_all)
         ui.on("save", self._save_pressed)
 
     async def start(self) -> None:
@@ -99,7 +95,7 @@ class EditPage:
             ui.label(session.config.map.name).classes("text-bold wide")
             self._undo = icon_button("undo", "undo (Ctrl+Z)", lambda: self._done(session.undo()))
             self._redo = icon_button("redo", "redo (Ctrl+Y)", lambda: self._done(session.redo()))
-            icon_button("add_location", "set a door in the middle of the view (N)", self._door_in_the_middle)
+            icon_button("add_location", "set a door in the middle of the view (N)", self._set_door)
             self._method = ui.select(list(METHODS), value=session.document.method, on_change=self._method_chosen)
             self._method.props("dense options-dense label=method data-id=method").classes("w-32")
             icon_button("tune", "settings of the method", self._ask_settings)
@@ -182,51 +178,12 @@ class EditPage:
         elif event.kind == "proposal" and event.type == "click" and event.name.isdecimal():
             await self._done(session.accept(int(event.name)))
 
-    async def _door_in_the_middle(self) -> None:
-        await self._done(self._session.point_at(self._board.middle))
+    async def _set_door(self) -> None:
+        await self._keys.set_door()
 
     def _select(self, name: str | None) -> None:
         self._session.selected = name
         self.draw()
-
-    async def _pressed(self, event: KeyEventArguments) -> None:
-        if not event.action.keydown:
-            return
-        session, key, held = self._session, event.key.name, event.modifiers
-        if held.ctrl or held.meta:
-            work = {"z": session.redo if held.shift else session.undo, "y": session.redo}.get(key.lower())
-            if work is not None:
-                await self._done(work())
-        elif key in ARROWS:
-            await self._arrow(*ARROWS[key], far=bool(held.shift))
-        elif key in TURNS and session.selected is not None:
-            name = session.selected
-            await self._done(session.change(lambda document: document.turned(name, TURNS[key])))
-        elif key in {"Delete", "Backspace"} and session.selected is not None:
-            name = session.selected
-            await self._done(session.change(lambda document: document.without_door(name)))
-        elif key == "Escape":
-            self._select(None)
-        elif key in {"+", "-"}:
-            self._board.zoom(1 if key == "+" else -1)
-        else:
-            await self._pressed_letter(key.lower())
-
-    async def _pressed_letter(self, key: str) -> None:
-        if key == "0":
-            self._show_all()
-        elif key == "n":
-            await self._door_in_the_middle()
-        elif key == "p" and self._session.open_proposals:
-            await self._done(self._session.accept(self._session.open_proposals[0][0]))
-
-    async def _arrow(self, right: int, up: int, *, far: bool) -> None:
-        name = self._session.selected
-        if name is None:
-            self._board.pan(right * PAN, -up * PAN)
-            return
-        step = BIG_STEP if far else STEP
-        await self._done(self._session.change(lambda document: document.shifted(name, (right * step, up * step))))
 
     # What comes of it
 

@@ -21,7 +21,7 @@ from closedrooms.core.numbers import FARTHEST, MAX_DOORS, MAX_ROOMS, WIDEST, che
 from closedrooms.core.remarks import Remark
 from closedrooms.core.room import Alternative, Room
 
-Feature = tuple[BaseGeometry, dict[str, Any]]
+GeoFeature = tuple[BaseGeometry, dict[str, Any]]
 MAX_FEATURES = 1_000_000
 # Other shapes of one room that are read; three are written.
 MAX_ALTERNATIVES = 100
@@ -29,7 +29,7 @@ MAX_ALTERNATIVES = 100
 LISTS = {"Point": 0, "LineString": 1, "MultiPoint": 1, "Polygon": 2, "MultiLineString": 2, "MultiPolygon": 3}
 
 
-def write_features(path: Path, features: Iterable[Feature]) -> None:
+def write_features(path: Path, features: Iterable[GeoFeature]) -> None:
     """Write geometries [m, map frame] with their properties, a line each, coordinates rounded to 0.1 mm.
 
     Raises:
@@ -53,7 +53,7 @@ def _rounded(coordinates: FloatArray) -> FloatArray:
 
 def read_features(
     path: Path, *, what: str = "a GeoJSON FeatureCollection", remarks: list[Remark] | None = None
-) -> list[Feature]:
+) -> list[GeoFeature]:
     """Read geometries and properties of an untrusted file, as we, QGIS or geopandas write it.
 
     A bare Feature or geometry counts as a collection of one. The ``id`` of a Feature stands in its properties when
@@ -102,7 +102,7 @@ def _features(data: Any) -> list[Any] | None:
     return None
 
 
-def _read_feature(number: int, feature: Any, path: Path) -> Feature:
+def _read_feature(number: int, feature: Any, path: Path) -> GeoFeature:
     try:
         geometry = feature["geometry"]
         _check_positions(geometry["coordinates"], LISTS[geometry["type"]])
@@ -143,7 +143,7 @@ def _check_positions(value: Any, depth: int) -> None:
 def write_doors(path: Path, doors: Sequence[ClosedDoor]) -> None:
     """Write closed doors: a LineString from jamb to jamb where the segment is known, else a Point."""
 
-    def feature(door: ClosedDoor) -> Feature:
+    def feature(door: ClosedDoor) -> GeoFeature:
         geometry = Point(door.midpoint) if door.segment is None else LineString(door.segment)
         properties: dict[str, Any] = {"id": door.id, "state": door.state}
         if door.width is not None:
@@ -198,7 +198,7 @@ def _parts(geometry: BaseGeometry) -> list[BaseGeometry]:
     return list(shapely.get_parts(geometry)) if isinstance(geometry, MultiLineString | MultiPoint) else [geometry]
 
 
-def _door_names(features: Sequence[Feature], path: Path, remarks: list[Remark]) -> list[str]:
+def _door_names(features: Sequence[GeoFeature], path: Path, remarks: list[Remark]) -> list[str]:
     """Name doors: as given, numbered where no name is given or several parts share one."""
     given = [_given_name(number, properties.get("id"), path) for number, (_, properties) in enumerate(features)]
     taken = {name for name in given if name is not None}
@@ -263,7 +263,7 @@ def _door(name: str, geometry: BaseGeometry, properties: dict[str, Any], path: P
 def write_rooms(path: Path, rooms: Sequence[Room]) -> None:
     """Write predicted rooms (``kind``, ``score``, ``bounded``; ``confidence`` and ``alternatives``), or true ones."""
 
-    def feature(room: Room) -> Feature:
+    def feature(room: Room) -> GeoFeature:
         properties: dict[str, Any] = {"doors": list(room.doors)}
         if room.kind is not None:
             score = None if room.score is None else round(room.score, 6)

@@ -189,16 +189,6 @@ def new_files(paths: Iterable[Path], *, force: bool = False, sources: Iterable[P
         _put(claims)
 
 
-def is_ours(folder: Path, command: object = None) -> bool:
-    """Check whether every file in ``folder``, at every depth, was written by ``command`` and has not changed since.
-
-    Args:
-        folder: With a manifest.
-        command: As the manifest names it; ``None`` for parts of a dataset, whose manifests name none.
-    """
-    return _strange(folder, command) == ""
-
-
 def _strange(folder: Path, command: object) -> str:
     """Find something in a folder that the same command did not write, or was changed since; empty for nothing."""
     try:

@@ -61,10 +61,6 @@ class RosMap:
         grid_T_map = self.map_T_grid.inverse()
         return [door.moved(grid_T_map) for door in doors] if self.turned else list(doors)
 
-    def doors_on_map(self, doors: Iterable[ClosedDoor]) -> list[ClosedDoor]:
-        """Move doors of the grid's frame to the map frame."""
-        return [door.moved(self.map_T_grid) for door in doors] if self.turned else list(doors)
-
     def rooms_on_map(self, rooms: Iterable[Room]) -> list[Room]:
         """Move rooms of the grid's frame to the map frame."""
         if not self.turned:

@@ -65,7 +65,7 @@ class Task:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class TaskResult:
     """Result of a task: nothing set is well.
 
     Attributes:
@@ -83,7 +83,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observed:
-    """Map, doors and poses that a sample's robot brought home, whichever way it was made.
+    """Map, doors and poses that a sample's robot brought home, whichever way it was made: not all were explored.
 
     Poses are those of all scans of an exploration, of an erased map those of the keyframes that make it.
     """
@@ -97,21 +97,21 @@ class Observed:
     about: dict[str, Any]
 
 
-def make(task: Task) -> Outcome:
+def make(task: Task) -> TaskResult:
     """Make one survey or sample as a folder; tell what goes wrong, but raise a missing package."""
     return guarded(lambda: make_folder(task, task.folder))
 
 
-def guarded(work: Callable[[], Outcome | None]) -> Outcome:
+def guarded(work: Callable[[], TaskResult | None]) -> TaskResult:
     """Do work and tell what goes wrong, but raise a missing package."""
     try:
-        return work() or Outcome()
+        return work() or TaskResult()
     except OutputError as error:
-        return Outcome(trouble=str(error))
+        return TaskResult(trouble=str(error))
     except ModuleNotFoundError:
         raise
     except Exception as error:
-        return Outcome(failure=reason(error))
+        return TaskResult(failure=reason(error))
 
 
 def make_folder(task: Task, folder: Path) -> None:

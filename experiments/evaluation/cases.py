@@ -13,15 +13,14 @@ from closedrooms.core.files.geojson import read_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.names import plot_text
 from closedrooms.experiments.evaluation.curves import same_extent, same_scale, save_figure
-from closedrooms.experiments.evaluation.listing import SamplePath
 from closedrooms.experiments.evaluation.sample_evaluation import predict_with
+from closedrooms.experiments.evaluation.sample_path import SamplePath
 from closedrooms.experiments.evaluation.samples import Sample, read_sample
-from closedrooms.experiments.evaluation.scores import hidden_area
+from closedrooms.experiments.evaluation.scores import Scores, hidden_area
 from closedrooms.experiments.evaluation.summary import MEASURES, estimates
-from closedrooms.experiments.evaluation.tours import cropped, plan_tour
+from closedrooms.experiments.evaluation.tours import cropped, plan_cropped_tour
 from closedrooms.visualization.colours import DOOR_CLOSED, FREE, OCCUPIED, ROOM_COLOURS, UNKNOWN
 
-Scores = dict[str, Any]
 HIDDEN, OUTLINE = (255, 205, 130), "#1c5fb0"
 # Share of the samples that know least, among which the two extreme cases are looked for.
 LEAST_KNOWN = 0.1
@@ -129,7 +128,7 @@ def draw_extremes(
         names = ("closed", "predicted", "truth")
         for place, (grid, doors), title, name in zip(line, grids, figures, names, strict=True):
             _show_grid(place, cropped(grid))
-            _show_tour(place, plan_tour(grid, doors))
+            _show_tour(place, plan_cropped_tour(grid, doors))
             place.set_title(f"{title}, tour {tour[name]['length_m']:.0f} m", fontsize=9)
         _dots(line[0], sample)
         same_extent(line)

@@ -8,7 +8,7 @@ from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, write_json
 from closedrooms.core.files.schema import KEY, SCHEMA, check_schema
 
 
-def claim(folder: Path, command: str) -> None:
+def claim_folder(folder: Path, command: str) -> None:
     """Make the folder ours, or make sure that it is of the same command, which goes on where it stopped.
 
     Args:

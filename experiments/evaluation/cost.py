@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -11,12 +10,12 @@ from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.cost_spread import spread_cost
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.experiments.evaluation.samples import Sample
-from closedrooms.experiments.evaluation.statistics import bootstrap, by_world, rounded
+from closedrooms.experiments.evaluation.scores import Scores
+from closedrooms.experiments.evaluation.statistics import bootstrap, by_world, round_figure
+from closedrooms.experiments.evaluation.tables import Row
 from closedrooms.experiments.evaluation.tours import START, kept_tour
 from closedrooms.predictor.prediction import Prediction
 
-Scores = dict[str, Any]
-Row = dict[str, Any]
 # Of the draws: an evaluation has no seed of its own.
 SEED = 0
 
@@ -75,14 +74,14 @@ def cost_rows(scores: Sequence[Scores], resamples: int) -> list[Row]:
                 "samples": len(own),
                 "completions": own[0]["completions"]["count"],
                 "interval": own[0]["completions"]["interval"],
-                "within": rounded(held.mean()),
+                "within": round_figure(held.mean()),
                 "within_low": first,
                 "within_high": last,
-                "below": rounded((truth < low).mean()),
-                "above": rounded((truth > high).mean()),
-                "width": rounded((100 * (high - low) / truth).mean()),
-                "error_mean": rounded((100 * np.abs(mean - truth) / truth).mean()),
-                "error_predicted": rounded((100 * np.abs(predicted - truth) / truth).mean()),
+                "below": round_figure((truth < low).mean()),
+                "above": round_figure((truth > high).mean()),
+                "width": round_figure((100 * (high - low) / truth).mean()),
+                "error_mean": round_figure((100 * np.abs(mean - truth) / truth).mean()),
+                "error_predicted": round_figure((100 * np.abs(predicted - truth) / truth).mean()),
             }
         )
     return rows

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from closedrooms.core.files.outgoing import write_bytes
+from closedrooms.experiments.evaluation.tables import Row
 from closedrooms.visualization.colours import ROOM_COLOURS, Colour
 
-Row = dict[str, Any]
 # One colour a method or estimate in every figure.
 COLOURS: dict[str, Colour] = {
     name: ROOM_COLOURS[number]

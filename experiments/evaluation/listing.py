@@ -1,7 +1,6 @@
 """Which samples a dataset holds: as its manifest lists them, or every folder with the files of one."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -9,37 +8,13 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import read_text
 from closedrooms.core.files.outgoing import MANIFEST
 from closedrooms.core.numbers import repr_of
-from closedrooms.experiments.evaluation.shard_rows import ShardRow, list_rows
+from closedrooms.experiments.evaluation.sample_path import SamplePath
+from closedrooms.experiments.evaluation.shard_rows import list_rows
 from closedrooms.experiments.places import Url
+from closedrooms.experiments.stores import DATASET_MANIFEST
 
 FILES = ("map.yaml", "doors.geojson", "truth.yaml")
-DATASET_MANIFEST = "manifest.json"
 MAX_REPETITION = 1_000_000
-
-
-@dataclass(frozen=True, slots=True, order=True)
-class SamplePath:
-    """Place of a sample.
-
-    Attributes:
-        name: Its path relative to the dataset.
-        folder: The folder with its files.
-        problem: Why there is nothing to read, from the manifest; empty where there should be.
-        listed: Whether a manifest lists it, so that its run.json and checksums have to be there.
-        digest: SHA-256 of its run.json, empty where the dataset does not say.
-        world: Building, empty where no manifest names it.
-        repetition: Repetition, -1 where no manifest names it.
-        shard: Where it is a row of a shard, else ``None``; see :mod:`closedrooms.experiments.evaluation.shard_rows`.
-    """
-
-    name: str
-    folder: Path
-    problem: str = ""
-    listed: bool = False
-    digest: str = ""
-    world: str = ""
-    repetition: int = -1
-    shard: ShardRow | None = None
 
 
 def find_samples(datasets: Sequence[Path | Url]) -> list[SamplePath]:
@@ -73,21 +48,11 @@ def _samples_of(dataset: Path | Url) -> Iterator[SamplePath]:
 
     manifest = read_manifest(dataset)
     if manifest.get("layout") == "shards":
-        yield from _rows(dataset, manifest)
+        yield from list_rows(dataset.resolve() if isinstance(dataset, Path) else dataset, manifest)
     elif isinstance(dataset, Path):
         yield from _listed(dataset, manifest)
     else:
         raise InvalidInputError("a dataset of folders at an address", expected="one of shards", where=dataset)
-
-
-def _rows(dataset: Path | Url, manifest: Mapping[str, Any]) -> Iterator[SamplePath]:
-    """List the samples in the shards of a dataset, those that failed included."""
-    place = dataset.resolve() if isinstance(dataset, Path) else dataset
-    for row in list_rows(place, manifest):
-        folder = Path(f"{row.shard.name}/{row.name}") if row.shard else Path(row.name)
-        yield SamplePath(
-            row.name, folder, row.problem, listed=True, world=row.world, repetition=row.repetition, shard=row.shard
-        )
 
 
 def _folders(dataset: Path) -> Iterator[SamplePath]:

@@ -1,15 +1,14 @@
 """The numbers of the paper's text beside ours."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from closedrooms.experiments.evaluation.statistics import rounded
+from closedrooms.experiments.evaluation.scores import Scores
+from closedrooms.experiments.evaluation.statistics import round_figure
 from closedrooms.experiments.evaluation.summary import REFERENCES, estimates, grouped, headline
+from closedrooms.experiments.evaluation.tables import Row
 
-Scores = dict[str, Any]
-Row = dict[str, Any]
 # Errors of the coverage cost in the text of section 5.3: mean and standard deviation [%].
 PRINTED: dict[str, tuple[float, float]] = {"closed": (21.37, 16.18), "baseline": (21.4, 23.38), "paper": (6.21, 9.06)}
 
@@ -69,11 +68,11 @@ def _values(scores: Sequence[Scores], measure: str) -> list[float]:
 
 
 def _mean(values: Sequence[float]) -> float:
-    return rounded(np.mean(values))
+    return round_figure(np.mean(values))
 
 
 def _deviation(values: Sequence[float]) -> float:
-    return rounded(np.std(values))
+    return round_figure(np.std(values))
 
 
 def _coverage(scores: Sequence[Scores], part: str) -> list[Row]:

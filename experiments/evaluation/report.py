@@ -2,15 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from closedrooms.experiments.evaluation.cases import draw_extremes, draw_worst, extreme_cases
-from closedrooms.experiments.evaluation.config import EvaluateConfig, in_order
+from closedrooms.experiments.evaluation.config import EvaluateConfig, sort_methods
 from closedrooms.experiments.evaluation.cost import cost_rows
 from closedrooms.experiments.evaluation.curves import draw_costs, draw_errors, draw_iou, draw_reliability
-from closedrooms.experiments.evaluation.listing import SamplePath
 from closedrooms.experiments.evaluation.numbers import number_rows
 from closedrooms.experiments.evaluation.page import Section, Table, write_page
+from closedrooms.experiments.evaluation.sample_path import SamplePath
+from closedrooms.experiments.evaluation.scores import Scores
 from closedrooms.experiments.evaluation.summary import (
     WITHOUT_PREDICTION,
     coverage_rows,
@@ -23,10 +23,8 @@ from closedrooms.experiments.evaluation.summary import (
     world_rows,
 )
 from closedrooms.experiments.evaluation.sureness import reliability_rows, sureness_rows
-from closedrooms.experiments.evaluation.tables import write_table
+from closedrooms.experiments.evaluation.tables import Row, write_table
 
-Scores = dict[str, Any]
-Row = dict[str, Any]
 INTERVALS = (
     "Intervals hold 95 %: low to high draws samples (other doors in the same buildings), world low to world high draws "
     "buildings with all their samples (other buildings)."
@@ -102,10 +100,12 @@ def write_report(
         files=["tests.csv"] if tests else [],
     )
     surely = []
-    if draw_reliability(folder / "reliability.png", reliability_rows(scores), in_order({r["method"] for r in sure})):
+    if draw_reliability(
+        folder / "reliability.png", reliability_rows(scores), sort_methods({r["method"] for r in sure})
+    ):
         files = ["sureness.csv", "reliability.csv"]
         surely = [Section("How sure", SURENESS, folder / "reliability.png", [_table(sure)], files)]
-    if draw_costs(folder / "completions.png", scores, in_order(row["method"] for row in costs)):
+    if draw_costs(folder / "completions.png", scores, sort_methods(row["method"] for row in costs)):
         surely.append(
             Section("Cost of coverage", COSTS, folder / "completions.png", [_table(costs)], ["completions.csv"])
         )
@@ -133,7 +133,7 @@ def _sections(
         if drawn:
             sections.append(Section(heading, text, folder / name, tables, [csv]))
 
-    every = [name for name in (*in_order(set(present) - {"authors"}), "authors") if name in present]
+    every = [name for name in (*sort_methods(set(present) - {"authors"}), "authors") if name in present]
     drawn = draw_iou(folder / "iou.png", iou, every, ("matched", "by_door"))
     add("All methods: IoU by number of closed doors", "Both ways to compare a room with the truth.", "iou.png",
         _doors_table(iou, "method", every, measure), csv="summary.csv", drawn=drawn)  # fmt: skip
@@ -143,7 +143,7 @@ def _sections(
     names = [name for name in ("paper", "rose") if name in present]
     drawn = draw_iou(folder / "figure-09.png", iou, names, (measure,))
     add("Figure 9: IoU with two ways to find structure", "", "figure-09.png", csv="summary.csv", drawn=drawn)
-    names = [name for name in in_order(present) if any(row["estimate"] == name for row in coverage)]
+    names = [name for name in sort_methods(present) if any(row["estimate"] == name for row in coverage)]
     shown = [*WITHOUT_PREDICTION, *names[:1]]
     drawn = draw_errors(folder / "figure-12.png", coverage, shown)
     table = [row for row in coverage if row["part"] == "all"]
@@ -151,7 +151,7 @@ def _sections(
     add("Figure 12: errors of the coverage cost", "", "figure-12.png", errors, csv="coverage.csv", drawn=drawn)
     drawn = draw_errors(folder / "figure-14.png", coverage, names)
     add("Figure 14: errors of the coverage cost by prediction", "", "figure-14.png", csv="coverage.csv", drawn=drawn)
-    method = next(iter(in_order(set(present) - {"authors"})), None)
+    method = next(iter(sort_methods(set(present) - {"authors"})), None)
     if method is not None:
         cases = extreme_cases(scores, method)
         count = draw_extremes(folder / "figure-07.png", folder / "figure-13.png", cases, samples)

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,19 +18,27 @@ from closedrooms.core.files.outgoing import write_json
 from closedrooms.core.files.rosmap import write_raw_map
 from closedrooms.experiments.dataset.checksums import digest
 from closedrooms.experiments.evaluation.cost import score_cost
-from closedrooms.experiments.evaluation.listing import SamplePath
+from closedrooms.experiments.evaluation.sample_path import SamplePath
 from closedrooms.experiments.evaluation.samples import Sample, at_hand, read_sample, renamed
 from closedrooms.experiments.evaluation.scores import (
+    Scores,
     added_rooms,
     hidden_area,
-    hidden_rooms,
     iou,
     matched_iou,
     room_masks,
+    split_hidden_area,
     union_of,
 )
 from closedrooms.experiments.evaluation.sureness import score_sureness
-from closedrooms.experiments.evaluation.tours import Tour, code_digest, kept_tour, plan_tour, tour_code, tour_figures
+from closedrooms.experiments.evaluation.tours import (
+    Tour,
+    code_digest,
+    kept_tour,
+    plan_cropped_tour,
+    tour_code,
+    tour_figures,
+)
 from closedrooms.pipeline.reporting.manifest import versions
 from closedrooms.pipeline.reporting.scores import room_iou
 from closedrooms.predictor.config import FacesConfig
@@ -42,11 +49,10 @@ from closedrooms.predictor.prediction import Prediction, free_probability
 AUTHORS = "authors"
 RESULT = "scores.json"
 INPUTS = {".yaml", ".png", ".pgm", ".geojson", ".json"}
-Scores = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Outcome:
+class SampleResult:
     """Result of one sample.
 
     Attributes:
@@ -90,7 +96,7 @@ def evaluate_sample(
     tours: bool = True,
     probability: bool = False,
     completions: int = 0,
-) -> Outcome:
+) -> SampleResult:
     """Score some methods on one sample, each kept in ``out/<method>/<sample>``.
 
     What was kept before from the same files, with the same method and code, is not done again.
@@ -107,19 +113,19 @@ def evaluate_sample(
         OutputError: The result cannot be written.
     """
     if sample.problem:
-        return Outcome(problems={sample.name: sample.problem})
+        return SampleResult(problems={sample.name: sample.problem})
     try:
         with at_hand(sample) as here:
             outcome = _evaluate(here, methods, out, Extras(tours, probability, completions))
             problems = {name: renamed(why, here.folder, sample) for name, why in outcome.problems.items()}
-            return Outcome(outcome.scores, problems)
+            return SampleResult(outcome.scores, problems)
     except InvalidInputError as error:
-        return Outcome(problems={sample.name: reason(error)})
+        return SampleResult(problems={sample.name: reason(error)})
 
 
-def _evaluate(sample: SamplePath, methods: Sequence[str], out: Path, extras: Extras) -> Outcome:
+def _evaluate(sample: SamplePath, methods: Sequence[str], out: Path, extras: Extras) -> SampleResult:
     """Score some methods on one sample in a folder."""
-    outcome = Outcome()
+    outcome = SampleResult()
     wanted = [*methods, *([AUTHORS] if (sample.folder / "authors.yaml").is_file() else [])]
     content = _content(sample.folder)
     keys = {method: _fingerprint(content, method, extras) for method in wanted}
@@ -251,7 +257,7 @@ def _has_tour(method: str) -> bool:
 
 def _hidden(sample: Sample) -> _Hidden:
     area = hidden_area(sample.observed, sample.truth)
-    rooms = hidden_rooms(area, sample.observed.frame.resolution)
+    rooms = split_hidden_area(area, sample.observed.frame.resolution)
     free = int(np.count_nonzero(sample.truth.free))
     return _Hidden(area, rooms, int(np.count_nonzero(area)) / max(free, 1))
 
@@ -304,7 +310,7 @@ def _score(
     compared = extras.tours and sample.rooms_seen is not None
     if _has_tour(method) and (compared or extras.completions):
         try:
-            own = plan_tour(prediction.grid)
+            own = plan_cropped_tour(prediction.grid)
             if extras.completions:
                 scores["completions"] = score_cost(sample, prediction, own, out, extras.completions)
             if compared:

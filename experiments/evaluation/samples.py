@@ -20,7 +20,7 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.numbers import repr_of
 from closedrooms.core.room import Room
 from closedrooms.experiments.dataset.checksums import check, digest
-from closedrooms.experiments.evaluation.listing import SamplePath
+from closedrooms.experiments.evaluation.sample_path import SamplePath
 from closedrooms.experiments.evaluation.shard_rows import unpacked
 from closedrooms.predictor.structure.known_window import MAX_CELLS
 

@@ -11,6 +11,8 @@ from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import cells_inside
 
+# Figures of one sample and one method by their names, as ``scores.json`` holds them.
+Scores = dict[str, Any]
 # How hidden rooms are told apart on a true map, as measured on the authors' maps (cells of 0.05 m there): closing of
 # the hidden area, least distance of a seed from its edge, least area of a room.
 CLOSING, SEED_DEPTH, MIN_AREA = 0.10, 0.45, 1.0
@@ -32,7 +34,7 @@ def hidden_area(observed: OccupancyGrid, truth: OccupancyGrid) -> BoolArray:
     return np.asarray(cv2.morphologyEx(area, cv2.MORPH_CLOSE, disc) > 0) & ~truth.occupied
 
 
-def hidden_rooms(area: BoolArray, resolution: float) -> list[BoolArray]:
+def split_hidden_area(area: BoolArray, resolution: float) -> list[BoolArray]:
     """Split a hidden area into rooms: watershed of its distance transform, a seed for each part deeper than 0.45 m.
 
     Args:

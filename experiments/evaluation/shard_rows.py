@@ -3,55 +3,19 @@
 import contextlib
 import tempfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.experiments.evaluation.sample_path import SamplePath, ShardRow
 from closedrooms.experiments.places import Url
-from closedrooms.experiments.stores import file_digest, open_store
+from closedrooms.experiments.stores import DATASET_MANIFEST, file_digest, open_store
 
 COLUMNS = ("id", "world", "repetition")
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class ShardRow:
-    """Row of a shard.
-
-    Attributes:
-        dataset: The dataset: an absolute path or an address, as text.
-        name: The shard, relative to the dataset.
-        group: The group of rows in it.
-        row: Which of the group.
-    """
-
-    dataset: str
-    name: str
-    group: int
-    row: int
-
-
-@dataclass(frozen=True, slots=True)
-class ListedRow:
-    """Sample that a dataset of shards holds, or should.
-
-    Attributes:
-        name: Its id.
-        world: Building.
-        repetition: Repetition, -1 where it is not known.
-        shard: Where it is.
-        problem: Why it is not there.
-    """
-
-    name: str
-    world: str = ""
-    repetition: int = -1
-    shard: ShardRow | None = None
-    problem: str = ""
-
-
-def list_rows(dataset: Path | Url, manifest: Mapping[str, Any]) -> Iterator[ListedRow]:
+def list_rows(dataset: Path | Url, manifest: Mapping[str, Any]) -> Iterator[SamplePath]:
     """Yield the samples of a dataset of shards; shards of this machine are compared with their checksums.
 
     Args:
@@ -64,7 +28,6 @@ def list_rows(dataset: Path | Url, manifest: Mapping[str, Any]) -> Iterator[List
     import pyarrow.parquet as pq
 
     from closedrooms.core.files.incoming import reading
-    from closedrooms.experiments.dataset.layout import DATASET_MANIFEST
     from closedrooms.experiments.dataset.packing import read_rows
     from closedrooms.experiments.dataset.shard import read_shard
 
@@ -74,7 +37,7 @@ def list_rows(dataset: Path | Url, manifest: Mapping[str, Any]) -> Iterator[List
     for entry in manifest.get("shards") or ():
         shard = read_shard(entry, store.where(DATASET_MANIFEST))
         for name, why in shard.failures.items():
-            yield ListedRow(name, problem=f"failed when the dataset was made: {why}")
+            yield SamplePath(name, Path(name), listed=True, problem=f"failed when the dataset was made: {why}")
         if not shard.rows:
             continue
         where = store.where(shard.name)
@@ -94,7 +57,11 @@ def list_rows(dataset: Path | Url, manifest: Mapping[str, Any]) -> Iterator[List
             )
         for (group, number), row in zip(places, rows, strict=True):
             place = ShardRow(str(dataset), shard.name, group, number)
-            yield ListedRow(_text(row["id"], where), _text(row["world"], where), _whole(row["repetition"]), place)
+            sample, world = _text(row["id"], where), _text(row["world"], where)
+            folder = Path(f"{shard.name}/{sample}")
+            yield SamplePath(
+                sample, folder, listed=True, world=world, repetition=_whole(row["repetition"]), shard=place
+            )
 
 
 def _text(value: Any, where: str) -> str:

@@ -29,7 +29,7 @@ def bootstrap(groups: Sequence[FloatArray], resamples: int, name: str) -> Interv
     draws = stream(0, "bootstrap", name).integers(0, sums.size, (resamples, sums.size))
     means = sums[draws].sum(axis=1) / counts[draws].sum(axis=1)
     low, high = np.percentile(means, [2.5, 97.5])
-    return rounded(low), rounded(high)
+    return round_figure(low), round_figure(high)
 
 
 def described(groups: Sequence[FloatArray], worlds: Sequence[str], resamples: int, name: str) -> dict[str, Any]:
@@ -48,9 +48,9 @@ def described(groups: Sequence[FloatArray], worlds: Sequence[str], resamples: in
     low, high = bootstrap(groups, resamples, name)
     world_low, world_high = bootstrap(by_world(groups, worlds), resamples, f"{name} worlds")
     return {
-        "mean": rounded(values.mean()) if values.size else None,
-        "median": rounded(np.median(values)) if values.size else None,
-        "sd": rounded(values.std()) if values.size else None,
+        "mean": round_figure(values.mean()) if values.size else None,
+        "median": round_figure(np.median(values)) if values.size else None,
+        "sd": round_figure(values.std()) if values.size else None,
         "low": low,
         "high": high,
         "world_low": world_low,
@@ -66,7 +66,7 @@ def by_world(groups: Sequence[FloatArray], worlds: Sequence[str]) -> list[FloatA
     return [np.concatenate(collected[world]) for world in sorted(collected)]
 
 
-def rounded(value: Any) -> float:
+def round_figure(value: Any) -> float:
     """Round a figure as it stands in tables: six decimals."""
     return round(float(value), 6) + 0.0
 
@@ -99,7 +99,7 @@ class PairedTest:
     p_worlds: float | None
 
 
-def paired(
+def compare_pairs(
     first: Mapping[str, float], second: Mapping[str, float], worlds: Mapping[str, str], resamples: int, name: str
 ) -> PairedTest | None:
     """Test whether two methods differ, on the samples that both have; ``None`` without any.
@@ -122,7 +122,7 @@ def paired(
     means = np.array([group.mean() for group in groups])
     enough = len(groups) >= LEAST_WORLDS
     p_samples, p_worlds = (_wilcoxon(values) if enough else None for values in (differences, means))
-    return PairedTest(len(common), len(groups), rounded(differences.mean()), low, high, p_samples, p_worlds)
+    return PairedTest(len(common), len(groups), round_figure(differences.mean()), low, high, p_samples, p_worlds)
 
 
 def _wilcoxon(differences: FloatArray) -> float:

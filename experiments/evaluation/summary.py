@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray
-from closedrooms.experiments.evaluation.config import EvaluateConfig, in_order
-from closedrooms.experiments.evaluation.statistics import described, paired, rounded
+from closedrooms.experiments.evaluation.config import EvaluateConfig, sort_methods
+from closedrooms.experiments.evaluation.scores import Scores
+from closedrooms.experiments.evaluation.statistics import compare_pairs, described, round_figure
+from closedrooms.experiments.evaluation.tables import Row
 
-Scores = dict[str, Any]
-Row = dict[str, Any]
 # What is measured on rooms, and how it is taken from the scores of one sample.
 MEASURES: dict[str, Callable[[Scores], Sequence[float]]] = {
     "matched": lambda score: score["matched"],
@@ -101,7 +101,7 @@ def coverage_rows(scores: Sequence[Scores], config: EvaluateConfig, part: str) -
 def estimates(scores: Sequence[Scores]) -> dict[str, list[Scores]]:
     """Group scores with tours by estimate: ``closed`` and ``baseline`` (once a sample), then the methods."""
     toured = grouped([score for score in scores if "tour" in score], "method")
-    ordered = {method: toured[method] for method in in_order(toured)}
+    ordered = {method: toured[method] for method in sort_methods(toured)}
     if not ordered:
         return {}
     largest = max(ordered.values(), key=len)
@@ -133,7 +133,7 @@ def paired_rows(scores: Sequence[Scores], config: EvaluateConfig) -> list[Row]:
     for method in methods:
         for name in ("matched", "by_door", "area", "error"):
             first, second = (_figure(methods[which], name) for which in (reference, method))
-            test = paired(first, second, worlds, config.resamples, f"{reference} {method} {name}")
+            test = compare_pairs(first, second, worlds, config.resamples, f"{reference} {method} {name}")
             if method != reference and test is not None:
                 rows.append({"first": reference, "second": method, "measure": name} | asdict(test))
     return rows
@@ -184,4 +184,4 @@ def sample_rows(scores: Sequence[Scores]) -> list[Row]:
 
 
 def _mean(values: Sequence[float] | FloatArray) -> float | None:
-    return rounded(np.mean(values)) if len(values) else None
+    return round_figure(np.mean(values)) if len(values) else None

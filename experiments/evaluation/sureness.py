@@ -10,12 +10,12 @@ from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.experiments.evaluation.statistics import rounded
-from closedrooms.pipeline.reporting.scores import polygon_iou
+from closedrooms.core.shapes import polygon_iou
+from closedrooms.experiments.evaluation.scores import Scores
+from closedrooms.experiments.evaluation.statistics import round_figure
+from closedrooms.experiments.evaluation.tables import Row
 from closedrooms.predictor.prediction import Prediction
 
-Scores = dict[str, Any]
-Row = dict[str, Any]
 # Cells are asked about where the map is unknown within this of a closed door [m], whatever a method predicts there and
 # whatever the truth is: about the depth of the larger rooms.
 ASKED = 8.0
@@ -63,7 +63,7 @@ def score_sureness(
         shapes = [room.polygon, *(other.polygon for other in room.alternatives)]
         ious = [polygon_iou(shape, true[room.doors[0]]) for shape in shapes]
         best = [max(ious[: count + 1]) for count in range(4)]
-        rooms.append([rounded(value) for value in (room.confidence, *best)])
+        rooms.append([round_figure(value) for value in (room.confidence, *best)])
     scores: Scores = {"rooms": rooms}
     if prediction.probability is not None:
         asked = cells_asked(observed, doors)
@@ -72,8 +72,8 @@ def score_sureness(
         guess = (prediction.grid.on(observed.frame).free & observed.unknown)[asked].astype(np.float64)
         scores["cells"] = int(free.size)
         for name, values in (("", chance), ("_guess", guess)):
-            scores[f"brier{name}"] = rounded(((values - free) ** 2).sum())
-            scores[f"log{name}"] = rounded(-_log_score(values, free).sum())
+            scores[f"brier{name}"] = round_figure(((values - free) ** 2).sum())
+            scores[f"log{name}"] = round_figure(-_log_score(values, free).sum())
     return scores
 
 
@@ -95,18 +95,18 @@ def sureness_rows(scores: Sequence[Scores]) -> list[Row]:
         row: Row = {
             "method": method,
             "rooms": len(figures),
-            "confidence_mean": rounded(confidence.mean()),
-            "iou_mean": rounded(iou.mean()),
-            "calibration_error": rounded(calibration_error(confidence, iou)),
+            "confidence_mean": round_figure(confidence.mean()),
+            "iou_mean": round_figure(iou.mean()),
+            "calibration_error": round_figure(calibration_error(confidence, iou)),
             "auroc": _optional(auroc(confidence, iou > FOUND)),
             "spearman": _optional(spearman(confidence, iou)),
         }
-        row |= {f"best_of_{count}": rounded(figures[:, count].mean()) for count in (2, 3, 4)}
+        row |= {f"best_of_{count}": round_figure(figures[:, count].mean()) for count in (2, 3, 4)}
         cells = sum(sure.get("cells", 0) for sure in own)
         if cells:
             row["cells"] = cells
             for name in ("brier", "brier_guess", "log", "log_guess"):
-                row[name] = rounded(sum(sure.get(name, 0.0) for sure in own) / cells)
+                row[name] = round_figure(sum(sure.get(name, 0.0) for sure in own) / cells)
         rows.append(row)
     return rows
 
@@ -124,9 +124,9 @@ def reliability_rows(scores: Sequence[Scores]) -> list[Row]:
                     "method": method,
                     "group": number,
                     "rooms": len(group),
-                    "confidence": rounded(confidence.mean()),
-                    "iou": rounded(iou.mean()),
-                    "iou_sd": rounded(iou.std()),
+                    "confidence": round_figure(confidence.mean()),
+                    "iou": round_figure(iou.mean()),
+                    "iou_sd": round_figure(iou.std()),
                 }
             )
     return rows
@@ -176,4 +176,4 @@ def spearman(confidence: FloatArray, iou: FloatArray) -> float | None:
 
 
 def _optional(value: float | None) -> float | None:
-    return None if value is None else rounded(value)
+    return None if value is None else round_figure(value)

@@ -2,13 +2,14 @@
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from closedrooms.core.files.outgoing import write_bytes
 
-Row = Mapping[str, Any]
+# Values of one line by column.
+Row = dict[str, Any]
 
 
 def write_table(stem: Path, rows: Sequence[Row], columns: Sequence[str] | None = None) -> None:

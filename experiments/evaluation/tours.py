@@ -25,7 +25,7 @@ CACHE = "tours"
 Tour = dict[str, Any]
 
 
-def plan_tour(grid: OccupancyGrid, doors: Sequence[ClosedDoor] = (), *, start: Point = START) -> CoverageTour:
+def plan_cropped_tour(grid: OccupancyGrid, doors: Sequence[ClosedDoor] = (), *, start: Point = START) -> CoverageTour:
     """Plan the tour on a map, which depends on its known cells only.
 
     Raises:
@@ -64,7 +64,7 @@ def kept_tour(out: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor] = (), 
     except (InvalidInputError, KeyError, TypeError):
         pass
     path.parent.mkdir(parents=True, exist_ok=True)
-    figures = tour_figures(plan_tour(grid, doors, start=start))
+    figures = tour_figures(plan_cropped_tour(grid, doors, start=start))
     write_json(path, figures)
     return figures
 

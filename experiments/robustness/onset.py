@@ -22,8 +22,8 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.random import stream
+from closedrooms.experiments.evaluation.tables import Row
 
-Row = dict[str, Any]
 STAGES = ("mapping", "doors", "structure", "prediction")
 # IoU with more and more stages repaired, in the order in which the stages work.
 CHAIN = ("iou", "iou_true_poses", "iou_true_doors", "iou_true_walls")

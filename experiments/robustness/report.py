@@ -2,16 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from closedrooms.experiments.evaluation.page import Section, Table, write_page
-from closedrooms.experiments.evaluation.tables import write_table
+from closedrooms.experiments.evaluation.tables import Row, write_table
 from closedrooms.experiments.robustness.config import RobustnessConfig
 from closedrooms.experiments.robustness.figures import draw_curves, draw_maps
 from closedrooms.experiments.robustness.levels import UNITS, cases
 from closedrooms.experiments.robustness.onset import STAGES, LevelResult, Onset, level_results, onsets
 
-Row = dict[str, Any]
 METHOD = (
     "Every level is held against the first of its factor on the same buildings and closed doors. The prediction "
     "suffers from the first level on whose mean difference of the IoU lies below zero with 97.5 % (bootstrap, "

@@ -19,7 +19,8 @@ from closedrooms.core.room import Room
 from closedrooms.experiments.dataset.erase import Eraser
 from closedrooms.experiments.dataset.open_survey import OpenSurvey
 from closedrooms.experiments.evaluation.scores import iou, room_masks
-from closedrooms.experiments.evaluation.tours import cropped, kept_tour, plan_tour
+from closedrooms.experiments.evaluation.tables import Row
+from closedrooms.experiments.evaluation.tours import cropped, kept_tour, plan_cropped_tour
 from closedrooms.experiments.robustness.clean_walls import sampled, with_clean_walls
 from closedrooms.experiments.robustness.config import RobustnessConfig
 from closedrooms.experiments.robustness.door_noise import disturbed_doors, phantom_doors, true_doors
@@ -31,13 +32,12 @@ from closedrooms.pipeline.survey import Truth, true_building
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.sim.config import FaultConfig
-from closedrooms.sim.robot_model import TRACK_SHARE
+from closedrooms.sim.robot.robot_model import TRACK_SHARE
 from closedrooms.worlds.closing import closable_rooms, draw_closed
 from closedrooms.worlds.geometry import door_leaf
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.truth import reachable
 
-Row = dict[str, Any]
 # A cell farther than this from every true wall is simply wrong: how far says nothing [m].
 FARTHEST = 0.5
 
@@ -162,7 +162,7 @@ class BuildingTrials:
 
         try:
             truth = kept_tour(self._config.out, closing.truth.grid)["length_m"]
-            lengths = [plan_tour(grid, doors).length, plan_tour(prediction.grid).length]
+            lengths = [plan_cropped_tour(grid, doors).length, plan_cropped_tour(prediction.grid).length]
         except InvalidInputError:
             return {"error_closed": None, "error_baseline": None, "error_predicted": None}
         world_T_map = self._drive(first_setting(self._config)).world_T_map

@@ -14,7 +14,7 @@ from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, only_writer, writ
 from closedrooms.core.random import stream
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
-from closedrooms.experiments.evaluation.claimed_folder import claim
+from closedrooms.experiments.evaluation.claimed_folder import claim_folder
 from closedrooms.experiments.evaluation.listing import find_samples
 from closedrooms.experiments.evaluation.tours import code_digest
 from closedrooms.experiments.training.config import TrainConfig
@@ -45,7 +45,7 @@ def train(config: TrainConfig, *, progress: Progress | None = None) -> Report:
     progress = progress or Silent()
     require(*NEEDS, by="closedrooms train")
     paths = find_samples(config.datasets)
-    claim(config.out, "train")
+    claim_folder(config.out, "train")
     with only_writer(config.out):
         progress.stage("read", len(paths))
         gathered = gather_examples(paths, lambda number: progress.advance(number, f"{number} of {len(paths)}"))
@@ -54,14 +54,14 @@ def train(config: TrainConfig, *, progress: Progress | None = None) -> Report:
 
 def _train(gathered: Gathered, config: TrainConfig, progress: Progress) -> Report:
     """Train, then write model, card, curves and manifest."""
-    from closedrooms.experiments.training.card import FILE as CARD
-    from closedrooms.experiments.training.card import write_card
-    from closedrooms.experiments.training.curves import PICTURE, TABLE, write_curves
     from closedrooms.experiments.training.export import write_model
+    from closedrooms.experiments.training.learning_curves import PICTURE, TABLE, write_curves
+    from closedrooms.experiments.training.model_card import FILE as CARD
+    from closedrooms.experiments.training.model_card import write_card
     from closedrooms.experiments.training.trainer import Training
 
     examples = gathered.examples
-    fit, held = split_buildings(examples, config)
+    fit, held = hold_out_buildings(examples, config)
     training = Training(config, examples, fit, held)
     checkpoint, key = config.out / CHECKPOINT, _fingerprint(examples, config)
     if training.resume(checkpoint, key):
@@ -109,7 +109,7 @@ def _train(gathered: Gathered, config: TrainConfig, progress: Progress) -> Repor
     return Report(folder=config.out, title=title, rows=rows, failures=gathered.failures, figures=figures)
 
 
-def split_buildings(examples: Examples, config: TrainConfig) -> tuple[IntArray, IntArray]:
+def hold_out_buildings(examples: Examples, config: TrainConfig) -> tuple[IntArray, IntArray]:
     """Split examples by building: which are learned from, and which are held out.
 
     Returns:

@@ -1,7 +1,5 @@
 """What two rooms say about each other: they do not overlap, share a wall, and end in one line (method ``best``)."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -9,8 +7,9 @@ import shapely
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.best.door_pose import SAME_WALL
+from closedrooms.predictor.best.feature import Feature
 from closedrooms.predictor.best.hypotheses import Hypotheses
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 
 # Two sides that overlap by this still touch; slack of the thickness of the wall between two rooms [cells].
 TOUCHING, SLACK = in_cells(0.1), in_cells(0.3)
@@ -109,29 +108,15 @@ def same_width(p: Pairs) -> FloatArray:
     return np.asarray(np.exp(-np.abs(p.sizes[0][..., axis] - p.sizes[1][..., axis]) / OFF_WIDTH) * p.agree)
 
 
-@dataclass(frozen=True, slots=True)
-class PairFeature:
-    """Kind of evidence that two rooms give together.
-
-    Attributes:
-        name: For people.
-        measure: Of every pair of rectangles, shape (n, m).
-        weight: What it counts; where from, ``best.features`` says.
-    """
-
-    name: str
-    measure: Callable[[Pairs], FloatArray]
-    weight: float
-
-
 OVERLAP_WEIGHT = -20.0
-PAIR_FEATURES = (
-    PairFeature("overlap", overlap, weight=OVERLAP_WEIGHT),
-    PairFeature("same depth", same_depth, weight=2.65),
-    PairFeature("shared wall", shared_wall, weight=0.69),
-    PairFeature("strip between", strip_between, weight=-0.89),
-    PairFeature("gap between", gap_between, weight=-0.44),
-    PairFeature("same width", same_width, weight=3.75),
+# Where the weights come from, ``features`` says.
+PAIR_FEATURES: tuple[Feature[Pairs, FloatArray], ...] = (
+    Feature("overlap", overlap, weight=OVERLAP_WEIGHT),
+    Feature("same depth", same_depth, weight=2.65),
+    Feature("shared wall", shared_wall, weight=0.69),
+    Feature("strip between", strip_between, weight=-0.89),
+    Feature("gap between", gap_between, weight=-0.44),
+    Feature("same width", same_width, weight=3.75),
 )
 WEIGHTS = np.array([feature.weight for feature in PAIR_FEATURES])
 

@@ -9,7 +9,7 @@ import numpy as np
 from closedrooms.core.arrays import BoolArray, CellArray, FloatArray, IntArray
 from closedrooms.predictor.best.door_frame import TurnedMap
 from closedrooms.predictor.best.door_pose import DoorPose
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.best.scene import Scene
 
 # Cells of a patch along each side, and their size [m]: 32 x 32 m, so that a room of 24 m fits.
@@ -60,7 +60,7 @@ def _cut_patch(turned: TurnedMap, pose: DoorPose, poses: tuple[DoorPose, ...]) -
     along = np.array([inward[1], -inward[0]])
     # To whole cells of the turned map, so that nothing is sampled between them.
     corner = (
-        np.round(turned.to_cells(pose.facing.middle)).astype(int) - in_cells(ASIDE) * along - in_cells(BEHIND) * inward
+        np.round(turned.to_frame(pose.facing.middle)).astype(int) - in_cells(ASIDE) * along - in_cells(BEHIND) * inward
     )
     seen = _take(turned, corner, along + inward, pose.quarter)
     channels = np.zeros((len(CHANNELS), SIZE, SIZE))

@@ -49,7 +49,7 @@ class Arrangement:
     neighbours: tuple[dict[int, int], ...]
 
 
-def arrange(lines: Sequence[Line], boundary: Sequence[Line]) -> Arrangement:
+def build_arrangement(lines: Sequence[Line], boundary: Sequence[Line]) -> Arrangement:
     """Divide the box into faces: node all lines and polygonize them.
 
     Args:

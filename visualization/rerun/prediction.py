@@ -14,6 +14,7 @@ from closedrooms.core.room import Room
 from closedrooms.visualization import colours
 from closedrooms.visualization.colours import Colour
 from closedrooms.visualization.rerun import drawables
+from closedrooms.visualization.rerun.documents import markdown
 from closedrooms.visualization.rerun.stream import RecordingStream, Stage
 
 if TYPE_CHECKING:
@@ -179,7 +180,7 @@ def _draw_scores(stream: RecordingStream, trace: "PredictionTrace", palette: Map
         for level in trace.levels
     ]
     lines = ["| " + " | ".join(row) + " |" for row in [["level", *doors], ["---:"] * (len(doors) + 1), *rows]]
-    stream.log("prediction/scores", rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN), static=True)
+    stream.log("prediction/scores", markdown("\n".join(lines)), static=True)
     for door in doors:
         stream.log(
             f"metrics/score/{door}",

@@ -11,6 +11,7 @@ from closedrooms.core.names import markdown_text
 from closedrooms.core.room import Room
 from closedrooms.visualization import colours
 from closedrooms.visualization.rerun import drawables
+from closedrooms.visualization.rerun.documents import markdown
 from closedrooms.visualization.rerun.stream import RecordingStream
 
 if TYPE_CHECKING:
@@ -34,13 +35,13 @@ def draw_sureness(
     """
     if prediction.probability is not None:
         stream.log("sureness/grid", probability_map(observed, prediction))
-    stream.log("sureness/table", rr.TextDocument(_table(prediction, iou), media_type=rr.MediaType.MARKDOWN))
+    stream.log("sureness/table", markdown(_table(prediction, iou)))
 
 
 def draw_nothing_yet(stream: RecordingStream, observed: OccupancyGrid) -> None:
     """Draw what stands there before the first prediction."""
     stream.log("sureness/grid", drawables.grid_map(observed))
-    stream.log("sureness/table", rr.TextDocument(NOTHING_YET, media_type=rr.MediaType.MARKDOWN))
+    stream.log("sureness/table", markdown(NOTHING_YET))
 
 
 def probability_map(observed: OccupancyGrid, prediction: "Prediction") -> rr.GridMap:

@@ -12,6 +12,7 @@ from closedrooms.core.names import markdown_text
 from closedrooms.visualization import colours
 from closedrooms.visualization.colours import Colour
 from closedrooms.visualization.rerun import drawables
+from closedrooms.visualization.rerun.documents import markdown
 from closedrooms.visualization.rerun.stream import RecordingStream, Stage
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def draw_weighed(
     if staged:
         for room in trace.rooms:
             _draw_bars(stream, room)
-        stream.log("weighing/candidates", _markdown(_candidates_table(trace.rooms)), static=True)
+        stream.log("weighing/candidates", markdown(_candidates_table(trace.rooms)), static=True)
 
 
 LEVELS = (
@@ -121,7 +122,7 @@ def _draw_bars(stream: RecordingStream, room: "WeighedRoom") -> None:
     title = markdown_text(", ".join(room.doors))
     none = "" if room.runner_up is not None else "\n\nAll candidates are much the same room: there is no runner-up."
     table = "\n".join([f"## {title}", "", *head, *rows]) + none
-    stream.log(f"weighing/{room_name(room)}/terms", _markdown(table), static=True)
+    stream.log(f"weighing/{room_name(room)}/terms", markdown(table), static=True)
 
 
 def _candidates_table(rooms: Sequence["WeighedRoom"]) -> str:
@@ -141,7 +142,3 @@ def _candidates_table(rooms: Sequence["WeighedRoom"]) -> str:
             lines.append(f"| {doors} | {what} | {sides[0]:.2f} x {sides[1]:.2f} | {scores} |")
     note = "The chosen one agrees best with all candidates, weighed by their scores: it need not have the highest."
     return "\n".join(["# Candidates", "", *lines, "", note])
-
-
-def _markdown(text: str) -> rr.TextDocument:
-    return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)

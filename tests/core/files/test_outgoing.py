@@ -12,7 +12,6 @@ from closedrooms.core.errors import OutputError
 from closedrooms.core.files.outgoing import (
     check_new_files,
     check_output_folder,
-    is_ours,
     new_files,
     output_folder,
     write_bytes,
@@ -26,7 +25,6 @@ def test_an_output_folder_appears_whole_and_lists_its_files(tmp_path: Path) -> N
     manifest = json.loads((tmp_path / "out" / "run.json").read_text())
     assert manifest.pop("sha256").keys() == {"a.txt", "run.json"}
     assert manifest == {"seed": 3, "program": "closedrooms", "schema": 1, "files": ["a.txt"]}
-    assert is_ours(tmp_path / "out")
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
 

@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 from closedrooms.core.robot import RobotConfig
 from closedrooms.sim.contacts import SKIN, Edge, Obstacles, distance, move_disc, offset
+from closedrooms.sim.robot.driven_robot import DrivenRobot, Motion
 
 # While velocities change, an arc is driven with the mean of so much time [s]: at the default limits this leaves the
 # true path by at most 0.1 mm in half a second (0.5 mm with 0.05 s).
@@ -20,30 +20,8 @@ CHORD_TURN = 0.1
 STALLED = 0.1
 
 
-class Motion(NamedTuple):
-    """One motion as it was really driven, in the robot frame at its start.
-
-    Attributes:
-        dx: Forwards [m].
-        dy: To the left [m].
-        turn: Change of the heading [rad].
-    """
-
-    dx: float
-    dy: float
-    turn: float
-
-
-class Drive:
-    """Pose and velocity of the robot; it cannot pass through anything.
-
-    Attributes:
-        x: Building frame [m].
-        y: Building frame [m].
-        theta: Building frame [rad].
-        v: Speed [m/s].
-        w: Turn rate [rad/s].
-        bumps: Directions in the robot frame from which something touched since they were last cleared [rad].
+class Drive(DrivenRobot):
+    """A disc that drives arcs exactly.
 
     The robot is a disc that is moved, not pushed: contacts are found in the plane, against the very edges that the
     walls are extruded from. It slides along what it meets at an angle and stops at what it meets head-on. A wheeled
@@ -52,11 +30,7 @@ class Drive:
     """
 
     def __init__(self, config: RobotConfig, obstacles: Obstacles, x: float, y: float, theta: float) -> None:
-        self.config = config
-        self.x, self.y, self.theta = x, y, theta
-        self.v = 0.0
-        self.w = 0.0
-        self.bumps: tuple[float, ...] = ()
+        super().__init__(config, (x, y, theta))
         self._obstacles = obstacles
 
     @staticmethod
@@ -64,23 +38,8 @@ class Drive:
         """Compute how far from its centre the robot may meet something within one arc [m]."""
         return config.radius + ARC_LENGTH + 2 * SKIN
 
-    @property
-    def collided(self) -> bool:
-        """Whether it touched anything since ``bumps`` were last cleared."""
-        return bool(self.bumps)
-
-    def advance(self, v: float, w: float, duration: float, sink: Callable[[Motion], None]) -> None:
-        """Follow a velocity command for some time.
-
-        Args:
-            v: Commanded speed [m/s]; the limits are applied.
-            w: Commanded turn rate [rad/s]; the limits are applied.
-            duration: Time [s].
-            sink: Takes every motion, in order.
-        """
+    def _advance(self, v: float, w: float, duration: float, sink: Callable[[Motion], None]) -> None:
         limits = self.config
-        v = min(max(v, -limits.max_speed), limits.max_speed)
-        w = min(max(w, -limits.max_turn_rate), limits.max_turn_rate)
         left = duration
         while left > 1e-12:
             time = self._piece(v, w, left)

@@ -8,7 +8,7 @@ import numpy as np
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.room import Alternative, Room
 from closedrooms.predictor.best.door_frame import TurnedMap
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.best.room_shape import trace_room
 from closedrooms.predictor.best.scene import Scene
 from closedrooms.predictor.best.selection import Choice, overlaps_of

@@ -10,8 +10,8 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.robot import RobotConfig
 from closedrooms.pipeline.bounds import check_width
 from closedrooms.sim.config import SimConfig, noise_level
-from closedrooms.sim.robot_model import make_model
-from closedrooms.sim.robot_urdf import read_robot
+from closedrooms.sim.robot.robot_model import make_model
+from closedrooms.sim.robot.robot_urdf import read_robot
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.plan import FloorPlan
 

@@ -7,9 +7,11 @@ from pathlib import Path
 
 from closedrooms.core.robot import RobotConfig
 from closedrooms.sim.config import STEPS
-from closedrooms.sim.differential_drive import Motion, chord, towards
-from closedrooms.sim.physics_world import EVERYTHING, FLOOR, GRAVITY, ROBOT, WHEELS, PhysicsWorld, quiet
-from closedrooms.sim.robot_model import RobotModel, Wheel
+from closedrooms.sim.physics_world import EVERYTHING, FLOOR, GRAVITY, ROBOT, WHEELS, PhysicsWorld
+from closedrooms.sim.pybullet_process import quiet
+from closedrooms.sim.robot.differential_drive import chord, towards
+from closedrooms.sim.robot.driven_robot import DrivenRobot, Motion
+from closedrooms.sim.robot.robot_model import RobotModel, Wheel
 
 # Encoders are read every so many steps [steps]: the ticks of 20 ms, in which wheel speeds change by little.
 TICK = 4
@@ -17,25 +19,17 @@ TICK = 4
 PRESSES = 0.5
 
 
-class WheeledRobot:
-    """Pose and speed of the robot as the physics have it; commands are ramped and handed to the motors.
+class WheeledRobot(DrivenRobot):
+    """A body as the physics have it; commands are ramped and handed to the motors.
 
-    Attributes:
-        x: Building frame [m].
-        y: Building frame [m].
-        theta: Building frame [rad].
-        v: Commanded speed at present, within the limits [m/s].
-        w: Commanded turn rate at present, within the limits [rad/s].
-        bumps: Directions in the robot frame from which something pressed since they were last cleared [rad].
+    Motions are told as the wheels' encoders count them; time that is no whole step is made up for next time.
     """
 
     def __init__(
         self, physics: PhysicsWorld, model: RobotModel, config: RobotConfig, start: tuple[float, float, float]
     ) -> None:
-        self.config, self.model = config, model
-        self.x, self.y, self.theta = start
-        self.v = self.w = 0.0
-        self.bumps: tuple[float, ...] = ()
+        super().__init__(config, start)
+        self.model = model
         self._physics = physics
         self._owed = 0.0
         self._body = self._load()
@@ -45,23 +39,7 @@ class WheeledRobot:
         self._torque = model.torque if math.isfinite(model.torque) else self._enough_torque()
         self._angles = self._read_wheels()
 
-    @property
-    def collided(self) -> bool:
-        """Whether something pressed against the body."""
-        return bool(self.bumps)
-
-    def advance(self, v: float, w: float, duration: float, sink: Callable[[Motion], None]) -> None:
-        """Follow a velocity command for some time.
-
-        Args:
-            v: Commanded speed [m/s]; the limits are applied.
-            w: Commanded turn rate [rad/s]; the limits are applied.
-            duration: Time [s]; what is no whole step is done next time.
-            sink: Takes every motion as the wheels' encoders count it, in order.
-        """
-        limits = self.config
-        v = min(max(v, -limits.max_speed), limits.max_speed)
-        w = min(max(w, -limits.max_turn_rate), limits.max_turn_rate)
+    def _advance(self, v: float, w: float, duration: float, sink: Callable[[Motion], None]) -> None:
         self._owed += duration * STEPS
         steps = int(self._owed + 1e-6)
         self._owed -= steps

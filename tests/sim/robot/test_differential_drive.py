@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
 from closedrooms.sim.contacts import Obstacles
-from closedrooms.sim.differential_drive import Drive, Motion
+from closedrooms.sim.robot.differential_drive import Drive
+from closedrooms.sim.robot.driven_robot import Motion
 
 
 def free_drive(config: RobotConfig | None = None) -> Drive:
