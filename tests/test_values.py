@@ -1,4 +1,4 @@
-"""Mutable state lives in few places: every other dataclass of the stages is frozen, and none with arrays is compared."""
+"""Mutable state lives in few places: other dataclasses of the stages are frozen, and none with arrays is compared."""
 
 import ast
 from collections.abc import Iterator
@@ -10,8 +10,8 @@ ROOT = Path(__file__).parents[1]
 FOLDERS = ("core", "worlds", "sim", "mapping", "navigation", "predictor", "coverage")
 # What is built up step by step, by whoever owns it.
 GROWING = {
-    "_Claims", "_Open", "_Scan", "Sketch", "SketchPassage", "Keyframe", "PoseGraph", "CarmenLog", "BagMessages", "_Link",
-    "EventLog", "Rater", "Growth", "_Branch",
+    "_Claims", "_Open", "_Scan", "Sketch", "SketchPassage", "Keyframe", "PoseGraph", "CarmenLog", "BagMessages",
+    "_Link", "EventLog", "Rater", "Growth", "_Branch",
 }  # fmt: skip
 
 
