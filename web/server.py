@@ -7,7 +7,6 @@ import sys
 import threading
 import webbrowser
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
 from functools import partial
 from typing import Any
 
@@ -60,6 +59,17 @@ class Desk:
         self._reading = threading.Lock()
         self._told = ""
 
+    def prepare(self) -> None:
+        """Read the map before the first visitor comes; what is wrong with it is told to them."""
+        with contextlib.suppress(Exception):
+            self._open()
+
+    def _open(self) -> MapSheet:
+        with self._reading:
+            if self._sheet is None:
+                self._sheet = open_sheet(self._config)
+            return self._sheet
+
     def session(self, visitor: str) -> EditSession:
         """Begin the session of a page; what cannot be read is told on the page and in one line of the terminal.
 
@@ -67,13 +77,11 @@ class Desk:
             ClosedroomsError: The map cannot be read; the next visit tries again.
         """
         try:
-            with self._reading:
-                if self._sheet is None:
-                    self._sheet = open_sheet(self._config)
+            sheet = self._open()
         except Exception as error:
             self._tell(reason(error))
             raise ClosedroomsError(reason(error)) from error
-        session = EditSession(self._config, self._sheet, self._drafts, visitor)
+        session = EditSession(self._config, sheet, self._drafts, visitor)
         if session.trouble:
             self._tell(session.trouble)
         return session
@@ -97,6 +105,7 @@ def _server(config: EditConfig, token: str, port: int) -> Any:
     from closedrooms.web.page import open_page
 
     desk = Desk(config)
+    threading.Thread(target=desk.prepare, daemon=True).start()
 
     async def page(request: Request) -> None:
         await open_page(partial(desk.session, request.scope["closedrooms_visitor"]))
@@ -110,14 +119,14 @@ def _server(config: EditConfig, token: str, port: int) -> Any:
     return uvicorn.Server(settings)
 
 
-@contextmanager
+@contextlib.contextmanager
 def _listening(port: int) -> Iterator[socket.socket]:
     """Open a socket on this machine alone.
 
     Raises:
         OutputError: The port is taken or not allowed.
     """
-    with closing(socket.socket(socket.AF_INET, socket.SOCK_STREAM)) as listener:
+    with contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_STREAM)) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listener.bind((HOST, port))
