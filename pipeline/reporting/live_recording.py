@@ -13,7 +13,7 @@ from closedrooms.navigation.opened_doors import ReopenedMap
 from closedrooms.navigation.revised_prediction import Revision
 from closedrooms.navigation.tour_follower import TourFollower
 from closedrooms.pipeline.reporting.run_log import RunLog
-from closedrooms.pipeline.reporting.scores import room_iou
+from closedrooms.pipeline.reporting.run_scores import room_iou
 from closedrooms.pipeline.reporting.story import Story
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.predictor.revision import Predict
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 GROWN = 1.5
 
 
-class GrowingPrediction:
+class InterimPrediction:
     """Prediction made anew whenever a closed door is first seen, so that a recording shows how it changes.
 
     With a door known, it also does when what is known has grown by half: else it would stand still for minutes.
@@ -61,7 +61,7 @@ class GrowingPrediction:
         prediction = self._predict(grid, doors)
         iou = room_iou(prediction.rooms, self._truth)
         iou = {door: iou[door] for door in iou if door in self._seen}
-        self._recorder.growth(grid, doors, prediction, stamp, iou=iou)
+        self._recorder.interim_prediction(grid, doors, prediction, stamp, iou=iou)
         return prediction, iou
 
 
@@ -74,10 +74,10 @@ class ExplorationRecording:
         log: RunLog,
         mapper: Mapper,
         explorer: Explorer,
-        growth: GrowingPrediction | None = None,
+        interim: InterimPrediction | None = None,
     ) -> None:
         self._recorder, self._log, self._mapper, self._explorer = recorder, log, mapper, explorer
-        self._growth = growth
+        self._interim = interim
         self._story = Story(
             recorder,
             floor=sum(room.polygon.area for room in log.sim.plan.rooms),
@@ -103,7 +103,7 @@ class ExplorationRecording:
     def _tell(self, grid: OccupancyGrid, doors: Sequence[ClosedDoor], stamp: float) -> None:
         """Write into the log what is new since the last map."""
         self._story.known(grid, stamp)
-        predicted = None if self._growth is None else self._growth(grid, doors, stamp)
+        predicted = None if self._interim is None else self._interim(grid, doors, stamp)
         self._story.doors(doors, stamp, *(predicted or ()))
         self._story.loops(len(self._mapper.loops), stamp)
         self._story.events(self._mapper.events, stamp)
