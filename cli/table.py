@@ -14,7 +14,7 @@ from tyro._errors import on_parse_error
 from closedrooms.cli.command_list import ABOUT, COMMANDS, GROUPS, HELP, HELP_ALL, Command
 from closedrooms.cli.options import option_names, options_class
 from closedrooms.cli.quick_types import tell_quickly
-from closedrooms.cli.usage import Place, UsageError, explain
+from closedrooms.cli.usage import LinePosition, UsageError, explain
 from closedrooms.core.errors import InvalidInputError
 
 MARKERS = (
@@ -121,14 +121,16 @@ def _description(command: Command, options: type[Any] | None) -> str:
     return f"{command.summary} --help-all shows the settings of each stage too: {groups}."
 
 
-def _place(words: Sequence[str], command: Command | None, options: type[Any] | None) -> Place:
+def _place(words: Sequence[str], command: Command | None, options: type[Any] | None) -> LinePosition:
     """Find where on the line tyro stopped: before a command, or among its options."""
     if command is not None and options is not None:
         method = options.about["method"]
-        return Place(tuple(words), f"closedrooms {command.name}", options=tuple(option_names(options)), method=method)
+        return LinePosition(
+            tuple(words), f"closedrooms {command.name}", options=tuple(option_names(options)), method=method
+        )
     group = words[0] if words and words[0] in GROUPS else None
     if group is not None:
         names = [c.name.split()[1] for c in COMMANDS if c.name.split()[0] == group]
-        return Place(tuple(words), f"closedrooms {group}", commands=tuple(names))
+        return LinePosition(tuple(words), f"closedrooms {group}", commands=tuple(names))
     names = list(dict.fromkeys(c.name.split()[0] for c in COMMANDS))
-    return Place(tuple(words), "closedrooms", commands=tuple(names))
+    return LinePosition(tuple(words), "closedrooms", commands=tuple(names))

@@ -121,6 +121,7 @@ def write_page(path: Path, title: str, sections: Sequence[Section]) -> None:
 
 
 def _section(section: Section) -> Iterator[str]:
+    """Write a section of the page, line by line."""
     yield f"<h2>{_text(section.heading)}</h2>"
     if section.text:
         yield f"<p>{_text(section.text)}</p>"
@@ -135,6 +136,7 @@ def _section(section: Section) -> Iterator[str]:
 
 
 def _table(table: Table) -> Iterator[str]:
+    """Write a table that sorts by its columns, line by line."""
     head, *body = _without_empty_columns(table.rows)
     if not body:
         return
@@ -155,6 +157,7 @@ def _table(table: Table) -> Iterator[str]:
 
 
 def _without_empty_columns(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
+    """Leave out columns in which no row has a value, but the first."""
     head, *body = rows
     kept = [at for at in range(len(head)) if at == 0 or any(row[at] is not None for row in body)]
     return [[row[at] for at in kept] for row in rows] if body else [list(head)]

@@ -1,7 +1,7 @@
 """Means with their uncertainty, and whether two methods differ."""
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -69,6 +69,12 @@ def by_world(groups: Sequence[FloatArray], worlds: Sequence[str]) -> list[FloatA
 def round_figure(value: Any) -> float:
     """Round a figure as it stands in tables: six decimals."""
     return round(float(value), 6) + 0.0
+
+
+def mean_figure(values: Iterable[float | None]) -> float | None:
+    """Average the figures that there are, rounded as in tables; ``None`` without any."""
+    present = [value for value in values if value is not None]
+    return round_figure(np.mean(present)) if present else None
 
 
 # With five buildings the smallest p that the test can give is 0.06: it says nothing.

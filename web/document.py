@@ -8,13 +8,15 @@ from typing import Any
 from closedrooms.core.door import ClosedDoor, Point, Segment
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.names import is_name, shown
-from closedrooms.core.numbers import FARTHEST, MAX_DOORS, WIDEST
+from closedrooms.core.numbers import FARTHEST, WIDEST
 from closedrooms.predictor.methods import find_method
 
 # A door that nothing tells the width of [m]: what the methods draw where they do not know (section 3.7).
 USUAL_WIDTH = 0.80
 # Narrowest door that can be drawn [m]: less is a slip of the pointer.
 NARROWEST = 0.20
+# More doors than this take a browser half a minute to draw.
+MOST_DOORS = 300
 # Steps that can be undone.
 MOST_STEPS = 1000
 
@@ -35,6 +37,11 @@ class Document:
     settings: Any
     doors: tuple[ClosedDoor, ...] = ()
     dismissed: frozenset[Point] = frozenset()
+
+    def __post_init__(self) -> None:
+        if len(self.doors) > MOST_DOORS:
+            expected = f"at most {MOST_DOORS} on the page (closedrooms predict takes more)"
+            raise InvalidInputError(f"{len(self.doors)} doors", expected=expected)
 
     def door(self, name: str) -> ClosedDoor:
         """Find a door by its id.
@@ -58,8 +65,6 @@ class Document:
         Raises:
             InvalidInputError: Too many doors, or a place, a width or a name that no door can have.
         """
-        if len(self.doors) >= MAX_DOORS:
-            raise InvalidInputError(f"{len(self.doors)} doors", expected=f"at most {MAX_DOORS}")
         name = name or self.free_name()
         self._check_name(name)
         return replace(self, doors=(*self.doors, _drawn(name, segment, width)))

@@ -23,7 +23,7 @@ class Keyboard:
         board: The map that is moved.
         done: Takes what an action had to tell.
         select: Selects a door.
-        save: Saves.
+        show_all: Shows the whole map.
     """
 
     def __init__(
@@ -32,10 +32,10 @@ class Keyboard:
         board: MapBoard,
         done: Callable[[str], Awaitable[None]],
         select: Callable[[str | None], None],
-        save: Callable[[], Awaitable[None]],
+        show_all: Callable[[], None],
     ) -> None:
         self._session, self._board = session, board
-        self._done, self._select, self._save = done, select, save
+        self._done, self._select, self._show_all = done, select, show_all
         self._keys = ui.keyboard(self._pressed, ignore=["input", "select", "textarea"])
 
     @property
@@ -60,8 +60,6 @@ class Keyboard:
             work = {"z": session.redo if held.shift else session.undo, "y": session.redo}.get(key.lower())
             if work is not None:
                 await self._done(work())
-            elif key.lower() == "s":
-                await self._save()
         elif key in ARROWS:
             await self._arrow(*ARROWS[key], far=bool(held.shift))
         elif key in TURNS and session.selected is not None:
@@ -74,10 +72,16 @@ class Keyboard:
             self._select(None)
         elif key in {"+", "-"}:
             self._board.zoom(1 if key == "+" else -1)
-        elif key.lower() == "n":
+        else:
+            await self._pressed_letter(key.lower())
+
+    async def _pressed_letter(self, key: str) -> None:
+        if key == "0":
+            self._show_all()
+        elif key == "n":
             await self.set_door()
-        elif key.lower() == "p" and session.open_proposals:
-            await self._done(session.accept(session.open_proposals[0][0]))
+        elif key == "p" and self._session.open_proposals:
+            await self._done(self._session.accept(self._session.open_proposals[0][0]))
 
     async def _arrow(self, right: int, up: int, *, far: bool) -> None:
         """Move the selected door by a step, else the view."""

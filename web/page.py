@@ -1,9 +1,11 @@
 """The page itself: what a session holds, drawn with NiceGUI; what somebody does, handed to the session."""
 
+import asyncio
 import contextlib
 import time
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 from nicegui import run, ui
 from nicegui.events import UploadEventArguments, ValueChangeEventArguments
@@ -39,6 +41,9 @@ body { margin: 0; }
 """
 # How long a browser may take to connect [s].
 PATIENCE = 30.0
+# Largest list of doors [bytes].
+MOST_BYTES = 20_000_000
+T = TypeVar("T")
 
 
 class EditPage:
@@ -58,7 +63,8 @@ class EditPage:
             with ui.column().classes("side"):
                 self._status = ui.label("").props("data-id=status role=status aria-live=polite")
                 self._list = DoorList(session, self._done, self._select)
-        self._keys = Keyboard(session, self._board, self._done, self._select, self._save)
+        self._keys = Keyboard(session, self._board, self._done, self._select, self._layers.show_all)
+        ui.on("save", self._save_pressed)
 
     async def start(self) -> None:
         """Draw the map once the browser is there, offer the draft, predict."""
@@ -101,9 +107,12 @@ class EditPage:
                 self._slider = ui.slider(min=0, max=1, step=0.05, value=1, on_change=self._faded).classes("w-28")
                 self._slider.props('aria-label="between map and prediction" data-id=slider')
                 ui.label("prediction").classes("wide")
+            icon_button("fit_screen", "show all (0)", self._show_all)
             ui.space()
             icon_button("folder_open", "take doors from a GeoJSON file", self._pick_file)
-            self._upload = ui.upload(on_upload=self._uploaded, auto_upload=True, max_file_size=20_000_000)
+            self._upload = ui.upload(
+                on_upload=self._uploaded, on_rejected=self._refused, auto_upload=True, max_file_size=MOST_BYTES
+            )
             self._upload.classes("hidden")
             icon_button("help_outline", "keys", show_keys)
             ui.button("save", icon="save", on_click=self._save).props("dense data-id=save")
@@ -130,7 +139,18 @@ class EditPage:
     async def _uploaded(self, event: UploadEventArguments) -> None:
         content = await event.file.read()
         self._upload.reset()
-        await self._done(self._session.load_doors(event.file.name, content))
+        try:
+            told = self._session.load_doors(event.file.name, content)
+        except ClosedroomsError as error:
+            tell(f"no doors were read: {error}", bad=True)
+        else:
+            await self._done(told)
+
+    def _refused(self) -> None:
+        tell(f"no doors were read: the file has more than {MOST_BYTES // 1_000_000} MB", bad=True)
+
+    def _show_all(self) -> None:
+        self._layers.show_all()
 
     def _faded(self) -> None:
         self._layers.fade(float(self._slider.value))
@@ -185,7 +205,7 @@ class EditPage:
             while self._session.stale:
                 self._status.set_text("predicting ...")
                 self._tour = None
-                await run.io_bound(self._session.predict)
+                await work_aside(self._session.predict)
                 self.draw()
         finally:
             self._busy = False
@@ -218,11 +238,16 @@ class EditPage:
         if self._tour is None:
             self._status.set_text("planning the tour ...")
             outcome = self._session.outcome
-            tour = await run.io_bound(self._session.tour)
+            tour = await work_aside(self._session.tour)
             if outcome is self._session.outcome and not self._session.stale:
                 self._tour = tour
                 self._layers.draw_tour(self._tour)
         self._say_outcome()
+
+    async def _save_pressed(self) -> None:
+        """Save by the keyboard, but not while a question is open."""
+        if self._keys.active:
+            await self._save()
 
     async def _save(self) -> None:
         """Save, after a question where files would be replaced."""
@@ -233,11 +258,11 @@ class EditPage:
             return
         self._status.set_text(f"saving to {session.out} ...")
         try:
-            report = await run.io_bound(session.save)
+            report = await work_aside(session.save)
         except ClosedroomsError as error:
             tell(f"not saved: {error}", bad=True)
         else:
-            tell(f"saved to {report.folder}: {report.title}")
+            tell(f"saved to {Path(report.folder).resolve()}: {report.title}")
         self._say_outcome()
 
     async def _offer_draft(self) -> None:
@@ -265,6 +290,18 @@ class EditPage:
         return answer
 
 
+async def work_aside(work: Callable[[], T]) -> T:
+    """Work on another thread while the page goes on.
+
+    Raises:
+        CancelledError: The server stops; NiceGUI 3 returns ``None`` then.
+    """
+    result = await run.io_bound(lambda: (work(),))
+    if result is None:
+        raise asyncio.CancelledError
+    return result[0]
+
+
 async def open_page(begin: Callable[[], EditSession]) -> None:
     """Build the page of one visitor.
 
@@ -273,12 +310,12 @@ async def open_page(begin: Callable[[], EditSession]) -> None:
     """
     ui.add_css(CSS)
     ui.page_title("closedrooms")
-    waiting = ui.label("reading the map ...").classes("q-ma-lg")
+    waiting = ui.label("reading the map and looking for closed doors ...").classes("q-ma-lg")
     # Who only fetches the page, or has left again, needs no map.
     with contextlib.suppress(TimeoutError):
         await ui.context.client.connected(timeout=PATIENCE)
         try:
-            session = await run.io_bound(begin)
+            session = await work_aside(begin)
         except ClosedroomsError as error:
             waiting.delete()
             _tell_trouble(str(error))

@@ -141,6 +141,7 @@ def alone(folder: Path | Url) -> Iterator[None]:
 
 
 def _clear_unfinished(folder: Path) -> None:
+    """Remove what killed processes left at any depth of a dataset."""
     for depth in ("*", "*/*", "*/*/*", "*/*/*/*"):
         for path in filter(_unfinished, folder.glob(depth)):
             shutil.rmtree(path) if path.is_dir() else path.unlink()

@@ -99,6 +99,7 @@ def _rows(summary: Sequence[Mapping[str, Any]], seconds: Mapping[str, float]) ->
 
 
 def _seconds(scores: Sequence[Scores]) -> dict[str, float]:
+    """Compute the median time of a prediction, by method [s]."""
     times: defaultdict[str, list[float]] = defaultdict(list)
     for score in scores:
         if "seconds" in score:

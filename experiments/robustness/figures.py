@@ -130,6 +130,7 @@ def draw_maps(path: Path, folder: Path, wanted: Sequence[Case]) -> bool:
 
 
 def _map(axes: Any, folder: Path) -> None:
+    """Show a kept map with true and predicted rooms."""
     grid = read_map(folder / "map.yaml")
     shown = np.full(grid.frame.shape, UNKNOWN, dtype=np.uint8)
     shown[grid.free], shown[grid.occupied] = FREE, OCCUPIED

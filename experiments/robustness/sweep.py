@@ -249,6 +249,7 @@ _LEVELS = FACTORS[:-1]
 
 @lru_cache(maxsize=1)
 def _code() -> str:
+    """Compute the digest of the code that disturbs and measures."""
     root = Path(__file__).parents[2]
     folders = (
         "core",

@@ -19,7 +19,7 @@ LEVEL, BESIDE = 0.1, 0.01
 GROUND = 0.03
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Joint:
     """One joint of the robot as it stands at the origin.
 

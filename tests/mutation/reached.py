@@ -1,4 +1,4 @@
-"""Plugin of pytest: which functions of the checkout each test reaches, and how long it takes.
+"""Plugin of pytest: which functions of the checkout each test reaches, and how much of the processor it takes.
 
     REACHED=FILE.json pytest -p reached ...
 
@@ -37,7 +37,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     """Trace one test with its set-up."""
     _reached.clear()
     _started.clear()
-    before, begin = sys.gettrace(), time.perf_counter()
+    before, begin = sys.gettrace(), time.process_time()
     threading.settrace(_trace)
     sys.settrace(_trace)
     try:
@@ -45,7 +45,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     finally:
         sys.settrace(before)
         threading.settrace(None)  # type: ignore[arg-type]
-        seconds = time.perf_counter() - begin
+        seconds = time.process_time() - begin
         functions = {place for code in _reached if (place := _place(code))}
         _tests.append(
             {

@@ -80,6 +80,7 @@ def extreme_cases(scores: Sequence[Scores], method: str) -> list[Scores]:
 
 
 def _badness(score: Scores) -> float:
+    """Rate how bad a result is: the error of the coverage cost, or the share of rooms that was not predicted."""
     if "tour" in score:
         return float(score["tour"]["error_predicted"])
     return 1.0 - float(np.mean(MEASURES["matched"](score)))
@@ -137,6 +138,7 @@ def draw_extremes(
 
 
 def _figure(rows: int, columns: int, width: float, height: float) -> tuple[Any, Any]:
+    """Make an empty figure of panels without axes, sizes of a panel in inches."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -149,6 +151,7 @@ def _figure(rows: int, columns: int, width: float, height: float) -> tuple[Any, 
 
 
 def _show_case(axes: Any, sample: Sample, rooms: Sequence[Any]) -> None:
+    """Show a map, its hidden area, predicted rooms and doors."""
     shown = np.full((*sample.observed.frame.shape, 3), UNKNOWN, dtype=np.uint8)
     shown[sample.observed.free] = FREE
     shown[hidden_area(sample.observed, sample.truth)] = HIDDEN
@@ -182,6 +185,7 @@ def _dots(axes: Any, sample: Sample) -> None:
 
 
 def _show_tour(axes: Any, tour: Any) -> None:
+    """Show the graph that a tour is planned on."""
     from matplotlib.collections import LineCollection
 
     edges = np.asarray(tour.graph.vertices)[tour.graph.pairs]

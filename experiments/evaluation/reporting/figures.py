@@ -75,6 +75,7 @@ def _series(rows: Sequence[Row], key: str, name: str, measure: str) -> Series:
 
 
 def _draw(path: Path, panels: Sequence[tuple[str, list[tuple[str, Series]]]], label: str, *, top: float | None) -> bool:
+    """Draw panels of curves against the number of closed doors; tell whether there was anything to draw."""
     panels = [panel for panel in panels if any(series[0] for _, series in panel[1])]
     if not panels:
         return False

@@ -55,6 +55,7 @@ def _row(
     where: str, what: str, ours: float, *, sd: float | None = None, paper: float | None = None,
     paper_sd: float | None = None,
 ) -> Row:  # fmt: skip
+    """Make a row in which what the paper or we do not say is ``None``."""
     return {
         "where": where, "what": what, "paper": paper, "paper_sd": paper_sd, "ours": ours, "ours_sd": sd,
         "low": None, "high": None, "p_worlds": None, "p_samples": None,
@@ -62,6 +63,7 @@ def _row(
 
 
 def _values(scores: Sequence[Scores], measure: str) -> list[float]:
+    """List the IoU of all rooms by a measure."""
     if measure == "matched":
         return [value for score in scores for value in score["matched"]]
     return [value for score in scores for value in score["by_door"].values()]

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from closedrooms.core.arrays import FloatArray
 from closedrooms.experiments.evaluation.config import EvaluateConfig, sort_methods
 from closedrooms.experiments.evaluation.scoring.scores import Scores
-from closedrooms.experiments.statistics import compare_pairs, described, round_figure
+from closedrooms.experiments.statistics import compare_pairs, described, mean_figure
 from closedrooms.experiments.tables import Row
 
 # What is measured on rooms, and how it is taken from the scores of one sample.
@@ -66,6 +65,7 @@ def iou_rows(scores: Sequence[Scores], config: EvaluateConfig) -> list[Row]:
 
 
 def _iou_row(method: str, doors: int | str, scores: Sequence[Scores], config: EvaluateConfig) -> Row:
+    """Summarise every measure of one method and one number of closed doors."""
     worlds = [score["world"] for score in scores]
     rooms = sum(len(score["matched"]) for score in scores)
     row: Row = {"closed_doors": doors, "method": method, "samples": len(scores), "rooms": rooms}
@@ -116,8 +116,8 @@ def world_rows(scores: Sequence[Scores]) -> list[Row]:
             row: Row = {"world": world, "method": method, "samples": len(group)}
             row["most_closed"] = max(score["closed_doors"] for score in group)
             for name in ("matched", "by_door", "area"):
-                row[f"{name}_mean"] = _mean([value for score in group for value in MEASURES[name](score)])
-            row["error_predicted_mean"] = _mean([s["tour"]["error_predicted"] for s in group if "tour" in s])
+                row[f"{name}_mean"] = mean_figure([value for score in group for value in MEASURES[name](score)])
+            row["error_predicted_mean"] = mean_figure([s["tour"]["error_predicted"] for s in group if "tour" in s])
             rows.append(row)
     return rows
 
@@ -145,7 +145,7 @@ def _figure(scores: Sequence[Scores], name: str) -> dict[str, float]:
         return {score["sample"]: score["tour"]["error_predicted"] for score in scores if "tour" in score}
     figures: dict[str, float] = {}
     for score in scores:
-        average = _mean(MEASURES[name](score))
+        average = mean_figure(MEASURES[name](score))
         if average is not None:
             figures[score["sample"]] = average
     return figures
@@ -171,7 +171,7 @@ def sample_rows(scores: Sequence[Scores]) -> list[Row]:
     for score in scores:
         names = ("method", "sample", "world", "repetition", "closed_doors", "doors", "hidden_share")
         row: Row = {name: score[name] for name in names}
-        row |= {f"{name}_mean": _mean(MEASURES[name](score)) for name in ("matched", "by_door")}
+        row |= {f"{name}_mean": mean_figure(MEASURES[name](score)) for name in ("matched", "by_door")}
         row |= {"area": score["area"], "agreement": score.get("agreement")}
         tour = score.get("tour")
         if tour is not None:
@@ -181,7 +181,3 @@ def sample_rows(scores: Sequence[Scores]) -> list[Row]:
             row |= {name: tour[name] for name in ("error_closed", "error_baseline", "error_predicted")}
         rows.append(row)
     return rows
-
-
-def _mean(values: Sequence[float] | FloatArray) -> float | None:
-    return round_figure(np.mean(values)) if len(values) else None

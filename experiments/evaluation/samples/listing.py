@@ -41,6 +41,7 @@ def find_samples(datasets: Sequence[Path | Url]) -> list[SamplePath]:
 
 
 def _samples_of(dataset: Path | Url) -> Iterator[SamplePath]:
+    """Yield the samples of a dataset: of shards, as its manifest lists them, or every folder that looks like one."""
     if isinstance(dataset, Path) and not (dataset / DATASET_MANIFEST).is_file():
         yield from _folders(dataset)
         return
@@ -88,6 +89,7 @@ def _digests(dataset: Path) -> dict[str, str]:
 
 
 def _entry(dataset: Path, entry: Any, number: int, digests: dict[str, str]) -> SamplePath:
+    """Read one sample of a manifest."""
     name = entry.get("id") if isinstance(entry, dict) else None
     if not isinstance(name, str) or not _stays_inside(name):
         where = dataset / DATASET_MANIFEST

@@ -65,6 +65,7 @@ def list_rows(dataset: Path | Url, manifest: Mapping[str, Any]) -> Iterator[Samp
 
 
 def _text(value: Any, where: str) -> str:
+    """Check an id or a world: a relative path that stays inside."""
     if not isinstance(value, str) or not value or value.startswith("/") or ".." in value.split("/"):
         raise InvalidInputError(
             f"a sample with the id or world {value!r}", expected="split/building/rRR-cNN", where=where
@@ -73,6 +74,7 @@ def _text(value: Any, where: str) -> str:
 
 
 def _whole(value: Any) -> int:
+    """Read a repetition, -1 for what is none."""
     return value if isinstance(value, int) and not isinstance(value, bool) and value >= 0 else -1
 
 

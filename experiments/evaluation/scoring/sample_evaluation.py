@@ -186,6 +186,7 @@ def _fingerprint(content: str, method: str, extras: Extras) -> str:
 
 @lru_cache(maxsize=1)
 def _code() -> str:
+    """Compute the digest of the code that predicts and scores."""
     root, here = Path(__file__).parents[3], Path(__file__).parent
     files = [
         *(root / "predictor").rglob("*.py"),
@@ -200,6 +201,7 @@ def _code() -> str:
 
 
 def _kept(path: Path, key: str) -> Scores | None:
+    """Read scores that were kept, ``None`` where they are of other inputs or code."""
     try:
         scores: Scores = read_json(path, what="the scores of a sample")
     except InvalidInputError:
@@ -249,6 +251,7 @@ def predict_with(name: str, sample: Sample, starts: Starts | None = None) -> tup
 
 
 def _has_tour(method: str) -> bool:
+    """Check whether a tour can be planned on what a method predicts: its rooms do not overlap."""
     return method != AUTHORS and find_method(method).disjoint
 
 
@@ -260,6 +263,7 @@ def _hidden(sample: Sample) -> _Hidden:
 
 
 def _head(sample: Sample, name: str, method: str, key: str, hidden: _Hidden) -> Scores:
+    """Say what a sample and a method are, in front of their scores."""
     return {
         "key": key,
         "sample": name,
@@ -281,6 +285,7 @@ def _score(
     starts: Starts,
     extras: Extras,
 ) -> Scores:
+    """Predict a sample with one method, keep the rooms, and measure."""
     if method == AUTHORS:
         assert sample.authors is not None, "only samples with authors.yaml come here"
         masks = added_rooms(sample.observed, sample.authors)

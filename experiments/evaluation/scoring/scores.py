@@ -64,6 +64,7 @@ def added_rooms(observed: OccupancyGrid, completed: OccupancyGrid) -> list[BoolA
 
 
 def _pieces(labels: npt.NDArray[Any], least: float) -> list[BoolArray]:
+    """List the masks of labels from 1 with at least so many cells."""
     sizes = np.bincount(labels.ravel())
     return [labels == number for number in range(1, sizes.size) if sizes[number] >= least]
 

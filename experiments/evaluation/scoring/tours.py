@@ -80,6 +80,7 @@ def tour_figures(tour: CoverageTour) -> Tour:
 
 
 def _key(grid: OccupancyGrid, doors: Sequence[ClosedDoor], start: Point) -> str:
+    """Digest what a tour depends on: known cells, doors, start, code."""
     frame = grid.frame
     where = [round(value, 6) for value in (frame.resolution, frame.origin_x, frame.origin_y)]
     places = [[door.id, door.midpoint, door.segment, door.width] for door in doors]
