@@ -27,7 +27,7 @@ SETTLE = 0.4
 
 
 class Explorer(Decider):
-    """Chooses goals on the estimated map and drives to them until no reachable frontier is left.
+    """Frontier exploration on the estimated map, until no reachable frontier is left.
 
     Greedy choice of the nearest frontier, with hysteresis: a goal is kept until its frontier is known, it is reached,
     its path is blocked, or a clearly nearer one turns up, which may happen ``max_switches`` times a goal. Every goal

@@ -31,7 +31,7 @@ class Goal:
 
 
 class GoalSearch:
-    """Finds the nearest frontier that can be looked at from a place that the robot can reach.
+    """Search for the nearest frontier that can be looked at from a place that the robot can reach.
 
     Attributes:
         map: The map that is searched; obstacles that the robot met are added there.

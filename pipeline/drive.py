@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DriveResult:
-    """How a tour was driven.
+    """Outcome of driving a tour.
 
     Attributes:
         log: Status, travelled distance and path.
@@ -41,7 +41,7 @@ class DriveResult:
 
 
 class Porter:
-    """Opens the closed doors of a building for a robot that drives a tour.
+    """Opener of a building's closed doors for a robot that drives a tour.
 
     Doors of rooms that are to be seen first open one after the other, each when the robot is done with the one before;
     when none of them is left, all others do.
@@ -74,7 +74,7 @@ class Porter:
 
 @dataclass(frozen=True, kw_only=True)
 class DriveSettings:
-    """What a drive goes by: the configurations of the stages that go on while it lasts."""
+    """Settings of a drive: the configurations of the stages that go on while it lasts."""
 
     navigation: RobotNavigation
     mapper: MapperConfig

@@ -38,7 +38,7 @@ CRAWL, SHORT_LOOKAHEAD = 0.08, 0.25
 
 
 class Driver:
-    """Follows one path at a time.
+    """Follower of one path at a time, with recoveries.
 
     Attributes:
         state: What the last command was about; ``stuck`` is reported once, before the recovery begins.

@@ -22,11 +22,11 @@ COMPARE_INTERVAL = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Revision:
-    """What was learnt at one time.
+    """Knowledge gained at one time.
 
     Attributes:
         doors: Doors of the rooms that were looked into since the revision before; empty where only walls moved.
-        stamp: When [s].
+        stamp: Timestamp [s].
         before: All rooms as predicted before.
         after: All rooms as revised.
         changed: Doors of the rooms whose shape changed, looked into or beside such.

@@ -42,7 +42,7 @@ MAX_LAST_LOOKS = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TourPlan:
-    """What is to be driven.
+    """Tour to be driven.
 
     Attributes:
         prediction: The completed map that the tour was planned on.
@@ -59,7 +59,7 @@ class TourPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TourOutcome:
-    """What became of a tour.
+    """Outcome of a driven tour.
 
     Attributes:
         prediction: As it stands at the end.
@@ -77,7 +77,7 @@ class TourOutcome:
 
 
 class TourFollower(Decider):
-    """Decides where to drive next on a coverage tour.
+    """Decider that follows a coverage tour.
 
     Attributes:
         status: How it ended, ``None`` before: ``complete`` when every vertex was visited or found to be out of reach.

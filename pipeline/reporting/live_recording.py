@@ -27,7 +27,7 @@ GROWN = 1.5
 
 
 class GrowingPrediction:
-    """Predicts anew whenever a closed door is first seen, so that a recording shows the prediction grow.
+    """Prediction made anew whenever a closed door is first seen, so that a recording shows how it changes.
 
     With a door known, it also does when what is known has grown by half: else it would stand still for minutes.
     """

@@ -54,7 +54,7 @@ def test_the_tour_of_a_small_office_is_driven_and_every_room_is_seen() -> None:
 
 
 class _Told:
-    """Stands for simulation, map, follower and recorder at once; remembers what was asked of it."""
+    """Stand-in for simulation, map, follower and recorder at once; remembers what was asked of it."""
 
     def __init__(self, first: list[str]) -> None:
         self.first, self.opened, self.map, self.notes = first, [], [], []

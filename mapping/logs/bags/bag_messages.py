@@ -19,7 +19,7 @@ MAX_SCANS = 2_000_000
 
 @dataclass(slots=True)
 class BagMessages:
-    """What was read, in the order of the bag; each with the time of its recording [s].
+    """Messages of a bag, in their order there; each with the time of its recording [s].
 
     Attributes:
         scans: Messages of the scans.

@@ -43,7 +43,7 @@ class Driven:
 
 
 class CellWorld:
-    """Walls are cells, the door is a row of them; the robot is a disc that stops at both."""
+    """World whose walls are cells, its door a row of them; the robot is a disc that stops at both."""
 
     period = 0.1
 
