@@ -7,8 +7,8 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.remarks import Remark
 from closedrooms.core.report import counted
+from closedrooms.core.shapes import polygon_iou
 from closedrooms.pipeline.config import RunConfig
-from closedrooms.pipeline.reporting.scores import polygon_iou
 from closedrooms.predictor.prediction import Prediction
 
 if TYPE_CHECKING:
