@@ -188,6 +188,7 @@ def _starts(config: type[Any], line: _Named, saved: Mapping[str, Any]) -> dict[s
 
 
 def _method(line: _Named, saved: Mapping[str, Any], config: type[Any]) -> Any:
+    """Find the method of a command: the line's, the file's, or the usual one."""
     standard = next(item.default for item in fields(config) if item.name == "method")
     return line.method or saved.get("method", standard)
 

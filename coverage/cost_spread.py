@@ -31,7 +31,8 @@ from closedrooms.coverage.tour.tour_planner import solve_tour
 HELD = 0.9
 # What draws of rooms do not hold: how far tours over M and M_GT differ where both show the same (M is ragged, M_GT is
 # not), and how far rooms of one building are off together. A standard deviation, as a share of the tour's length, found
-# on drawn maps of the use `fit` (benchmarks/completions.py): the interval of `best` holds the true cost on 90 % of 69.
+# on drawn maps of the use `fit` (benchmarks/quality/completions.py): the interval of `best` holds the true cost on 90 %
+# of 69.
 COST_NOISE = 0.016
 # Unknown cells around a room [m].
 MARGIN = 0.5

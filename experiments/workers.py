@@ -93,6 +93,7 @@ class Crew(Generic[Job, Result]):
                 yield from self._locally(work, jobs)
 
     def _locally(self, work: Callable[[Job], Result], jobs: Iterator[Job]) -> Iterator[tuple[Job, Result | Lost]]:
+        """Do jobs in local processes, and hand out again what a worker died of."""
         # Jobs that were under way when a worker died are retried one at a time, to find the one that kills workers.
         suspects: deque[tuple[Job, int]] = deque()
         while True:
@@ -191,6 +192,7 @@ def _prepared(function: Callable[[Job], Result], needs: tuple[str, ...], by: str
 
 @functools.cache
 def _make_ready(needs: tuple[str, ...], by: str) -> None:
+    """Check the packages of a worker and set up its process, once."""
     require(*needs, by=by)
     one_thread()
     keep_memory()

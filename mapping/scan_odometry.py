@@ -121,6 +121,7 @@ class ScanOdometry:
         return match.score, match.pose
 
     def _remember(self, points: FloatArray) -> None:
+        """Add a scan to the surroundings; after some scans those are drawn anew from the last few."""
         if len(self._last) == SURROUNDINGS:
             self._stale += 1
         self._last.append((self._pose, points))

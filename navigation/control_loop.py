@@ -159,6 +159,7 @@ def run_loop(
 def _log(
     status: LoopStatus, reason: str, stamps: Sequence[float], poses: Sequence[Pose2], clock: "StepClock"
 ) -> LoopLog:
+    """Sum up a run that has ended."""
     path = np.array([(pose.x, pose.y) for pose in poses])
     distance = sum(a.distance(b) for a, b in pairwise(poses))
     return LoopLog(status, reason, np.array(stamps), path, distance, clock.seconds)

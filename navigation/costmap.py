@@ -190,12 +190,14 @@ def traversable(costmap: Costmap, config: RobotNavigation) -> BoolArray:
 
 
 def _coarser(frame: GridFrame, factor: int) -> GridFrame:
+    """Divide a frame into cells that are ``factor`` times larger, an incomplete last row or column left out."""
     return GridFrame(
         frame.resolution * factor, frame.origin_x, frame.origin_y, frame.rows // factor, frame.cols // factor
     )
 
 
 def _grown(window: tuple[int, ...], margin: int, shape: tuple[int, ...]) -> tuple[int, int, int, int]:
+    """Widen a window ``(row0, row1, col0, col1)`` by cells on each side, within a grid of a shape."""
     r0, r1, c0, c1 = window
     return (max(r0 - margin, 0), min(r1 + margin, shape[0]), max(c0 - margin, 0), min(c1 + margin, shape[1]))
 

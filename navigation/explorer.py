@@ -59,6 +59,7 @@ class Explorer(Decider):
         return self._search.count
 
     def _has_goal(self, now: Situation) -> bool:
+        """Check the goal every so often, and search the nearest frontier where there is none."""
         if self.goal is not None and now.stamp - self._checked_at >= self.config.check_interval - 1e-9:
             self._check(now.pose, now.grid(), now.stamp)
         return self.goal is not None or self._choose(now.pose, now.grid(), now.stamp)
@@ -71,6 +72,7 @@ class Explorer(Decider):
         self._facing_since = now.stamp
 
     def _get_stuck(self, now: Situation) -> None:
+        """Note obstacles where the robot is held up, across the path when that happens again and again."""
         self._search.map.add_obstacles(touching_points(now.pose, now.scan, self.config, now.bumps))
         if self._driver.recoveries % HELD_UP == 0:
             # What the scan does not show (glass, a sill) holds the robot: what lies behind is reached another way,
@@ -142,6 +144,7 @@ class Explorer(Decider):
         return (0.0, 0.0)
 
     def _forget(self) -> None:
+        """Forget goal and path."""
         self.goal, self._facing_since, self._switches = None, None, 0
         self._driver.stop()
 

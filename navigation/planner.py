@@ -122,6 +122,7 @@ class PathSearch:
             reach *= 2.0
 
     def _flood(self) -> None:
+        """Search the costs from the start to every cell of the window [m]."""
         from skimage.graph import MCP_Geometric
 
         clearance = self._costmap.clearance[self._window]

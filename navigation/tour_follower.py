@@ -115,11 +115,11 @@ class TourFollower(Decider):
         return self._prediction.now
 
     def doors_first(self) -> tuple[str, ...]:
-        """Doors of the unsure rooms with stops still to visit, the least sure one first."""
+        """List the doors of unsure rooms that hold stops still to visit, the least sure room first."""
         return tuple(door for room in self._unsure_rooms() for door in room.doors)
 
     def _unsure_rooms(self) -> list[Room]:
-        """Rooms that nobody is sure of and that still hold stops, the least sure one first."""
+        """List the rooms that nobody is sure of and that still hold stops, the least sure one first."""
         asked = [
             (room.confidence, room.doors, room)
             for room in self.prediction.rooms
@@ -149,11 +149,13 @@ class TourFollower(Decider):
         return True
 
     def _has_goal(self, now: Situation) -> bool:
+        """Compare map and prediction every so often, and set out for the next vertex where none is headed for."""
         if now.stamp - self._checked_at >= CHECK_INTERVAL - 1e-9:
             self._check(now.pose, now.grid(), now.stamp)
         return self._goal is not None or self._next(now.pose, now.grid(), now.stamp)
 
     def _get_stuck(self, now: Situation) -> None:
+        """Note an obstacle, and count an attempt at the vertex as failed."""
         self._map.add_obstacles(touching_points(now.pose, now.scan, self.config, now.bumps))
         self._goal, self._going_back = None, False
         self._attempts += 1

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.files.geojson import write_doors
-from closedrooms.core.files.outgoing import check_output_folder, output_folder
+from closedrooms.core.files.output_folders import check_output_folder, output_folder
 from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.files.tum import write_trajectory
 from closedrooms.core.pose import Pose2
@@ -108,6 +108,7 @@ def _rows(built: BuiltMap) -> list[tuple[str, str]]:
 
 
 def _metrics(built: BuiltMap) -> dict[str, Any]:
+    """List the figures of ``run.json``."""
     errors = {name: {"ate_m": round(m, 5), "ate_rad": round(rad, 6)} for name, (m, rad) in built.errors.items()}
     return {
         "scans": len(built.stamps),
@@ -119,6 +120,7 @@ def _metrics(built: BuiltMap) -> dict[str, Any]:
 
 
 def _write(folder: Path, run: RecordedRun, built: BuiltMap) -> None:
+    """Write map, trajectories, doors and picture; the reference is aligned with the trajectory first."""
     from closedrooms.visualization.summary import draw_map
 
     write_map(folder / "map", built.grid)
@@ -132,6 +134,7 @@ def _write(folder: Path, run: RecordedRun, built: BuiltMap) -> None:
 
 @contextlib.contextmanager
 def _recording(config: MapConfig, path: Path) -> Iterator["Recorder"]:
+    """Open a recording named after the log, or none."""
     if not config.record:
         yield no_recording()
         return

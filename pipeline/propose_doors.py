@@ -35,6 +35,7 @@ def doors_map(config: DoorsConfig, *, progress: Progress | None = None) -> Repor
 
 
 def _doors_map(config: DoorsConfig, progress: Progress, watch: Stopwatch) -> Report:
+    """Read the map, propose doors, write them and, on demand, their picture."""
     with watch.stage("read"):
         progress.stage("read")
         read = read_ros_map(config.map, allow_outside=config.allow_outside)

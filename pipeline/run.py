@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.outgoing import check_output_folder, output_folder
+from closedrooms.core.files.output_folders import check_output_folder, output_folder
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.names import file_name
 from closedrooms.core.random import stream
@@ -32,7 +32,7 @@ from closedrooms.pipeline.reporting.run_directory import Finding, run_figures, s
 from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.pipeline.reporting.scores import room_iou
 from closedrooms.pipeline.reporting.stopwatch import Stopwatch
-from closedrooms.pipeline.reporting.story import describe_robot, sum_up
+from closedrooms.pipeline.reporting.story import describe_robot, summarise_run
 from closedrooms.pipeline.survey import Survey, survey_building, true_building
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction
@@ -111,7 +111,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
         ]
         manifest |= run_figures(plan, closed, sim.world_T_map.inverse(), found)
         manifest["remarks"] = [remark.as_json() for remark in remarks]
-        recorder.note(sum_up(manifest["metrics"]))
+        recorder.note(summarise_run(manifest["metrics"]))
         with watch.stage("write"):
             progress.stage("write")
             write_run_files(staging, found, manifest["metrics"])
@@ -233,7 +233,7 @@ def _spread(
     config: RunConfig,
     recorder: "Recorder",
 ) -> CostSpread | None:
-    """What covering the building may cost, where asked for and where there is a tour on the predicted map."""
+    """Estimate what covering the building may cost, where asked for and where there is a tour on the predicted map."""
     if not config.completions or "predicted" not in tours:
         return None
     spread = spread_cost(

@@ -13,7 +13,7 @@ from urllib.parse import quote
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
 from closedrooms.core.files.incoming import check_regular, is_file, is_folder, read_json
-from closedrooms.core.files.outgoing import MANIFEST
+from closedrooms.core.files.output_folders import MANIFEST
 from closedrooms.core.files.schema import check_schema
 from closedrooms.core.runtime.packages import require
 from closedrooms.pipeline.reporting.progress import Progress

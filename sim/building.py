@@ -89,6 +89,7 @@ class Building:
         self._opening = [door for door in self._opening if door.opens]
 
     def _add_static(self, area: Polygon | shapely.MultiPolygon, height: float | None, colour: Colour) -> list[int]:
+        """Extrude an area, building frame [m], to a height [m] or that of the walls; returns its bodies."""
         vertices, triangles = extrude(area) if height is None else extrude(area, height=height)
         return self._physics.add_static(vertices, upright(vertices, triangles), colour)
 
@@ -102,6 +103,11 @@ def building_solids(plan: FloorPlan) -> Polygon | shapely.MultiPolygon:
 
 
 def _check_doors(plan: FloorPlan, wanted: Collection[str], inner: Collection[str]) -> None:
+    """Check that doors to close or open lie between two rooms.
+
+    Raises:
+        InvalidInputError: One does not; the message lists those that do.
+    """
     for name in wanted:
         if name not in inner:
             known = f"one of {', '.join(inner)}" if inner else "none: this plan has no doors between rooms"

@@ -181,6 +181,7 @@ class HungDoor:
                 self._let_go(link)
 
     def _let_go(self, link: int) -> None:
+        """Leave a leaf to push and friction, no motor."""
         friction = SLIDE_FRICTION if self.leaves[link].slides else HINGE_FRICTION
         self._physics.brake_joint(self.body, link, friction)
 

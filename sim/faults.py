@@ -93,5 +93,6 @@ def phantom_places(plan: FloorPlan, count: int, seed: int) -> list[tuple[Point, 
 
 
 def _moved(b_T_a: Pose2, point: Point) -> Point:
+    """Transform a point from frame a to frame b [m]."""
     pose = b_T_a @ Pose2(*point)
     return (pose.x, pose.y)

@@ -71,5 +71,6 @@ class Odometry:
 
 
 def _normals(rng: np.random.Generator) -> Iterator[float]:
+    """Draw standard normal numbers for ever, a block at a time."""
     while True:
         yield from rng.standard_normal(BLOCK).tolist()

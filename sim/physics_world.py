@@ -257,6 +257,7 @@ class PhysicsWorld:
     def _cast(
         self, start: FloatArray, ends: FloatArray, mask: int, *, normals: bool
     ) -> tuple[FloatArray, IntArray, FloatArray]:
+        """Cast rays as :meth:`cast` at bodies of some groups, in batches that PyBullet takes."""
         n = len(ends)
         fractions, bodies = np.empty(n), np.empty(n, dtype=np.int64)
         found = np.zeros((n if normals else 0, 3))

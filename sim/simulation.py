@@ -242,6 +242,11 @@ class Simulation:
         return [Polygon(corners) for corners in door.corners()]
 
     def _check_start(self) -> None:
+        """Check that the robot has room where it starts.
+
+        Raises:
+            InvalidInputError: A wall, door or furniture is nearer than its radius.
+        """
         start, radius = self.world_T_map, self.config.robot.radius
         near = distance(start.x, start.y, self._building.obstacles.near(start.x, start.y))
         free = min(gap_from(self._building.solids, start.x, start.y), near)
@@ -253,5 +258,6 @@ class Simulation:
 
 
 def _moved(b_T_a: Pose2, point: Point) -> Point:
+    """Transform a point from frame a to frame b [m]."""
     pose = b_T_a @ Pose2(*point)
     return (pose.x, pose.y)

@@ -185,6 +185,8 @@ def as_segment(door: ClosedDoor) -> Segment:
 
 
 def _rounded(door: ClosedDoor) -> ClosedDoor:
+    """Round a door to 0.1 mm, so that a file written and read again is the same."""
+
     def place(point: Point) -> Point:
         return (round(point[0], 4) + 0.0, round(point[1], 4) + 0.0)
 
@@ -225,6 +227,7 @@ def _moved(door: ClosedDoor, by: Point) -> ClosedDoor:
 
 
 def _around(middle: Point, angle: float, length: float) -> Segment:
+    """Place a segment of a length [m] and direction [rad] around a middle."""
     dx, dy = math.cos(angle) * length / 2, math.sin(angle) * length / 2
     return ((middle[0] - dx, middle[1] - dy), (middle[0] + dx, middle[1] + dy))
 

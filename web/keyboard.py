@@ -52,6 +52,7 @@ class Keyboard:
         await self._done(self._session.point_at(self._board.middle))
 
     async def _pressed(self, event: KeyEventArguments) -> None:
+        """Do what a key that goes down means."""
         if not event.action.keydown:
             return
         session, key, held = self._session, event.key.name, event.modifiers
@@ -83,6 +84,7 @@ class Keyboard:
             await self._done(self._session.accept(self._session.open_proposals[0][0]))
 
     async def _arrow(self, right: int, up: int, *, far: bool) -> None:
+        """Move the selected door by a step, else the view."""
         name = self._session.selected
         if name is None:
             self._board.pan(right * PAN, -up * PAN)

@@ -197,6 +197,7 @@ def css(colour: Colour) -> str:
 
 
 def _point(args: Any) -> Point:
+    """Read the place of an event of the map [m]: its lng is x, its lat y."""
     place = args["latlng"]
     return (float(place["lng"]), float(place["lat"]))
 

@@ -90,6 +90,7 @@ class EditPage:
     # The bar
 
     def _bar(self) -> None:
+        """Build the bar above the map."""
         session = self._session
         with ui.row().classes("bar"):
             ui.label(session.config.map.name).classes("text-bold wide")
@@ -168,6 +169,7 @@ class EditPage:
         self._pointer.set_text(f"x {x:.2f} m, y {y:.2f} m")
 
     async def _handled(self, event: HandleEvent) -> None:
+        """Do what a click on a handle or the end of its drag means."""
         session = self._session
         if event.kind in {"door", "chosen"} and event.type == "dragend":
             await self._done(session.drag(event.name, event.point))
@@ -211,6 +213,7 @@ class EditPage:
         await self._plan_tour()
 
     def _say_outcome(self) -> None:
+        """Say in one line what stands: rooms, time, tour."""
         outcome, doors = self._session.outcome, self._session.document.doors
         if outcome is None:
             return
@@ -229,6 +232,7 @@ class EditPage:
         self._status.set_text(text)
 
     async def _plan_tour(self) -> None:
+        """Plan the tour of what stands, where it is wanted and nothing changes meanwhile."""
         if not self._with_tour.value or self._busy or self._session.stale:
             return
         if self._tour is None:
@@ -246,6 +250,7 @@ class EditPage:
             await self._save()
 
     async def _save(self) -> None:
+        """Save, after a question where files would be replaced."""
         session = self._session
         if session.out_is_taken and not await self._ask(
             f"{session.out} holds files already. Replace what a prediction wrote there?", "replace", "keep it"
@@ -261,6 +266,7 @@ class EditPage:
         self._say_outcome()
 
     async def _offer_draft(self) -> None:
+        """Ask whether to go on with what the last visit left unsaved."""
         try:
             draft = self._session.draft()
         except ClosedroomsError as error:
@@ -323,6 +329,7 @@ async def open_page(begin: Callable[[], EditSession]) -> None:
 
 
 def _tell_trouble(text: str) -> None:
+    """Show why there is no page, and a way to try again."""
     with ui.card().classes("q-ma-lg"):
         ui.label("This map cannot be read.").classes("text-bold")
         ui.label(text).props("role=alert")

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
-from closedrooms.core.errors import ClosedroomsError, OutputError
+from closedrooms.core.errors import ClosedroomsError, OutputError, reason
 from closedrooms.core.files.incoming import check_regular
 from closedrooms.core.runtime.packages import require
 from closedrooms.pipeline.reporting.progress import Progress
@@ -57,10 +57,11 @@ class Desk:
         self._config, self._drafts = config, Drafts()
         self._sheet: MapSheet | None = None
         self._reading = threading.Lock()
+        self._told = ""
 
     def prepare(self) -> None:
         """Read the map before the first visitor comes; what is wrong with it is told to them."""
-        with contextlib.suppress(ClosedroomsError):
+        with contextlib.suppress(Exception):
             self._open()
 
     def _open(self) -> MapSheet:
@@ -70,12 +71,28 @@ class Desk:
             return self._sheet
 
     def session(self, visitor: str) -> EditSession:
-        """Begin the session of a page.
+        """Begin the session of a page; what cannot be read is told on the page and in one line of the terminal.
 
         Raises:
             ClosedroomsError: The map cannot be read; the next visit tries again.
         """
-        return EditSession(self._config, self._open(), self._drafts, visitor)
+        try:
+            sheet = self._open()
+        except Exception as error:
+            self._tell(reason(error))
+            raise ClosedroomsError(reason(error)) from error
+        session = EditSession(self._config, sheet, self._drafts, visitor)
+        if session.trouble:
+            self._tell(session.trouble)
+        return session
+
+    def _tell(self, trouble: str) -> None:
+        """Say it on the terminal, once for all visits in a row."""
+        if trouble != self._told:
+            self._told = trouble
+            with contextlib.suppress(OSError, ValueError):  # nobody listens
+                sys.stderr.write(f"closedrooms: {trouble}\n")
+                sys.stderr.flush()
 
 
 def _server(config: EditConfig, token: str, port: int) -> Any:

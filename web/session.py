@@ -258,12 +258,14 @@ class EditSession:
         return self.change(lambda _: draft.document)
 
     def _add(self, segment: Segment) -> str:
+        """Set a door on a segment, frame of the grid [m], and select it; returns what is to be told."""
         told = self.change(lambda document: document.with_door(self.sheet.segment_on_map(segment)))
         if not told:
             self.selected = self.document.doors[-1].id
         return told
 
     def _place_of(self, proposal: DoorProposal) -> Point:
+        """Say where a proposal is, map frame, to the millimetre: what tells it from others."""
         x, y = self.sheet.point_on_map(proposal.midpoint)
         return (round(x, 3), round(y, 3))
 
@@ -279,4 +281,5 @@ class EditSession:
 
 
 def _same_prediction(a: Document, b: Document) -> bool:
+    """Check whether two documents ask for the same prediction."""
     return (a.doors, a.method, a.settings) == (b.doors, b.method, b.settings)

@@ -65,6 +65,11 @@ def open_sheet(config: EditConfig) -> MapSheet:
 
 
 def _moved(point: Point, b_T_a: Pose2) -> Point:
+    """Transform a point from frame a to frame b [m].
+
+    Raises:
+        InvalidInputError: It is too far out to be a number.
+    """
     pose = b_T_a @ Pose2(point[0], point[1])
     if not (math.isfinite(pose.x) and math.isfinite(pose.y)):
         raise InvalidInputError(f"a point at {point}", expected="finite metres")

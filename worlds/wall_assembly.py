@@ -229,6 +229,7 @@ def _border(gap: Polygon, room: Polygon, touching: float) -> float:
 
 
 def _is_narrow(part: Polygon, width: float, least: float = 1e-3) -> bool:
+    """Check whether a part is hardly wider than ``width`` [m], and no speck."""
     return part.area > least and shapely.maximum_inscribed_circle(part, tolerance=0.02).length < width / 2 + 0.05
 
 

@@ -47,6 +47,7 @@ def write_features(path: Path, features: Iterable[GeoFeature]) -> None:
 
 
 def _rounded(coordinates: FloatArray) -> FloatArray:
+    """Round coordinates to 0.1 mm."""
     # Beyond 1e11 a float holds no tenth of a millimetre, and rounding would overflow in the end.
     return np.where(np.abs(coordinates) < 1e11, np.round(np.clip(coordinates, -1e11, 1e11), 4), coordinates) + 0.0
 
@@ -103,6 +104,7 @@ def _features(data: Any) -> list[Any] | None:
 
 
 def _read_feature(number: int, feature: Any, path: Path) -> GeoFeature:
+    """Read the geometry and the properties of one feature of an untrusted file."""
     try:
         geometry = feature["geometry"]
         _check_positions(geometry["coordinates"], LISTS[geometry["type"]])
@@ -228,6 +230,7 @@ def _door_names(features: Sequence[GeoFeature], path: Path, remarks: list[Remark
 
 
 def _given_name(number: int, value: Any, path: Path) -> str | None:
+    """Read the id of a door as a text, ``None`` where there is none."""
     if value is None or value == "":
         return None
     if isinstance(value, float) and value.is_integer():
@@ -240,6 +243,7 @@ def _given_name(number: int, value: Any, path: Path) -> str | None:
 
 
 def _door(name: str, geometry: BaseGeometry, properties: dict[str, Any], path: Path) -> ClosedDoor:
+    """Make a door from its midpoint or its leaf, and what a file says of it."""
     width = properties.get("width")
     if width is not None and not (is_number(width) and 0 < width <= WIDEST):
         raise InvalidInputError(
@@ -305,6 +309,7 @@ def read_rooms(path: Path, *, remarks: list[Remark] | None = None) -> list[Room]
 
 
 def _room(number: int, read: BaseGeometry, properties: dict[str, Any], path: Path) -> Room:
+    """Make a room from what a file says of it."""
     doors, kind, score = properties.get("doors", []), properties.get("kind"), properties.get("score")
     if not isinstance(doors, list) or not all(isinstance(d, str | int) and is_name(str(d)) for d in doors):
         raise InvalidInputError(f"room {number} with doors {repr_of(doors)}", expected="a list of ids", where=path)
@@ -321,6 +326,7 @@ def _room(number: int, read: BaseGeometry, properties: dict[str, Any], path: Pat
 
 
 def _area(number: int, read: BaseGeometry, path: Path) -> Polygon | MultiPolygon:
+    """Check that a geometry is an area, and repair one that crosses itself."""
     geometry = read if read.is_valid else _repaired(read)
     if not isinstance(geometry, Polygon | MultiPolygon) or geometry.is_empty:
         raise InvalidInputError(f"room {number} is a {geometry.geom_type}", expected="a Polygon", where=path)
@@ -328,6 +334,7 @@ def _area(number: int, read: BaseGeometry, path: Path) -> Polygon | MultiPolygon
 
 
 def _share(number: int, value: Any, name: str, path: Path) -> float | None:
+    """Check that a property is a number from 0 to 1, or not there."""
     if value is not None and not (is_number(value) and 0.0 <= value <= 1.0):
         raise InvalidInputError(f"room {number} of {name} {repr_of(value)}", expected="0 to 1", where=path)
     return value

@@ -112,6 +112,7 @@ def write_raw_map(stem: Path, grid: OccupancyGrid, *, map_T_grid: Pose2 = IDENTI
 
 
 def _write(stem: Path, frame: GridFrame, pixels: npt.NDArray[np.uint8], mode: str, map_T_grid: Pose2) -> None:
+    """Write the picture and the YAML of a map."""
     import cv2
 
     picture = stem.with_name(stem.name + ".png")
@@ -250,6 +251,7 @@ def _origin(value: Any, path: Path, remarks: list[Remark]) -> tuple[float, float
 
 
 def _raw() -> CellArray:
+    """Map grey values to cells in the mode ``raw``: the occupancy in percent, unknown above 100."""
     levels = np.arange(256)
     return np.where(levels <= OCCUPIED, levels, UNKNOWN).astype(np.int8)
 
@@ -274,6 +276,7 @@ def _meanings(fields: dict[str, Any], mode: str, path: Path) -> CellArray:
 
 
 def _negate(value: Any, path: Path) -> bool:
+    """Read ``negate``, as a number or a word."""
     words = {"0": False, "1": True, "false": False, "true": True, "no": False, "yes": True}
     negate = words.get(value.strip().lower()) if isinstance(value, str) else None
     if negate is None:

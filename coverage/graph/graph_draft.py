@@ -38,6 +38,7 @@ class GraphDraft:
             self.follow(chain)
 
     def _vertex_at(self, cell: IntArray, kind: VertexKind) -> int:
+        """Find or add the vertex in the middle of a cell; a detour that is met again takes the other kind."""
         key = (int(cell[0]), int(cell[1]))
         if key not in self._at_cell:
             self._at_cell[key] = self.add_vertex(cell.astype(np.float64) + 0.5, kind)

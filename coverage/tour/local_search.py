@@ -38,6 +38,7 @@ class LocalSearch:
         return sum(self.d[a][b] for a, b in zip(self.tour, self.tour[1:] + self.tour[:1], strict=True))
 
     def _number(self, first: int, last: int) -> None:
+        """Note again where the vertices of a stretch of the tour stand."""
         for position in range(first, last + 1):
             self.position[self.tour[position]] = position
 

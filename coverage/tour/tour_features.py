@@ -54,6 +54,7 @@ def make_tour_features(tour: CoverageTour, map_name: str) -> list[GeoFeature]:
 
 
 def _geometry(tour: CoverageTour) -> LineString | MultiLineString | Point:
+    """Make the line of a tour, in parts where it has breaks; a point where it has one vertex."""
     breaks = np.flatnonzero(np.isnan(tour.path[:, 0]))
     pieces = [piece[~np.isnan(piece[:, 0])] for piece in np.split(tour.path, breaks)]
     # A part with a single vertex: a line of length 0 from it to itself.

@@ -9,7 +9,8 @@ from typing import Any, TextIO
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files.incoming import read_json
-from closedrooms.core.files.outgoing import MANIFEST, write_bytes
+from closedrooms.core.files.outgoing import write_bytes
+from closedrooms.core.files.output_folders import MANIFEST
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.dataset.checksums import check

@@ -69,6 +69,7 @@ def _body(
     *,
     ours: bool,
 ) -> list[str]:
+    """Write the card below its head."""
     rights = (
         "The buildings are closedrooms' own; the dataset is under the MIT licence."
         if ours

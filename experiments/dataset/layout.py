@@ -14,7 +14,8 @@ from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files.incoming import parse_json
-from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, new_file, write_json
+from closedrooms.core.files.outgoing import json_text, new_file, write_json
+from closedrooms.core.files.output_folders import MANIFEST, PROGRAM
 from closedrooms.core.files.schema import KEY, SCHEMA, check_schema
 from closedrooms.experiments.dataset.checksums import digest
 from closedrooms.experiments.dataset.config import DatasetConfig
@@ -140,6 +141,7 @@ def alone(folder: Path | Url) -> Iterator[None]:
 
 
 def _clear_unfinished(folder: Path) -> None:
+    """Remove what killed processes left at any depth of a dataset."""
     for depth in ("*", "*/*", "*/*/*", "*/*/*/*"):
         for path in filter(_unfinished, folder.glob(depth)):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -176,7 +178,7 @@ def read_stored_json(store: Store, name: str) -> Any:
 
 def json_bytes(value: Any) -> bytes:
     """Encode a value as the JSON that a dataset holds."""
-    return (json.dumps(value, indent=2, allow_nan=False) + "\n").encode()
+    return json_text(value).encode()
 
 
 def description(config: DatasetConfig, worlds: Sequence[World]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import OutputError, reason
 from closedrooms.core.files.geojson import write_doors, write_rooms
-from closedrooms.core.files.outgoing import output_folder
+from closedrooms.core.files.output_folders import output_folder
 from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.files.tum import write_trajectory
 from closedrooms.core.grid import GridFrame, OccupancyGrid
@@ -148,6 +148,7 @@ def _about(task: Task, seed: int) -> dict[str, Any]:
 
 
 def _make_sample(task: Task, variant: Variant, plan: FloorPlan, folder: Path) -> None:
+    """Write the folder of one sample: map, truth, doors, rooms, trajectories."""
     config, world = task.config, task.world
     closed = tuple(door.id for door in plan.doors if door.id in variant.closed)
     erased = config.maps == "erased"
@@ -208,6 +209,7 @@ def _metrics(
 
 
 def _erased(config: DatasetConfig, world: World, closed: Sequence[str]) -> Observed:
+    """Redraw the map of the open survey as it would be with these doors closed."""
     eraser = _eraser(config, world)
     survey, result = eraser.survey, eraser.erase(closed)
     kept = result.keyframes
@@ -244,6 +246,7 @@ def _true_map(source: str, frame: GridFrame, start: Pose2) -> OccupancyGrid:
 def _simulated(
     config: DatasetConfig, plan: FloorPlan, closed: Sequence[str], seed: int, recorder: "Recorder"
 ) -> Observed:
+    """Explore the building with these doors closed."""
     with Simulation(plan, closed, config.sim, seed) as sim:
         log, mapper = RunLog(sim, Silent(), keep_scans=config.keep_scans), Mapper(config.mapper)
         survey = survey_building(log, mapper, config.navigation, recorder=recorder)

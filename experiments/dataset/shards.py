@@ -133,6 +133,7 @@ def fill_shard(job: Filling) -> TaskResult:
 
 
 def _joined(store: Store, names: Sequence[str]) -> Any:
+    """Read parts and put them together to one Arrow table."""
     import pyarrow as pa
 
     tables = zip(names, store.read_all(names), strict=True)

@@ -7,15 +7,16 @@ from functools import partial
 from statistics import median
 from typing import Any
 
-from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, only_writer, write_json
+from closedrooms.core.files.outgoing import write_json
+from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
-from closedrooms.experiments.evaluation.claimed_folder import claim_folder
+from closedrooms.experiments.claimed_folder import claim_folder
 from closedrooms.experiments.evaluation.config import EvaluateConfig
-from closedrooms.experiments.evaluation.listing import find_samples
-from closedrooms.experiments.evaluation.sample_evaluation import SampleResult, evaluate_sample
-from closedrooms.experiments.evaluation.sample_path import SamplePath
-from closedrooms.experiments.evaluation.scores import Scores
+from closedrooms.experiments.evaluation.samples.listing import find_samples
+from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
+from closedrooms.experiments.evaluation.scoring.sample_evaluation import SampleResult, evaluate_sample
+from closedrooms.experiments.evaluation.scoring.scores import Scores
 from closedrooms.experiments.workers import Crew, Lost
 from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
@@ -58,7 +59,7 @@ def _evaluate(samples: Sequence[SamplePath], config: EvaluateConfig, progress: P
         progress.advance(number, f"{number} of {len(samples)}")
     scores.sort(key=lambda score: (score["method"], score["sample"]))
     failures = dict(sorted(failures.items()))
-    from closedrooms.experiments.evaluation.report import write_report
+    from closedrooms.experiments.evaluation.reporting.report import write_report
 
     progress.stage("report")
     summary = write_report(config.out, scores, samples, config, failures)
@@ -98,6 +99,7 @@ def _rows(summary: Sequence[Mapping[str, Any]], seconds: Mapping[str, float]) ->
 
 
 def _seconds(scores: Sequence[Scores]) -> dict[str, float]:
+    """Compute the median time of a prediction, by method [s]."""
     times: defaultdict[str, list[float]] = defaultdict(list)
     for score in scores:
         if "seconds" in score:

@@ -11,18 +11,19 @@ from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError, OutputError, reason
 from closedrooms.core.files.incoming import read_json
-from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, only_writer, write_json
+from closedrooms.core.files.outgoing import write_json
+from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer
 from closedrooms.core.names import file_name
 from closedrooms.core.remarks import Remark
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
+from closedrooms.experiments.claimed_folder import claim_folder
 from closedrooms.experiments.dataset.variants import given_worlds, remarks_on, world_sources
-from closedrooms.experiments.evaluation.claimed_folder import claim_folder
-from closedrooms.experiments.evaluation.tables import Row
-from closedrooms.experiments.evaluation.tours import code_digest
+from closedrooms.experiments.evaluation.scoring.tours import code_digest
 from closedrooms.experiments.robustness.config import FACTORS, RobustnessConfig
 from closedrooms.experiments.robustness.levels import Case, Setting, cases
 from closedrooms.experiments.robustness.onset import Onset
+from closedrooms.experiments.tables import Row
 from closedrooms.experiments.workers import Crew, Lost
 from closedrooms.pipeline.reporting.manifest import resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
@@ -248,6 +249,7 @@ _LEVELS = FACTORS[:-1]
 
 @lru_cache(maxsize=1)
 def _code() -> str:
+    """Compute the digest of the code that disturbs and measures."""
     root = Path(__file__).parents[2]
     folders = (
         "core",

@@ -13,8 +13,8 @@ from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.errors import ClosedroomsError, reason
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import Shape
-from closedrooms.experiments.evaluation.sample_path import SamplePath
-from closedrooms.experiments.evaluation.samples import Sample, read_sample
+from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
+from closedrooms.experiments.evaluation.samples.sample_reader import Sample, read_sample
 from closedrooms.experiments.training.buildings import group_of, may_train
 from closedrooms.predictor.best.scene import prepare
 from closedrooms.predictor.config import BestConfig

@@ -10,13 +10,14 @@ import numpy as np
 
 from closedrooms.core.arrays import IntArray
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, only_writer, write_bytes, write_json
+from closedrooms.core.files.outgoing import write_bytes, write_json
+from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer
 from closedrooms.core.random import stream
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
-from closedrooms.experiments.evaluation.claimed_folder import claim_folder
-from closedrooms.experiments.evaluation.listing import find_samples
-from closedrooms.experiments.evaluation.tours import code_digest
+from closedrooms.experiments.claimed_folder import claim_folder
+from closedrooms.experiments.evaluation.samples.listing import find_samples
+from closedrooms.experiments.evaluation.scoring.tours import code_digest
 from closedrooms.experiments.training.config import TrainConfig
 from closedrooms.experiments.training.examples import Examples, Gathered, gather_examples
 from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions

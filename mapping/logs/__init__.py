@@ -4,7 +4,7 @@
   writes them; ``clicked_points`` are doors that a person clicked.
 - CARMEN logs: ``carmen``, ``carmen_lines``, ``carmen_odometry``.
 - NumPy archives: ``npz``.
-- All of them: ``clocks``, ``odometry``, ``recorded_run``.
+- All of them: ``clocks``, ``recorded_odometry``, ``recorded_run``.
 """
 
 from typing import TYPE_CHECKING

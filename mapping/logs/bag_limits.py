@@ -59,6 +59,8 @@ def _limit_chunks(path: Path) -> None:
 
 
 def _unpacking(decompressor: Callable[[], Any], path: Path) -> Callable[[bytes], bytes]:
+    """Make a function that unpacks one chunk and refuses what would not fit into memory."""
+
     def unpack(data: bytes) -> bytes:
         unpacker = decompressor()
         content: bytes = unpacker.decompress(data, MAX_CHUNK)

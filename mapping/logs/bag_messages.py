@@ -62,6 +62,7 @@ def choose_connections(connections: Iterable[Any], options: BagOptions) -> tuple
 
 
 def _topic(found: set[str], asked: str | None, kind: str, topics: dict[str, set[str]]) -> str:
+    """Choose the topic of a kind: the one asked for, or the only one; else say which there are."""
     if asked is not None and asked in found:
         return asked
     if asked is None and len(found) == 1:
@@ -94,6 +95,7 @@ def read_messages(reader: Any, connections: list[Any]) -> BagMessages:
 
 
 def _take_scan(messages: BagMessages, message: Any, recorded: float) -> None:
+    """Keep a scan with the time it was recorded at [s]; beyond the limit it is only counted."""
     if len(messages.scans) >= MAX_SCANS:
         messages.surplus += 1
         return
@@ -101,6 +103,7 @@ def _take_scan(messages: BagMessages, message: Any, recorded: float) -> None:
 
 
 def _take_odometry(messages: BagMessages, message: Any, recorded: float) -> None:
+    """Keep a pose as stamp, recording time [s], x, y [m] and yaw [rad], and the frame that moves."""
     pose = message.pose.pose
     turned, at = pose.orientation, pose.position
     matrix = transform_matrix((at.x, at.y, at.z), (turned.x, turned.y, turned.z, turned.w))
@@ -110,6 +113,7 @@ def _take_odometry(messages: BagMessages, message: Any, recorded: float) -> None
 
 
 def _take_transforms(messages: BagMessages, message: Any, recorded: float, *, static: bool) -> None:
+    """Add transforms to the tree of frames; those that are no rotation are counted as broken."""
     for stamped in message.transforms:
         shift, turn = stamped.transform.translation, stamped.transform.rotation
         try:

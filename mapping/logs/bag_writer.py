@@ -105,6 +105,7 @@ class _Messages:
         return self._make("std_msgs/msg/Header", self._make("builtin_interfaces/msg/Time", seconds, rest), frame)
 
     def _turn(self, theta: float) -> Any:
+        """Make the quaternion of a heading [rad]."""
         return self._make("geometry_msgs/msg/Quaternion", 0.0, 0.0, math.sin(theta / 2), math.cos(theta / 2))
 
     def scan(self, stamp: float, scan: LaserScan) -> Any:

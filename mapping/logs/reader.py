@@ -10,7 +10,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import is_file, is_folder, read_head, reading
 from closedrooms.core.remarks import Remark
 from closedrooms.mapping.logs.bag_options import BagOptions
-from closedrooms.mapping.logs.odometry import bridge_jumps, jump_remarks
+from closedrooms.mapping.logs.recorded_odometry import bridge_jumps, jump_remarks
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 
 GZIP, ZIP, SQLITE, MCAP = b"\x1f\x8b", b"PK\x03\x04", b"SQLite format 3", b"\x89MCAP0\r\n"
@@ -56,6 +56,7 @@ def read_run(
 
 
 def _read(path: Path, options: BagOptions) -> RecordedRun:
+    """Read a log by the reader that its first bytes ask for."""
     head = _head(path)
     version = OLD_BAG.match(head)
     if version and version[1] != ROSBAG:

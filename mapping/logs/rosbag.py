@@ -20,7 +20,7 @@ from closedrooms.mapping.logs.bag_messages import MAX_SCANS, BagMessages, choose
 from closedrooms.mapping.logs.bag_options import BagOptions
 from closedrooms.mapping.logs.bag_scans import ranges_of, scan_of, sector_of
 from closedrooms.mapping.logs.clocks import Times, forward, scan_and_odometry_times
-from closedrooms.mapping.logs.odometry import bridge_jumps, jump_remarks, odometry_at
+from closedrooms.mapping.logs.recorded_odometry import bridge_jumps, jump_remarks, odometry_at
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.mapping.logs.transform_tree import Mount, TransformTree, clean_name
 
@@ -92,6 +92,7 @@ def _named(path: Path) -> Iterator[Path]:
 
 
 def _resolved(messages: BagMessages, options: BagOptions, remarks: list[Remark]) -> RecordedRun:
+    """Put scans, motion and mounting of the messages together to a run, on one clock."""
     remarks = [*remarks, *_reading_remarks(messages)]
     if not messages.scans:
         return RecordedRun((), np.empty((0, 3)), None, tuple(remarks))
@@ -157,6 +158,7 @@ def _run(
 
 
 def _reading_remarks(messages: BagMessages) -> list[Remark]:
+    """Say which messages were broken or too many."""
     remarks = [
         Remark(action="dropped", what=what, why="broken in the bag", count=count, loss=what == "scans")
         for what, count in messages.broken.items()

@@ -117,6 +117,7 @@ class TransformTree:
         return reached
 
     def _steady_neighbours(self, name: str) -> Iterator[tuple[str, FloatArray]]:
+        """Yield the frames that are fixed to a frame, with the transform there, (4, 4)."""
         for (parent, child), link in self._links.items():
             if not (link.static or (link.steady and not _drifts(parent, child))):
                 continue

@@ -150,6 +150,11 @@ class Terminal:
         self._print(shown(line, longest=LONGEST_CELL), markup=False, highlight=False, soft_wrap=True)
 
     def _print(self, what: Any, **how: Any) -> None:
+        """Print by rich, 120 columns wide where there is no terminal.
+
+        Raises:
+            BrokenPipeError: Nobody reads any more.
+        """
         from rich.console import Console
 
         out = Console(file=sys.stdout, soft_wrap=False, width=None if sys.stdout.isatty() else 120)
@@ -160,7 +165,7 @@ class Terminal:
 
 
 def _bars() -> Any:
-    """Bars on a terminal, by rich, which is not imported where there is none."""
+    """Make bars for a terminal by rich, which is not imported where there is none."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 

@@ -103,7 +103,7 @@ def describe_robot(config: RunConfig) -> str:
     )
 
 
-def sum_up(metrics: Mapping[str, Any]) -> str:
+def summarise_run(metrics: Mapping[str, Any]) -> str:
     """Sum up the figures of a run in one line.
 
     Args:

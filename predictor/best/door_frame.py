@@ -217,6 +217,7 @@ def _find_ends(known: BoolArray) -> IntArray:
 
 
 def _turn(mask: BoolArray, quarter: int) -> BoolArray:
+    """Turn a raster to the right by so many right angles: what lay to the left of +y then lies along +y."""
     return (mask, mask.T[::-1], mask[::-1, ::-1], mask.T[:, ::-1])[quarter]
 
 

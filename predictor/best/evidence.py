@@ -193,6 +193,7 @@ def _bytes(mask: BoolArray) -> UInt8Array:
 
 
 def _blur(edges: BoolArray, reach: int) -> BoolArray:
+    """Widen edges along the rows, by ``reach`` positions to either side."""
     return np.asarray(cv2.dilate(_bytes(edges), np.ones((1, 2 * reach + 1), np.uint8)) > 0)
 
 

@@ -157,15 +157,18 @@ def weigh_pairs(a: Hypotheses, b: Hypotheses, thickness: int) -> dict[str, Float
 
 
 def _pair_up(a: Hypotheses, b: Hypotheses, thickness: int) -> Pairs:
+    """Pair all rectangles of two doors whose walls have one direction."""
     back = (3, 0, 1, 2)[a.quarter] if _are_in_one_wall(a, b) else None
     return Pairs(a.boxes, b.boxes, back, thickness, agree=float(np.exp(-abs(a.u - b.u) / DEPTH_REACH)))
 
 
 def _are_in_one_wall(a: Hypotheses, b: Hypotheses) -> bool:
+    """Check whether two doors look the same way from one line."""
     return a.quarter == b.quarter and abs(a.v - b.v) < SAME_WALL
 
 
 def _measure(pairs: Pairs) -> FloatArray:
+    """Measure all features of pairs, one along the last axis, shape (n, m, features)."""
     return np.stack([feature.measure(pairs) for feature in PAIR_FEATURES], axis=-1)
 
 

@@ -35,6 +35,7 @@ def believe(
 
 
 def _believe(scene: Scene, choice: Choice, openings: Sequence[Doorway | None]) -> Belief:
+    """Form the belief about one room from all rectangles that it could have."""
     boxes, corners, weights = _weigh_all(choice)
     overlap = overlaps_of(boxes)
     chosen = choose_diverse(overlap, weights, choice.index)

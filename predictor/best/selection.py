@@ -181,6 +181,7 @@ class JointSearch:
         return chosen, True
 
     def _round(self, chosen: list[int]) -> bool:
+        """Move every door, then every pair of doors, to where the total is largest; tell whether anything moved."""
         changed = False
         for i in range(len(chosen)):
             score = self.seen_by(i, chosen)

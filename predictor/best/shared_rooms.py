@@ -110,7 +110,7 @@ def corner_closed(t: Together) -> float:
     return t.measured("sides closed", "back closed") * meeting_walls(t)
 
 
-# Weights: logistic regression on ``fit`` (``benchmarks/fit_shared_rooms.py``).
+# Weights: logistic regression on ``fit`` (``benchmarks/fitting/fit_shared_rooms.py``).
 SHARED_FEATURES: tuple[Feature[Together, float], ...] = (
     Feature("always", lambda _: 1.0, weight=1.72),
     Feature("gain", gain, weight=0.089),

@@ -91,6 +91,7 @@ def box_of(boundary: Sequence[Line]) -> Polygon:
 
 
 def _crossing(a: Line, b: Line) -> FloatArray:
+    """Find the point where two lines cross [m]; they are not parallel."""
     return np.asarray(np.linalg.solve(np.stack((a.normal, b.normal)), np.array([a.offset, b.offset])))
 
 

@@ -68,6 +68,7 @@ class Drive(DrivenRobot):
         return time
 
     def _arc(self, length: float, turn: float) -> Motion:
+        """Drive one arc of ``length`` [m] that turns by ``turn`` [rad], chord by chord where something is near."""
         edges = self._obstacles.near(self.x, self.y) if length else ()
         if not edges or distance(self.x, self.y, edges) > self.config.radius + SKIN + abs(length):
             motion = Motion(*chord(length, turn), turn)
@@ -103,6 +104,7 @@ class Drive(DrivenRobot):
         self.bumps = tuple(sorted({round(bearing, 1), *self.bumps}))
 
     def _apply(self, motion: Motion) -> None:
+        """Move by a motion in the robot frame."""
         c, s = math.cos(self.theta), math.sin(self.theta)
         self.x += c * motion.dx - s * motion.dy
         self.y += s * motion.dx + c * motion.dy

@@ -19,7 +19,7 @@ LEVEL, BESIDE = 0.1, 0.01
 GROUND = 0.03
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Joint:
     """One joint of the robot as it stands at the origin.
 
@@ -80,6 +80,7 @@ def read_joints(physics: PhysicsWorld, path: Path) -> tuple[list[Joint], tuple[F
 
 
 def _box(physics: PhysicsWorld, body: int, link: int, place: Any) -> tuple[FloatArray, FloatArray]:
+    """Find the corners of the box around a link's shapes [m]; its place twice where it has none."""
     bullet, client = physics.bullet, physics.client
     if not bullet.getCollisionShapeData(body, link, physicsClientId=client):
         return np.array(place), np.array(place)

@@ -112,6 +112,7 @@ class WheeledRobot(DrivenRobot):
             self.bumps = tuple(sorted(felt.union(self.bumps)))
 
     def _locate(self) -> None:
+        """Read the pose from the physics; the heading is kept unwrapped [rad]."""
         bullet, client = self._physics.bullet, self._physics.client
         (x, y, _), q = bullet.getBasePositionAndOrientation(self._body, physicsClientId=client)
         base = math.atan2(2.0 * (q[3] * q[2] + q[0] * q[1]), 1.0 - 2.0 * (q[1] ** 2 + q[2] ** 2))
@@ -165,6 +166,7 @@ class WheeledRobot(DrivenRobot):
                     bullet.setJointMotorControl2(body, link, bullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client)
 
     def _find_wheels(self) -> list[tuple[int, Wheel]]:
+        """Look up the joints of the driven wheels in the loaded body."""
         bullet, client = self._physics.bullet, self._physics.client
         names = {
             bullet.getJointInfo(self._body, link, physicsClientId=client)[1].decode(): link

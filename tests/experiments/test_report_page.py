@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from closedrooms.experiments.evaluation.curves import same_extent, same_scale
-from closedrooms.experiments.evaluation.page import NO_DIGIT, NO_POINT, Section, Table, write_page
-from closedrooms.experiments.evaluation.statistics import LEAST_WORLDS, compare_pairs
+from closedrooms.experiments.evaluation.reporting.figures import same_extent, same_scale
+from closedrooms.experiments.html_page import NO_DIGIT, NO_POINT, Section, Table, write_page
+from closedrooms.experiments.statistics import LEAST_WORLDS, compare_pairs
 
 ROWS = [
     ["method", "IoU", "samples", "note"],

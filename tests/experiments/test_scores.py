@@ -6,7 +6,7 @@ from shapely.geometry import box
 
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.experiments.evaluation.scores import (
+from closedrooms.experiments.evaluation.scoring.scores import (
     added_rooms,
     hidden_area,
     iou,

@@ -22,7 +22,7 @@ from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.packing import as_bytes, from_bytes, pack_sample, unpack
 from closedrooms.experiments.dataset.shard import Shard, read_shard, shard_name
 from closedrooms.experiments.dataset.shard_plan import TOGETHER, ShardPlan
-from closedrooms.experiments.evaluation.listing import find_samples
+from closedrooms.experiments.evaluation.samples.listing import find_samples
 from closedrooms.experiments.places import Url, read_place
 from closedrooms.experiments.stores import open_store, read_file
 

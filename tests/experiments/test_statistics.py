@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from closedrooms.experiments.evaluation.statistics import bootstrap, compare_pairs, described
+from closedrooms.experiments.statistics import bootstrap, compare_pairs, described
 
 
 def test_the_bootstrap_interval_holds_the_mean_and_narrows_with_more_samples() -> None:

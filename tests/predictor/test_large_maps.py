@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
@@ -55,6 +55,7 @@ def test_only_edges_near_a_door_tell_its_direction(y, angle):
     assert directions.at(ClosedDoor("d", (2.5, y))) == angle
 
 
+@settings(max_examples=40)
 @given(st.lists(st.tuples(SPREAD, st.floats(0.1, 1.5), SPREAD), min_size=1, max_size=30))
 def test_segments_chain_as_in_a_table_of_all_pairs(segments):
     ends = np.array([[(low, across), (low + length, across)] for low, length, across in segments])

@@ -23,7 +23,7 @@ from closedrooms.visualization.rerun.views import Bounds, show_log
 DEFAULT_BOUNDS: Bounds = (-20.0, -20.0, 20.0, 20.0)
 
 
-def arrange(holds: Contents, bounds: Bounds | None) -> rrb.Blueprint:
+def make_blueprint(holds: Contents, bounds: Bounds | None) -> rrb.Blueprint:
     """Build the blueprint of a recording.
 
     Args:

@@ -27,7 +27,7 @@ LEGEND = """| colour | what |
 """
 
 
-def markdown(text: str) -> rr.TextDocument:
+def text_document(text: str) -> rr.TextDocument:
     """Make a document of Markdown."""
     return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
 

@@ -20,11 +20,11 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.core.shapes import Shape, polygon_iou
 from closedrooms.visualization import colours
 from closedrooms.visualization.rerun import drawables
-from closedrooms.visualization.rerun.blueprint import arrange
+from closedrooms.visualization.rerun.blueprint import make_blueprint
 from closedrooms.visualization.rerun.curves import Curves
-from closedrooms.visualization.rerun.documents import LEGEND, configuration_text, markdown, room_line, rooms_table
-from closedrooms.visualization.rerun.prediction import draw_doors, draw_input, draw_rooms, draw_tours, draw_trace
-from closedrooms.visualization.rerun.robot import RecordedRobot
+from closedrooms.visualization.rerun.documents import LEGEND, configuration_text, room_line, rooms_table, text_document
+from closedrooms.visualization.rerun.drawn_prediction import draw_doors, draw_input, draw_rooms, draw_tours, draw_trace
+from closedrooms.visualization.rerun.recorded_robot import RecordedRobot
 from closedrooms.visualization.rerun.stream import RecordingStream, Stage
 from closedrooms.visualization.rerun.sureness import draw_nothing_yet, draw_sureness
 from closedrooms.visualization.rerun.tabs import Contents
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from closedrooms.coverage.tour.coverage_tour import CoverageTour
     from closedrooms.predictor.prediction import Level, Prediction
     from closedrooms.sim.bystanders import Mover
-    from closedrooms.visualization.rerun.building import RecordedBuilding
+    from closedrooms.visualization.rerun.recorded_building import RecordedBuilding
     from closedrooms.worlds.plan import FloorPlan
 
 # A map every so often: what the eye can follow [s].
@@ -85,7 +85,7 @@ class Recorder:
 
     def __enter__(self) -> Self:
         self._stream.__enter__()
-        self._stream.log("legend", markdown(LEGEND), static=True)
+        self._stream.log("legend", text_document(LEGEND), static=True)
         self._stream.at(stage=Stage.BUILDING)
         return self
 
@@ -99,7 +99,7 @@ class Recorder:
                 self._curves.send_errors()
                 self._curves.send_stages(self._last_stage())
                 self._hold(reference=self._curves.has_reference)
-                self._stream.arrange(arrange(self._holds, self._bounds))
+                self._stream.arrange(make_blueprint(self._holds, self._bounds))
         finally:
             self._stream.__exit__(kind, error, trace)
 
@@ -113,12 +113,12 @@ class Recorder:
         """Record the configuration as it was resolved; paths (``out``) are left out, so that equal runs stay equal."""
         kept = {key: value for key, value in values.items() if key != "out"}
         self._hold(configuration=True)
-        self._stream.log("configuration", markdown(configuration_text(kept)), static=True)
+        self._stream.log("configuration", text_document(configuration_text(kept)), static=True)
         self._stream.property("configuration", {key: json.dumps(value, default=str) for key, value in kept.items()})
 
     def building(self, plan: "FloorPlan", map_T_world: Pose2, closed: Collection[str]) -> None:
         """Record walls, floors and doors in three dimensions."""
-        from closedrooms.visualization.rerun.building import RecordedBuilding
+        from closedrooms.visualization.rerun.recorded_building import RecordedBuilding
         from closedrooms.worlds.truth import truth_bounds
 
         self._palette = colours.room_colours(closed)
@@ -303,6 +303,7 @@ class Recorder:
         staged: bool = False,
         stamp: float | None = None,
     ) -> None:
+        """Draw a prediction and how it came about, each step at its stage where ``staged``; else at ``stamp`` [s]."""
         from closedrooms.predictor.prediction import WeighedTrace
 
         self._palette = colours.room_colours({*self._palette, *(door.id for door in doors)})
@@ -361,14 +362,14 @@ class Recorder:
 
     def table(self, text: str) -> None:
         """Record the table of results, Markdown."""
-        self._stream.log("result", markdown(text), static=True)
+        self._stream.log("result", text_document(text), static=True)
         self._hold(result=True)
 
     def _hold(self, **parts: Any) -> None:
         """Note what the recording holds by now; who watches sees a tab for it at once."""
         before, self._holds = self._holds, replace(self._holds, **parts)
         if self._stream.live and before != self._holds:
-            self._stream.arrange(arrange(self._holds, self._bounds))
+            self._stream.arrange(make_blueprint(self._holds, self._bounds))
 
     def _send_scans(self) -> None:
         """Send poses and scans kept since the last time."""
@@ -377,5 +378,6 @@ class Recorder:
 
 
 def _known_bounds(grid: OccupancyGrid) -> Bounds | None:
+    """Find the bounds of what a map knows [m], ``None`` where it knows nothing."""
     window = grid.known_bounds()
     return None if window is None else grid.frame.cropped(*window).bounds

@@ -144,11 +144,13 @@ def weighing_tab(layout: Layout) -> rrb.Container:
 
 
 def _page(rooms: Sequence[str], at: int) -> str:
+    """Name a page of bar charts by its first and last room."""
     page = rooms[at : at + CHARTS]
     return page[0] if len(page) == 1 else f"{page[0]} to {page[-1]}"
 
 
 def _weighed(room: str) -> rrb.Container:
+    """Arrange the bar chart of a room beside the names of its terms."""
     chart = rrb.BarChartView(
         origin=f"/weighing/{room}",
         contents=[f"+ /weighing/{room}/chosen", f"+ /weighing/{room}/runner_up"],

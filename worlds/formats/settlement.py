@@ -156,6 +156,7 @@ def _odd_scale(plan: FloorPlan, widths: Sequence[float]) -> list[Remark]:
 
 
 def _odd_rooms(areas: Sequence[float]) -> list[Remark]:
+    """Warn where the median room has a size that no building has."""
     usable = [area for area in areas if math.isfinite(area) and area > 0.0]
     area = float(np.median(usable)) if usable else USUAL_ROOM
     if SMALLEST_MEDIAN_ROOM <= area <= LARGEST_MEDIAN_ROOM:

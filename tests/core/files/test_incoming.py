@@ -11,6 +11,8 @@ from closedrooms.core.files.incoming import (
     MAX_DEPTH,
     MAX_DIGITS,
     is_file,
+    is_folder,
+    is_there,
     opened,
     read_bytes,
     read_json,
@@ -45,6 +47,17 @@ def test_names_that_no_file_system_takes_are_one_line() -> None:
         with pytest.raises(InvalidInputError):
             read_text(Path(name), what="a plan")
         assert not is_file(Path(name))
+
+
+@pytest.mark.parametrize("name", ["x" * 300, "a\0b", "circle/below", "gone"])
+def test_nothing_has_a_name_that_the_system_refuses(tmp_path: Path, name: str) -> None:
+    (tmp_path / "circle").symlink_to(tmp_path / "circle")
+    (tmp_path / "file").write_text("x")
+    path = tmp_path / name
+    assert (is_file(path), is_there(path), is_folder(path)) == (False, False, False)
+    assert (is_file(tmp_path), is_there(tmp_path), is_folder(tmp_path)) == (False, True, True)
+    file = tmp_path / "file"
+    assert (is_file(file), is_there(file), is_folder(file)) == (True, True, False)
 
 
 def test_what_is_read_counts_and_not_what_the_system_says(tmp_path: Path) -> None:

@@ -63,6 +63,14 @@ def test_transparent_pixels_are_unknown(tmp_path: Path) -> None:
     assert read_map(save(tmp_path, rgba)).cells.tolist() == [[0, -1]]
 
 
+def test_transparent_colours_of_a_palette_are_unknown(tmp_path: Path) -> None:
+    save(tmp_path, np.zeros((1, 3), dtype=np.uint8))
+    palette = Image.fromarray(np.array([[0, 1, 2]], dtype=np.uint8)).convert("P")
+    palette.putpalette([255, 255, 255, 0, 0, 0, 0, 0, 0])
+    palette.save(tmp_path / "m.png", transparency=bytes([255, 0, 255]))
+    assert read_map(tmp_path / "m.yaml").cells.tolist() == [[0, -1, 100]]
+
+
 def test_finds_the_picture_of_a_foreign_absolute_path_beside_the_yaml(tmp_path: Path) -> None:
     path = save(tmp_path, np.zeros((2, 2), dtype=np.uint8), image="/nowhere/at/all/m.png")
     assert read_map(path).occupied.all()

@@ -7,12 +7,12 @@ import pytest
 
 from closedrooms.cli.config_file import read_settings
 from closedrooms.core.errors import InvalidInputError, OutputError
-from closedrooms.core.files.outgoing import output_folder
+from closedrooms.core.files.output_folders import output_folder
 from closedrooms.core.files.schema import SCHEMA, check_schema
+from closedrooms.experiments.claimed_folder import claim_folder
 from closedrooms.experiments.dataset.layout import read_manifest
-from closedrooms.experiments.evaluation.claimed_folder import claim_folder
-from closedrooms.experiments.evaluation.sample_path import SamplePath
-from closedrooms.experiments.evaluation.samples import read_sample
+from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
+from closedrooms.experiments.evaluation.samples.sample_reader import read_sample
 from closedrooms.pipeline.config import PredictConfig
 from closedrooms.pipeline.view import find_recording
 

@@ -7,7 +7,7 @@ import shapely
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.random import stream
-from closedrooms.experiments.evaluation.listing import find_samples
+from closedrooms.experiments.evaluation.samples.listing import find_samples
 from closedrooms.experiments.training.batches import blur, draw_batches, hide_pockets, make_batch
 from closedrooms.experiments.training.buildings import group_of, may_train
 from closedrooms.experiments.training.config import TrainConfig

@@ -6,8 +6,8 @@ import pytest
 from closedrooms.core.files.rosmap import read_map
 from closedrooms.core.random import stream
 from closedrooms.core.shapes import cells_inside
-from closedrooms.experiments.evaluation.listing import find_samples
-from closedrooms.experiments.evaluation.samples import read_sample
+from closedrooms.experiments.evaluation.samples.listing import find_samples
+from closedrooms.experiments.evaluation.samples.sample_reader import read_sample
 from closedrooms.experiments.training.synthetic_maps import DrawnMap, synthesise_map, write_sample
 from closedrooms.worlds.closing import draw_closed
 from closedrooms.worlds.library import load_world

@@ -16,7 +16,7 @@ from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.mapping.map_builder import build_map
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.pipeline.reporting.log_observer import LogWatch
-from closedrooms.pipeline.reporting.story import Story, sum_up
+from closedrooms.pipeline.reporting.story import Story, summarise_run
 from closedrooms.predictor.prediction import Prediction
 
 FRAME = GridFrame(0.5, 0.0, 0.0, 20, 20)
@@ -120,12 +120,12 @@ def test_the_end_sums_up_what_is_known_and_leaves_out_what_is_not() -> None:
         "rooms_closed": 5,
         "tour": {"errors_percent": {"predicted": 0.71}},
     }
-    assert sum_up(figures) == (
+    assert summarise_run(figures) == (
         "in the end: 98.5 % of what can be reached is mapped, trajectory error 0.012 m (ATE), "
         "IoU 0.900 on average over 5 rooms, length of the tour predicted to 0.7 %"
     )
     unknown = {"area_mapped": None, "room_iou_mean": None, "tour": {"errors_percent": {"predicted": None}}}
-    assert sum_up(figures | unknown) == "in the end: trajectory error 0.012 m (ATE)"
+    assert summarise_run(figures | unknown) == "in the end: trajectory error 0.012 m (ATE)"
 
 
 def test_the_log_of_a_mapped_log_says_how_long_it_is_how_far_it_is_and_what_was_missing(told: Told) -> None:
