@@ -296,7 +296,11 @@ async def work_aside(work: Callable[[], T]) -> T:
     Raises:
         CancelledError: The server stops; NiceGUI 3 returns ``None`` then.
     """
-    result = await run.io_bound(lambda: (work(),))
+
+    def wrapped() -> tuple[T]:
+        return (work(),)
+
+    result: tuple[T] | None = await run.io_bound(wrapped)
     if result is None:
         raise asyncio.CancelledError
     value: T = result[0]
