@@ -9,7 +9,7 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.driver import Driver
+from closedrooms.navigation.driving.driver import Driver
 
 Ending = Literal["complete", "stuck"]
 

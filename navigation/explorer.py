@@ -11,10 +11,10 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.navigation.config import RobotNavigation
 from closedrooms.navigation.decider import Decider, Situation
+from closedrooms.navigation.driving.met_obstacles import barrier, touching_points
+from closedrooms.navigation.driving.path_check import fits_along
 from closedrooms.navigation.frontiers import still_unknown
 from closedrooms.navigation.goal_search import Goal, GoalSearch
-from closedrooms.navigation.met_obstacles import barrier, touching_points
-from closedrooms.navigation.path_check import fits_along
 
 # The path is checked this far ahead of the robot [m].
 CHECK_AHEAD = 3.0

@@ -10,9 +10,9 @@ from closedrooms.core.door import Point
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.costmap import Costmap, NavigationMap, pooled, traversable
+from closedrooms.navigation.driving.costmap import Costmap, NavigationMap, pooled, traversable
+from closedrooms.navigation.driving.planner import PathSearch, PlannedPath, reachable_cells, start_cell
 from closedrooms.navigation.frontiers import Frontiers, find_frontiers, seen_from
-from closedrooms.navigation.planner import PathSearch, PlannedPath, reachable_cells, start_cell
 
 
 @dataclass(frozen=True, slots=True, eq=False)

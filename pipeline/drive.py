@@ -12,8 +12,8 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import RobotNavigation
 from closedrooms.navigation.control_loop import LoopLog, Step, run_loop
-from closedrooms.navigation.opened_doors import ReopenedMap
-from closedrooms.navigation.tour_follower import DOOR_WAIT, TourFollower, TourOutcome, TourPlan
+from closedrooms.navigation.tour.opened_doors import ReopenedMap
+from closedrooms.navigation.tour.tour_follower import DOOR_WAIT, TourFollower, TourOutcome, TourPlan
 from closedrooms.pipeline.bounds import BuildingBounds
 from closedrooms.pipeline.reporting.live_recording import DriveRecording
 from closedrooms.pipeline.reporting.run_log import RunLog

@@ -1,7 +1,7 @@
 """From a map and its closed doors to the rooms behind them (paper, sections 3 and 4).
 
 ``methods`` is the registry: every method by name, also those of other packages (CONTRIBUTING.md says how to add one);
-``config`` holds their settings. ``paper/`` (also ``rose``), ``best/``, ``learned/`` and ``baselines`` are the methods,
+``config`` holds their settings. ``paper/`` (also rose), ``best/``, ``learned/`` and ``baselines`` are the methods,
 ``structure/`` is what a grid shows to all of them. ``prediction`` is the result; ``disjoint_rooms`` and ``inpainting``
 finish it, ``confidence/`` says how sure it is, ``revision`` goes on with it as knowledge arrives.
 """

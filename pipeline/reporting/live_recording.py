@@ -9,9 +9,9 @@ from closedrooms.core.room import Room
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.control_loop import Step
 from closedrooms.navigation.explorer import Explorer
-from closedrooms.navigation.opened_doors import ReopenedMap
-from closedrooms.navigation.revised_prediction import Revision
-from closedrooms.navigation.tour_follower import TourFollower
+from closedrooms.navigation.tour.opened_doors import ReopenedMap
+from closedrooms.navigation.tour.revised_prediction import Revision
+from closedrooms.navigation.tour.tour_follower import TourFollower
 from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.pipeline.reporting.run_scores import room_iou
 from closedrooms.pipeline.reporting.story import Story

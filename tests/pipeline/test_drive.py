@@ -11,7 +11,7 @@ from closedrooms.coverage.tour.tour_planner import plan_coverage
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.tour_follower import TourPlan
+from closedrooms.navigation.tour.tour_follower import TourPlan
 from closedrooms.pipeline.drive import DriveSettings, Porter, drive_tour
 from closedrooms.pipeline.reporting.drive_report import drive_metrics
 from closedrooms.pipeline.reporting.progress import Silent

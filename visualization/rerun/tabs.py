@@ -108,7 +108,7 @@ def mapping_tab(layout: Layout) -> rrb.Container:
     side = rrb.Vertical(
         *(plot_curves(name, title) for name, title in titles.items()),
         plot_curves("known_area", "Known area [m²]"),
-        rrb.Tabs(rrb.TextDocumentView(origin="/legend", name="Colours"), show_log(), active_tab=0),
+        rrb.TextDocumentView(origin="/legend", name="Colours"),
         row_shares=[3] * (len(titles) + 1) + [4],
     )
     return rrb.Horizontal(view, side, column_shares=[2, 1], name="Mapping")

@@ -22,8 +22,8 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.control_loop import LoopLog, run_loop
-from closedrooms.navigation.opened_doors import ReopenedMap
-from closedrooms.navigation.tour_follower import TourFollower, TourOutcome, TourPlan
+from closedrooms.navigation.tour.opened_doors import ReopenedMap
+from closedrooms.navigation.tour.tour_follower import TourFollower, TourOutcome, TourPlan
 from closedrooms.predictor.inpainting import inpaint
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction

@@ -9,7 +9,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import mark_doorways
-from closedrooms.navigation.prediction_monitor import SURPRISE, PredictionMonitor, difference
+from closedrooms.navigation.tour.prediction_monitor import SURPRISE, PredictionMonitor, difference
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.predictor.revision import Predict, overlay, update
 

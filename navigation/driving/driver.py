@@ -10,7 +10,7 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.path_follower import (
+from closedrooms.navigation.driving.path_follower import (
     FollowedPath,
     Steering,
     free_distance,
