@@ -101,6 +101,18 @@ def check_output_folder(folder: Path, command: object = None, *, sources: Iterab
         pass
 
 
+def real_path(path: Path) -> Path:
+    """Follow an output to the whole path that it leads to, for processes that stand in other folders.
+
+    Raises:
+        OutputError: A circle of symbolic links.
+    """
+    try:
+        return path.resolve()
+    except RuntimeError as error:
+        raise OutputError(f"cannot write (a circle of symbolic links): {path}") from error
+
+
 def _holds(folder: Path, source: Path) -> bool:
     """Check whether an output folder holds something that is read."""
     try:
