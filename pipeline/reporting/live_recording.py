@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
@@ -13,7 +15,7 @@ from closedrooms.navigation.tour.opened_doors import ReopenedMap
 from closedrooms.navigation.tour.revised_prediction import Revision
 from closedrooms.navigation.tour.tour_follower import TourFollower
 from closedrooms.pipeline.reporting.run_log import RunLog
-from closedrooms.pipeline.reporting.run_scores import room_iou
+from closedrooms.pipeline.reporting.run_scores import room_iou, room_points
 from closedrooms.pipeline.reporting.story import Story
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.predictor.revision import Predict
@@ -78,11 +80,7 @@ class ExplorationRecording:
     ) -> None:
         self._recorder, self._log, self._mapper, self._explorer = recorder, log, mapper, explorer
         self._interim = interim
-        self._story = Story(
-            recorder,
-            floor=sum(room.polygon.area for room in log.sim.plan.rooms),
-            closed=sum(not opening for opening in log.sim.door_states().values()),
-        )
+        self._story: Story | None = None
         self._told = 0
 
     def __call__(self, step: Step) -> None:
@@ -102,11 +100,25 @@ class ExplorationRecording:
 
     def _tell(self, grid: OccupancyGrid, doors: Sequence[ClosedDoor], stamp: float) -> None:
         """Write into the log what is new since the last map."""
-        self._story.known(grid, stamp)
+        if self._story is None:  # not before: nothing may be recorded at all
+            self._story = begin_story(self._recorder, self._log)
+        story = self._story
+        story.known(grid, stamp)
         predicted = None if self._interim is None else self._interim(grid, doors, stamp)
-        self._story.doors(doors, stamp, *(predicted or ()))
-        self._story.loops(len(self._mapper.loops), stamp)
-        self._story.events(self._mapper.events, stamp)
+        story.doors(doors, stamp, *(predicted or ()))
+        story.loops(len(self._mapper.loops), stamp)
+        story.events(self._mapper.events, stamp)
+
+
+def begin_story(recorder: "Recorder", log: RunLog) -> Story:
+    """Begin the story of a robot in a building, by its floor and its closed doors."""
+    sim = log.sim
+    rooms = room_points(sim.plan)
+    return Story(
+        recorder,
+        floor=sim.world_T_map.inverse().transform(np.concatenate(rooms)) if rooms else None,
+        closed=sum(not opening for opening in sim.door_states().values()),
+    )
 
 
 class DriveRecording:
