@@ -296,10 +296,15 @@ async def work_aside(work: Callable[[], T]) -> T:
     Raises:
         CancelledError: The server stops; NiceGUI 3 returns ``None`` then.
     """
-    result = await run.io_bound(lambda: (work(),))
+
+    def wrapped() -> tuple[T]:
+        return (work(),)
+
+    result: tuple[T] | None = await run.io_bound(wrapped)
     if result is None:
         raise asyncio.CancelledError
-    return result[0]
+    value: T = result[0]
+    return value
 
 
 async def open_page(begin: Callable[[], EditSession]) -> None:

@@ -84,7 +84,7 @@ class Mutant:
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a mutant, ``killed``, ``survived`` or ``timeout`` (counts for neither side), and by which test."""
+    """Fate of a mutant, ``killed``, ``survived`` or ``timeout`` (counts for neither side), and the test that told."""
 
     module: str
     operator: str
@@ -162,7 +162,7 @@ def _differs(source: str, changed: str) -> bool:
 
 @dataclass(frozen=True)
 class Reach:
-    """What a test of a folder reaches.
+    """Code that a test of a folder reaches.
 
     Attributes:
         test: Its id.

@@ -17,7 +17,7 @@ from closedrooms.visualization.rerun.tabs import (
     sureness_tab,
     weighing_tab,
 )
-from closedrooms.visualization.rerun.views import Bounds
+from closedrooms.visualization.rerun.views import Bounds, show_log
 
 # Where nothing is known yet [m].
 DEFAULT_BOUNDS: Bounds = (-20.0, -20.0, 20.0, 20.0)
@@ -48,6 +48,8 @@ def make_blueprint(holds: Contents, bounds: Bounds | None) -> rrb.Blueprint:
         tabs.append(coverage_tab(layout))
     if holds.driving:
         tabs.append(driving_tab(layout))
+    if holds.mapping or holds.rooms:
+        tabs.append(show_log())
     if holds.result or holds.configuration:
         tabs.append(result_tab(layout))
     names = [str(tab.name) for tab in tabs]

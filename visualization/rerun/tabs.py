@@ -52,7 +52,12 @@ class Contents:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Parts of a recording, and their place: ``bounds`` are ``x_min, y_min, x_max, y_max`` [m] in the map frame."""
+    """Parts that a recording holds, and the extent of the map, to which views are zoomed.
+
+    Attributes:
+        holds: Parts of the recording.
+        bounds: ``x_min, y_min, x_max, y_max`` in the map frame [m].
+    """
 
     holds: Contents
     bounds: Bounds
@@ -103,7 +108,7 @@ def mapping_tab(layout: Layout) -> rrb.Container:
     side = rrb.Vertical(
         *(plot_curves(name, title) for name, title in titles.items()),
         plot_curves("known_area", "Known area [m²]"),
-        rrb.Tabs(rrb.TextDocumentView(origin="/legend", name="Colours"), show_log(), active_tab=0),
+        rrb.TextDocumentView(origin="/legend", name="Colours"),
         row_shares=[3] * (len(titles) + 1) + [4],
     )
     return rrb.Horizontal(view, side, column_shares=[2, 1], name="Mapping")

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import rerun as rr
 import rerun.blueprint as rrb
+from rerun.blueprint.encodings import TextLogColumnKind
 
 from closedrooms.visualization import colours
 
@@ -16,8 +17,10 @@ HALF_VIEW = math.radians(55.0) / 2
 
 
 def show_log() -> rrb.View:
-    """Show the log of the run."""
-    return rrb.TextLogView(origin="/log", name="Log")
+    """Show the log of the run: when, and what; all lines come from one place."""
+    return rrb.TextLogView(
+        origin="/log", name="Log", columns=rrb.TextLogColumns(text_log_columns=[TextLogColumnKind.Body])
+    )
 
 
 def plot_curves(name: str, title: str, *, top: float | None = None) -> rrb.View:
