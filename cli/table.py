@@ -80,7 +80,7 @@ def named_command(words: Sequence[str]) -> Command | None:
 
 @dataclass(frozen=True)
 class _NotAsked:
-    """Stands for the options of the commands that a line does not name, which nobody looks at."""
+    """Stand-in for the options of the commands that a line does not name, which nobody looks at."""
 
 
 def _table(chosen: Command | None, options: type[Any] | None, *, completing: bool) -> Any:

@@ -15,12 +15,12 @@ GONE = {
 
 
 class UsageError(Exception):
-    """What was typed is no command that there is (exit status 2)."""
+    """A command line that cannot be understood: exit status 2."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinePosition:
-    """Where on a line something was not understood.
+    """Place on a command line where something was not understood.
 
     Attributes:
         words: The whole line.

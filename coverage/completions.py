@@ -26,7 +26,7 @@ FIRST, BETWEEN = 20, 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Possibilities:
-    """What one room may be.
+    """Shapes that one room may have, with their probabilities.
 
     Attributes:
         room: As predicted.

@@ -12,7 +12,7 @@ Parts = Literal["start", "all"]
 
 @dataclass(frozen=True, kw_only=True)
 class GraphConfig:
-    """How a map becomes a topological graph (paper, section 5.1)."""
+    """Settings of the topological graph of a map (paper, section 5.1)."""
 
     clutter_filter: bool = True
     """Take furniture out of the map first (ROSE's filter; paper, sections 4.2 and 5.1)."""
@@ -67,7 +67,7 @@ class GraphConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class TourConfig:
-    """How a tour is searched (paper, section 5.2)."""
+    """Settings of the search for a tour (paper, section 5.2)."""
 
     method: TourMethod = "default"
     """``default``: OR-Tools' Christofides, then Or-opt and 2-opt moves with restarts, bounded by moves.

@@ -43,7 +43,7 @@ WIDTH, REACH = 0.8, 0.3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CostSpread:
-    """What it costs to cover a building of which some rooms are only predicted.
+    """Distribution of the cost of covering a building of which some rooms are only predicted.
 
     Attributes:
         lengths: Of a tour over each completion [m], shape (n,), in the order drawn.

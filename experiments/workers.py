@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
 from closedrooms.core.files.unfinished import remove_unfinished
 from closedrooms.core.runtime.packages import missing_package, require
-from closedrooms.core.runtime.stopping import SIGNALS, Stop, end_in_time, handle
+from closedrooms.core.runtime.stopping import SIGNALS, Stop, end_in_time, ending_with, handle
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -35,7 +35,6 @@ PATIENCE = 10.0
 # How long workers may take to clear away what they have under way [s]; the parent itself has 1.4 s.
 GRACE = 1.0
 SAFE_PATH = "PYTHONSAFEPATH"
-PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 # Jobs that a cluster is given for each of its threads: one to work on, one to go on with.
 AHEAD = 2
 
@@ -238,11 +237,8 @@ def _begin(parent: int) -> None:
     """Prepare a local worker: one thread, no part in the parent's Ctrl-C, and no life after the parent's."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_in_time((signal.SIGTERM,), lambda _: remove_unfinished(), patience=GRACE / 2)
-    # The kernel sends the signal when the parent ends, however it ends; it may have ended already.
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    ending_with(parent, signal.SIGTERM)()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
-    if os.getppid() != parent:
-        os._exit(1)
     one_thread()
     # Until here the signal ends the worker by itself: it has nothing under way.
     handle((signal.SIGTERM,), _Dismissal())

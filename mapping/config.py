@@ -8,7 +8,7 @@ from closedrooms.core.runtime.options import check_magnitudes
 
 @dataclass(frozen=True, kw_only=True)
 class MatcherConfig:
-    """How a scan is matched to the map; one set of values for every sensor and noise level."""
+    """Settings of scan matching; one set of values for every sensor and noise level."""
 
     field_sigma: float = 0.08
     """Standard deviation of the likelihood around a mapped hit [m]: sensor noise and half a cell together."""
@@ -81,7 +81,7 @@ class MatcherConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class LoopConfig:
-    """When a place is recognised and how the pose graph is solved."""
+    """Settings of place recognition, loop closure and the pose graph's solver."""
 
     enabled: bool = True
     """Close loops."""
@@ -151,7 +151,7 @@ class LoopConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class RecoveryConfig:
-    """What is done when a match contradicts what was seen before, because the odometry failed."""
+    """Settings of recovery: what happens when a match contradicts the map because the odometry failed."""
 
     enabled: bool = True
     """Look for contradictions, search wide windows and start submaps."""
@@ -208,7 +208,7 @@ class RecoveryConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class MapperConfig:
-    """How scans become a map."""
+    """Settings of mapping, from scans to a map."""
 
     resolution: float = 0.05
     """Cell size of the map [m]."""

@@ -21,7 +21,7 @@ Mask = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Imprint:
-    """What one scan at one pose counts, so that it can be counted out, or in again, without drawing it anew.
+    """Counts of one scan at one pose, so that it can be counted out, or in again, without drawing it anew.
 
     Attributes:
         row: First row of its window, on the lattice (not in the array, which grows).

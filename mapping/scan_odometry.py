@@ -37,7 +37,7 @@ drifted, and putting it together is the mapper's task."""
 
 
 class ScanOdometry:
-    """Follows a robot by matching each scan with the last ones (correlative search, then refinement).
+    """Odometry by matching each scan with the last ones (correlative search, then refinement).
 
     It drifts as odometry does; the mapper takes it for odometry.
     """

@@ -23,7 +23,7 @@ REASONS: dict[Ending, str] = {"complete": "", "stuck": "the robot could not get 
 
 
 class Robot(Protocol):
-    """What is sensed and moved: a simulation, or a real robot."""
+    """A robot that senses and moves, simulated or real."""
 
     @property
     def period(self) -> float:
@@ -33,11 +33,11 @@ class Robot(Protocol):
         """Sense what is around the robot now."""
 
     def step(self, v: float, w: float, duration: float) -> None:
-        """Let time pass under a velocity command."""
+        """Apply a velocity command ``v`` [m/s], ``w`` [rad/s] for ``duration`` [s]."""
 
 
 class MapMaker(Protocol):
-    """What makes the map and the pose that everything is decided on."""
+    """Source of the map and the pose that everything is decided on (SLAM)."""
 
     def process(self, scan: LaserScan, odometry: Pose2, sightings: Sequence[DoorSighting] = ()) -> Pose2:
         """Take in one scan; returns ``map_T_robot``."""
@@ -48,7 +48,7 @@ class MapMaker(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """One turn of the loop, after it was decided.
+    """One pass of the loop, once the command is decided and before it is applied.
 
     Attributes:
         observation: What was sensed.
@@ -60,16 +60,16 @@ class Step:
 
     @property
     def stamp(self) -> float:
-        """When [s]."""
+        """Timestamp [s]."""
         return self.observation.stamp
 
 
 @dataclass(frozen=True, slots=True)
 class EarlyEnd:
-    """Why a run ends early.
+    """Status and reason of a run that ends early.
 
     Attributes:
-        status: What it ends as.
+        status: Status of the run.
         reason: One line for people.
     """
 
@@ -79,7 +79,7 @@ class EarlyEnd:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoopLog:
-    """How a run went.
+    """Outcome of a run of the loop.
 
     Attributes:
         status: ``complete`` when there was nothing left to do, ``stuck`` when the robot could not get free, ``limit``
@@ -166,7 +166,7 @@ def _log(
 
 
 class Limits:
-    """How long a run may last and how large its map may grow."""
+    """Limits of a run: simulated time, processor time, and size of the map."""
 
     def __init__(self, config: NavigationConfig, mapper: MapMaker) -> None:
         self._config = config

@@ -9,14 +9,14 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.driver import Driver
+from closedrooms.navigation.driving.driver import Driver
 
 Ending = Literal["complete", "stuck"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Situation:
-    """What a command is decided on.
+    """State that a command is decided on.
 
     Attributes:
         pose: ``map_T_robot`` as estimated.
@@ -32,12 +32,12 @@ class Situation:
 
     @property
     def stamp(self) -> float:
-        """When [s]."""
+        """Timestamp [s]."""
         return self.scan.stamp
 
 
 class Decider(ABC):
-    """Chooses goals and hands the paths there to a driver; says what follows when it arrives or gets stuck.
+    """Choice of goals; a driver follows the paths there. Subclasses say what follows on arrival or when stuck.
 
     Attributes:
         status: How it ended, ``None`` before.

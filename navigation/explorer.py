@@ -11,10 +11,10 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.navigation.config import RobotNavigation
 from closedrooms.navigation.decider import Decider, Situation
+from closedrooms.navigation.driving.met_obstacles import barrier, touching_points
+from closedrooms.navigation.driving.path_check import fits_along
 from closedrooms.navigation.frontiers import still_unknown
 from closedrooms.navigation.goal_search import Goal, GoalSearch
-from closedrooms.navigation.met_obstacles import barrier, touching_points
-from closedrooms.navigation.path_check import fits_along
 
 # The path is checked this far ahead of the robot [m].
 CHECK_AHEAD = 3.0
@@ -27,7 +27,7 @@ SETTLE = 0.4
 
 
 class Explorer(Decider):
-    """Chooses goals on the estimated map and drives to them until no reachable frontier is left.
+    """Frontier exploration on the estimated map, until no reachable frontier is left.
 
     Greedy choice of the nearest frontier, with hysteresis: a goal is kept until its frontier is known, it is reached,
     its path is blocked, or a clearly nearer one turns up, which may happen ``max_switches`` times a goal. Every goal

@@ -17,10 +17,10 @@ from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.cost_spread import CostSpread, spread_cost
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.coverage.tour.tour_planner import plan_coverage
-from closedrooms.mapping.logs.bag_writer import check_bags, write_bag
+from closedrooms.mapping.logs.bags.bag_writer import check_bags, write_bag
 from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.navigation.tour_follower import TourPlan
+from closedrooms.navigation.tour.tour_follower import TourPlan
 from closedrooms.pipeline.bounds import check_size, check_width, too_narrow
 from closedrooms.pipeline.config import RunConfig
 from closedrooms.pipeline.drive import DriveSettings, drive_tour

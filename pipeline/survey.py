@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Survey:
-    """What the robot brought home from a simulated building, the truth beside it.
+    """Map, poses and doors that the robot brought home from a simulated building, the truth beside it.
 
     Attributes:
         grid: The map M.

@@ -27,7 +27,7 @@ DEFAULT_METHOD = "best"
 
 
 class Predictor(Protocol):
-    """What a method does."""
+    """Function that predicts rooms."""
 
     def __call__(self, grid: "OccupancyGrid", doors: "Sequence[ClosedDoor]", config: Any) -> "Prediction":
         """Predict the rooms behind ``doors``; trouble with one door stands in ``failures`` and stops no other."""
@@ -131,7 +131,7 @@ _OURS = (
 
 
 class _Methods(Mapping[str, Method]):
-    """Ours first, then those of other packages by name; a package is imported when its method is asked for."""
+    """Our methods, then those of other packages by name; a package is imported when its method is asked for."""
 
     def __getitem__(self, name: str) -> Method:
         for method in _OURS:

@@ -31,7 +31,7 @@ TRIES = 40
 
 
 class Mover(Protocol):
-    """Something that moves by itself."""
+    """Person or thing that moves by itself."""
 
     @property
     def outline(self) -> Polygon:
@@ -65,7 +65,7 @@ class _Body:
 
 
 class Floor:
-    """Where people can walk: cells of free floor that hang together with the robot's start."""
+    """Floor that people can walk on: free cells that hang together with the robot's start."""
 
     def __init__(self, plan: FloorPlan, solids: Polygon | MultiPolygon, start: tuple[float, float]) -> None:
         x0, y0, x1, y1 = shapely.union_all([room.polygon for room in plan.rooms]).bounds

@@ -19,7 +19,7 @@ ON_WALL = 0.4
 
 
 class Faults:
-    """Spoils what was measured, each fault by a stream of its own."""
+    """Faults applied to measurements, each by a random stream of its own."""
 
     def __init__(self, config: FaultConfig, plan: FloorPlan, seed: int) -> None:
         self.config = config

@@ -135,7 +135,10 @@ class PhysicsWorld:
         self.has_glass = True
 
     def move_body(self, body: int, x: float, y: float) -> None:
-        """Put a static body, its origin first at the world's, at ``(x, y)`` [m]; rays see it at once."""
+        """Teleport a body without mass, made around the world's origin, to ``(x, y)`` [m]; rays see it at once.
+
+        It has no speed: contacts on the way are not found.
+        """
         self._bullet.resetBasePositionAndOrientation(
             body, [x, y, 0.0], [0.0, 0.0, 0.0, 1.0], physicsClientId=self._client
         )
@@ -210,7 +213,10 @@ class PhysicsWorld:
         return body
 
     def drive_joint(self, body: int, link: int, target: float, *, force: float, speed: float) -> None:
-        """Let a motor move a joint to ``target`` [rad or m] at ``speed`` [1/s] with at most ``force`` [Nm or N]."""
+        """Let a motor move a joint to ``target`` [rad or m] at ``speed`` [rad/s or m/s] by ``force`` [Nm or N].
+
+        Force and speed are upper limits: a joint that is blocked stays.
+        """
         self._bullet.setJointMotorControl2(
             body, link, self._bullet.POSITION_CONTROL, targetPosition=target, force=force, maxVelocity=speed,
             physicsClientId=self._client,

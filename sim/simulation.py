@@ -190,11 +190,15 @@ class Simulation:
         self._path = path[max(first, 0) :]
 
     def true_ranges(self, world_T_robot: Pose2) -> FloatArray:
-        """Measure without noise from anywhere, shape (beams,) [m], infinity without a return."""
+        """Measure without noise from any pose; rays pass glass as if it were not there.
+
+        Returns:
+            Ranges [m], shape (beams,), infinity without a return.
+        """
         return self._lidar.cast(world_T_robot)[0]
 
     def step(self, v: float, w: float, duration: float) -> None:
-        """Let time pass under a velocity command.
+        """Apply a velocity command ``v`` [m/s], ``w`` [rad/s] for ``duration`` [s].
 
         The drive follows the command within its limits and touches what it meets; doors that open move on.
 

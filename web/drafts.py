@@ -23,11 +23,11 @@ MOST_BYTES = 10_000_000
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """What was kept.
+    """Document that was kept for a visitor.
 
     Attributes:
         document: As it stood.
-        saved: When, seconds since the epoch.
+        saved: Time of keeping it, seconds since the epoch.
     """
 
     document: Document

@@ -16,7 +16,7 @@ TURNS = {"[": math.radians(5), "]": -math.radians(5), "{": math.radians(45), "}"
 
 
 class Keyboard:
-    """What keys do to a session and its map.
+    """Effect of keys on a session and its map.
 
     Args:
         session: What is edited.

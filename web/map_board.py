@@ -72,7 +72,7 @@ CSS = """
 
 @dataclass(frozen=True, slots=True)
 class HandleEvent:
-    """Something happened to a handle.
+    """Event of a handle.
 
     Attributes:
         type: ``click`` or ``dragend``.

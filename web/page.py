@@ -303,7 +303,8 @@ async def work_aside(work: Callable[[], T]) -> T:
     result: tuple[T] | None = await run.io_bound(wrapped)
     if result is None:
         raise asyncio.CancelledError
-    return result[0]
+    value: T = result[0]
+    return value
 
 
 async def open_page(begin: Callable[[], EditSession]) -> None:

@@ -51,7 +51,7 @@ def edit_map(config: EditConfig, *, progress: Progress) -> list[str]:  # noqa: A
 
 
 class Desk:
-    """What the visitors of one server share: the map, once it could be read."""
+    """State that the visitors of one server share: the map, once it could be read."""
 
     def __init__(self, config: EditConfig) -> None:
         self._config, self._drafts = config, Drafts()

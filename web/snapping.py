@@ -39,7 +39,7 @@ class Snapped:
 
 
 class WallSnapper:
-    """Finds walls near points of one map; coordinates are of the grid's frame [m]."""
+    """Search for walls near points of one map; coordinates are of the grid's frame [m]."""
 
     def __init__(self, grid: OccupancyGrid) -> None:
         self._grid = grid

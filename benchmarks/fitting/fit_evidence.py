@@ -3,7 +3,11 @@
     python benchmarks/fitting/fit_evidence.py FIT [FIT ...] [--ridge 0.001] [--every 1]
 
 FIT are folders of samples, as ``drawn_maps.py`` or ``closedrooms dataset`` write them; a building of another use is
-refused. The weights are those of a log-linear model over the rectangles of a door that expects the largest overlap
+refused. What it found was not taken: with its weights the IoU by door on maps of the use ``choose`` was 0.753 where the
+program's give 0.746 if the maps were drawn, but 0.680 where the program's give 0.688 if they came from simulated runs:
+no gain on both. How the program's were found stands at the head of ``features.py``.
+
+The weights are those of a log-linear model over the rectangles of a door that expects the largest overlap
 (IoU) with the true room, held towards 0 by ``--ridge``, in units of what a feature varies by among the rectangles of a
 door. What is printed beside them was found with other buildings (five folds over groups of buildings).
 """

@@ -109,7 +109,7 @@ def check_regular(path: Path, what: str) -> None:
 
 
 def is_file(path: Path) -> bool:
-    """Check whether a regular file of this name exists; none has a name that the system refuses."""
+    """Check whether a regular file stands at ``path``; ``False`` for a name that the system refuses (too long, NUL)."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -117,7 +117,7 @@ def is_file(path: Path) -> bool:
 
 
 def is_there(path: Path) -> bool:
-    """Check whether anything of this name exists; nothing has a name that the system refuses."""
+    """Check whether anything stands at ``path``; ``False`` for a name that the system refuses (too long, NUL)."""
     try:
         return path.exists()
     except (OSError, ValueError):
@@ -125,7 +125,7 @@ def is_there(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Check whether a folder of this name exists; none has a name that the system refuses."""
+    """Check whether a folder stands at ``path``; ``False`` for a name that the system refuses (too long, NUL)."""
     try:
         return path.is_dir()
     except (OSError, ValueError):

@@ -35,7 +35,7 @@ SAME_YAW = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RosMap:
-    """A map that somebody else made.
+    """A map as read from a ROS map's files, whoever wrote them.
 
     The grid keeps the axes of its picture. Everything that the program works out lies in the frame of the grid, and is
     brought to the map frame where it is written.

@@ -72,7 +72,7 @@ class GraphDraft:
         return np.asarray(next(seen, found[0]))
 
     def add_vertex(self, point: FloatArray, kind: VertexKind) -> int:
-        """Number of a new vertex."""
+        """Add a vertex at ``point``, ``(row, col)`` in continuous cells; returns its number."""
         self.points.append(np.asarray(point, dtype=np.float64))
         self.kinds.append(kind)
         return len(self.points) - 1

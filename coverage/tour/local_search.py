@@ -29,7 +29,7 @@ class LocalSearch:
         self.take(list(tour))
 
     def take(self, tour: list[int]) -> None:
-        """Go on from another tour."""
+        """Replace the present tour by another one over the same vertices."""
         self.tour = tour
         self._number(0, self.n - 1)
 

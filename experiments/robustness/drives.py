@@ -36,7 +36,7 @@ START_CLEAR = 0.6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedDrive:
-    """What ideal sensors saw on one exploration with all doors open.
+    """Observations of ideal sensors on one exploration with all doors open.
 
     Attributes:
         plan: The building.

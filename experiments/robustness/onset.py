@@ -52,7 +52,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class LevelResult:
-    """What one level of a factor does.
+    """Effect of one level of a factor.
 
     Attributes:
         factor: What was disturbed.
@@ -75,7 +75,7 @@ class LevelResult:
 
 @dataclass(frozen=True, slots=True)
 class Onset:
-    """Where a factor starts to hurt.
+    """Level at which a factor starts to hurt.
 
     Attributes:
         factor: What was disturbed.

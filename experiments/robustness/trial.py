@@ -45,12 +45,12 @@ FARTHEST = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Closing:
-    """One set of closed doors in the undisturbed map.
+    """One set of doors of a building, closed: truth, and the map as an undisturbed robot makes it.
 
     Attributes:
-        closed: Door ids.
-        seen: Those that the undisturbed robot saw.
-        clean: The undisturbed map.
+        closed: Ids of the closed doors.
+        seen: Ids of those of them that the undisturbed robot saw.
+        clean: Map of the undisturbed robot.
         truth: M_GT and the hidden rooms, on a frame of 0.05 m.
         open_cells: True free cells that a robot can reach, on that frame.
         wall_distance: Distance of its cells to the next true wall, closed leaf or furniture [m].
@@ -65,7 +65,7 @@ class Closing:
 
 
 class BuildingTrials:
-    """Everything about one building that its trials share."""
+    """Trials of one building, with what they share: plan, sets of closed doors, drives, surveys and erasers."""
 
     def __init__(self, world: str, config: RobustnessConfig) -> None:
         self._config = config

@@ -58,7 +58,7 @@ class OdometryLine:
 
 @dataclass(slots=True)
 class CarmenLog:
-    """What the lines of a log say.
+    """Content of a log's lines.
 
     Attributes:
         scans: By the word that their lines begin with.

@@ -9,7 +9,7 @@ import numpy as np
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import is_file, is_folder, read_head, reading
 from closedrooms.core.remarks import Remark
-from closedrooms.mapping.logs.bag_options import BagOptions
+from closedrooms.mapping.logs.bags.bag_options import BagOptions
 from closedrooms.mapping.logs.recorded_odometry import bridge_jumps, jump_remarks
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 
@@ -62,7 +62,7 @@ def _read(path: Path, options: BagOptions) -> RecordedRun:
     if version and version[1] != ROSBAG:
         raise InvalidInputError(f"a ROS bag {version[1].decode()}", expected="ROS bag 2.0", where=path)
     if version or head.startswith((MCAP, SQLITE)):
-        from closedrooms.mapping.logs.rosbag import read_bag
+        from closedrooms.mapping.logs.bags.rosbag import read_bag
 
         return read_bag(path, options)
     _refuse_options(options, path)

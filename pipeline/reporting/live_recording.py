@@ -11,9 +11,9 @@ from closedrooms.core.room import Room
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.control_loop import Step
 from closedrooms.navigation.explorer import Explorer
-from closedrooms.navigation.opened_doors import ReopenedMap
-from closedrooms.navigation.revised_prediction import Revision
-from closedrooms.navigation.tour_follower import TourFollower
+from closedrooms.navigation.tour.opened_doors import ReopenedMap
+from closedrooms.navigation.tour.revised_prediction import Revision
+from closedrooms.navigation.tour.tour_follower import TourFollower
 from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.pipeline.reporting.scores import room_iou, room_points
 from closedrooms.pipeline.reporting.story import Story
@@ -29,7 +29,7 @@ GROWN = 1.5
 
 
 class GrowingPrediction:
-    """Predicts anew whenever a closed door is first seen, so that a recording shows the prediction grow.
+    """Prediction made anew whenever a closed door is first seen, so that a recording shows how it changes.
 
     With a door known, it also does when what is known has grown by half: else it would stand still for minutes.
     """

@@ -28,7 +28,7 @@ TRACKS = {
 
 
 class LogWatch:
-    """Stands beside ``mapping.map_builder.build_map``: pass it as ``watch``, then call :meth:`finish`."""
+    """Observer of ``mapping.map_builder.build_map``: pass it as ``watch``, then call :meth:`finish`."""
 
     def __init__(self, recorder: "Recorder", run: RecordedRun) -> None:
         self._recorder = recorder

@@ -16,7 +16,7 @@ LONGEST_CELL = 10_000
 
 
 class Progress(Protocol):
-    """Where a long task says what it does and how far it is."""
+    """Receiver of what a long task says of its progress."""
 
     def stage(self, name: str, total: float | None = None) -> None:
         """Begin a stage; ``total`` is its size in any unit, ``None`` where nobody knows."""
@@ -42,7 +42,7 @@ class Silent:
 
 
 class Pace:
-    """How fast a stage goes: what is done of how much, and how long the rest will take."""
+    """Speed of a stage: what is done of how much, and how long the rest will take."""
 
     def __init__(self, name: str, total: float | None, now: float) -> None:
         self.name, self.total = name, total

@@ -22,7 +22,7 @@ from closedrooms.worlds.plan import FloorPlan
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Finding:
-    """What a run finds out; maps on one frame.
+    """Findings of a run; maps on one frame.
 
     Attributes:
         survey: What the robot brought home.

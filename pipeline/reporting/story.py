@@ -23,7 +23,7 @@ QUARTERS = (0.25, 0.5, 0.75)
 
 
 class Story:
-    """Tells the recorder's log what is worth a line; what happens often is told once, then when it has doubled."""
+    """Source of the lines in the recording's log; what happens often is told once, then when it has doubled."""
 
     def __init__(self, recorder: "Recorder", *, floor: FloatArray | None = None, closed: int | None = None) -> None:
         """Begin.
@@ -78,7 +78,7 @@ class Story:
 
         Args:
             doors: All that were seen.
-            stamp: When [s].
+            stamp: Timestamp [s].
             prediction: What is predicted behind them now, where that was asked.
             iou: With the true room, by door, where it is known.
         """

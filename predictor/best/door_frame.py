@@ -64,7 +64,10 @@ class SummedAreaTable:
     col: int = 0
 
     def count(self, v0: IntArray, u0: IntArray, v1: IntArray, u1: IntArray) -> IntArray:
-        """Count the cells set in ``[v0, v1) x [u0, u1)``, clipped to the table; none where that is reversed."""
+        """Count the set cells of the boxes ``[v0, v1) x [u0, u1)``, shape (n,) each, clipped to the table.
+
+        A box whose ends are swapped (``v1 < v0`` or ``u1 < u0``) holds none.
+        """
         rows, cols = self.sums.shape
         v0, u0, v1, u1 = v0 - self.row, u0 - self.col, v1 - self.row, u1 - self.col
         # Twice as quick as np.clip on short arrays.

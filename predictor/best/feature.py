@@ -15,7 +15,7 @@ class Feature(Generic[Measured, Figures]):
     Attributes:
         name: For people.
         measure: The figure, or one for each of what is measured at once.
-        weight: What it counts.
+        weight: Factor of the figure in the score.
     """
 
     name: str

@@ -56,7 +56,10 @@ def gain(t: Together) -> float:
 
 
 def crowd(t: Together) -> float:
-    """Measure how much the rooms of each are expected to overlap: where there is no room for two, there is one."""
+    """Compute the mean expected overlap of two doors' own rooms: where there is no room for two, there is one.
+
+    Overlaps are as :func:`~.pair_features.score_pairs` gives them (0 up, may exceed 1), weighed by probability.
+    """
     lots = list(zip(t.alone, t.weights, strict=True))
     found = [p @ score_pairs(a, b, t.thickness)[1] @ q for (a, p), (b, q) in itertools.combinations(lots, 2)]
     return float(np.mean(found))
@@ -91,7 +94,7 @@ def wall_filled(t: Together) -> float:
 
 
 def log_short_side(t: Together) -> float:
-    """Measure how narrow the room is, by the logarithm of its short side [m]."""
+    """Compute the logarithm of the short side of the room in metres."""
     return float(np.log(t.sides.min()))
 
 
@@ -110,7 +113,7 @@ def corner_closed(t: Together) -> float:
     return t.measured("sides closed", "back closed") * meeting_walls(t)
 
 
-# Weights: logistic regression on ``fit`` (``benchmarks/fitting/fit_shared_rooms.py``).
+# Weights: found by ``benchmarks/fitting/fit_shared_rooms.py``, logistic regression on ``fit``.
 SHARED_FEATURES: tuple[Feature[Together, float], ...] = (
     Feature("always", lambda _: 1.0, weight=1.72),
     Feature("gain", gain, weight=0.089),

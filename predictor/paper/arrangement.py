@@ -96,9 +96,10 @@ def _crossing(a: Line, b: Line) -> FloatArray:
 
 
 def draw_line(line: Line, full: Sequence[Line], centre: FloatArray, reach: float) -> LineString:
-    """Draw a line where it passes ``centre``, ``reach`` both ways: beyond the box, so that no end lies on its edge.
+    """Clip a line to a segment: ``reach`` [m] both ways from its point next to ``centre``, beyond the box.
 
-    A line with a span ends at the last of the ``full`` lines that it crosses before that, and at the first after it.
+    A line with a span is clipped to the last of the ``full`` lines that it crosses before the span, and to the first
+    after it.
     """
     foot = centre - line.distance(centre) * line.normal
     low, high = -reach, reach

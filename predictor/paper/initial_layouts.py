@@ -23,7 +23,7 @@ FARTHEST = 1e9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Start:
-    """What every method starts from.
+    """Faces and initial faces that ``paper``, ``rose`` and the two baselines begin with (``best`` does not).
 
     Attributes:
         grid: The known window of the map, at the working resolution.

@@ -44,7 +44,7 @@ def calibrate_drive(model: RobotModel, robot: RobotConfig, path: Path) -> tuple[
 
 @dataclass(frozen=True, slots=True)
 class _Trial:
-    """How a robot drove: shares of the distance and the turn that its wheels counted, and the largest tilt [rad]."""
+    """Outcome of a drive: shares of the distance and the turn that the wheels counted, and the largest tilt [rad]."""
 
     ahead: float
     turned: float

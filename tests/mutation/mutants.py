@@ -30,7 +30,7 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby, islice, zip_longest
 from pathlib import Path
@@ -57,8 +57,8 @@ LIBRARIES = (
     "PIL.Image", "yaml", "networkx", "hypothesis.extra.numpy", "_pytest.python", "sklearn.cluster",
     "skimage.morphology", "rich.console", "defusedxml.ElementTree",
 )  # fmt: skip
-# Tests that take so many times longer than they did, and some for the start, hang [, s].
-HANGS, START = 4, 30
+# A test that takes so many times longer than it did, and some seconds, hangs; tests that take more memory never end.
+HANGS, MORE, MEMORY = 4, 5.0, 6_000_000_000
 # After this time on a busy machine it cannot be told [s].
 PATIENCE = 1800
 
@@ -84,7 +84,7 @@ class Mutant:
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a mutant, ``killed``, ``survived`` or ``timeout`` (counts for neither side), and by which test."""
+    """Fate of a mutant, ``killed``, ``survived`` or ``timeout`` (counts for neither side), and the test that told."""
 
     module: str
     operator: str
@@ -162,7 +162,7 @@ def _differs(source: str, changed: str) -> bool:
 
 @dataclass(frozen=True)
 class Reach:
-    """What a test of a folder reaches.
+    """Code that a test of a folder reaches.
 
     Attributes:
         test: Its id.
@@ -247,8 +247,7 @@ def fate(root: Path, mutant: Mutant, tests: Sequence[Reach]) -> tuple[str, str]:
         for lot in lots(original, mutant, tests):
             listed = root / "lot.txt"
             listed.write_text("\n".join(lot))
-            usual = sum(test.seconds for test in tests if test.test in lot)
-            status, said = run_tests(root, ["-x", f"@{listed}"], seconds=HANGS * usual + START)
+            status, said = run_tests(root, ["-x", f"@{listed}"], usual={test.test: test.seconds for test in tests})
             if status is None:
                 return "timeout", ""
             if status not in {0, 5}:
@@ -260,7 +259,7 @@ def fate(root: Path, mutant: Mutant, tests: Sequence[Reach]) -> tuple[str, str]:
 
 
 def run_tests(
-    root: Path, words: Sequence[str], *, seen: Path | None = None, seconds: float | None = None
+    root: Path, words: Sequence[str], *, seen: Path | None = None, usual: Mapping[str, float] | None = None
 ) -> tuple[int | None, str]:
     """Run pytest in a child of this process, which has the libraries already.
 
@@ -268,7 +267,7 @@ def run_tests(
         root: The copy of the checkout.
         words: Arguments of pytest.
         seen: Where the plugin ``reached`` writes.
-        seconds: Processor time that it may take.
+        usual: Processor time that each test takes as a rule; the child ends at the first that hangs.
 
     Returns:
         Its status, ``None`` where there was no answer in time, and what it said.
@@ -277,12 +276,13 @@ def run_tests(
         child = os.fork()
         if child == 0:
             try:
-                _become_tests(root, said.fileno(), seen, seconds)
+                _become_tests(root, said.fileno(), seen)
                 import pytest
 
                 # hypothesis, which pytest would rewrite, is imported already.
                 words = ["-W", "ignore::pytest.PytestAssertRewriteWarning", *words]
-                status = int(pytest.main(["-q", "-p", "no:cacheprovider", "-p", "no:xdist", *words]))
+                words = ["-q", "-p", "no:cacheprovider", "-p", "no:xdist", *words]
+                status = int(pytest.main(words, plugins=[] if usual is None else [_Watch(usual)]))
             except BaseException:
                 traceback.print_exc()
                 status = 99
@@ -298,7 +298,20 @@ def run_tests(
         return (os.waitstatus_to_exitcode(ended[1]) if ended[0] else None), said.read()
 
 
-def _become_tests(root: Path, said: int, seen: Path | None, seconds: float | None) -> None:
+class _Watch:
+    """Plugin of pytest: a test that hangs ends the process by SIGPROF."""
+
+    def __init__(self, usual: Mapping[str, float]) -> None:
+        self._usual = usual
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        signal.setitimer(signal.ITIMER_PROF, HANGS * self._usual.get(nodeid, 30.0) + MORE)
+
+    def pytest_runtest_logfinish(self, nodeid: str) -> None:  # noqa: ARG002 (pytest gives it)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+
+
+def _become_tests(root: Path, said: int, seen: Path | None) -> None:
     os.setsid()
     os.dup2(said, 1)
     os.dup2(said, 2)
@@ -310,8 +323,7 @@ def _become_tests(root: Path, said: int, seen: Path | None, seconds: float | Non
     }  # fmt: skip
     # A job in the background of a script ignores Ctrl-C, and so would the tests of it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    if seconds is not None:
-        resource.setrlimit(resource.RLIMIT_CPU, (int(seconds), int(seconds)))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
 
 
 def _warm() -> None:

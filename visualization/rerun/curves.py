@@ -63,7 +63,7 @@ class Curves:
             value: The value.
             name: Of the curve, for people.
             colour: Of the curve.
-            stamp: When [s]; ``None`` where no time goes by.
+            stamp: Timestamp [s]; ``None`` where no time goes by.
             stage: At which stage.
             dots: Mark the values.
         """

@@ -23,7 +23,7 @@ PATH_COLOURS = {"odometry": colours.ODOMETRY, "estimate": colours.ESTIMATE, "tru
 
 
 class RecordedRobot:
-    """What the robot senses and drives, in the map frame [m]; batched where that is cheaper."""
+    """Robot in a recording: what it senses and drives, in the map frame [m]; batched where that is cheaper."""
 
     def __init__(self, stream: RecordingStream, radius: float) -> None:
         self._stream, self._radius = stream, radius

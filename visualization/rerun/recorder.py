@@ -133,7 +133,7 @@ class Recorder:
         self._hold(building=True, door_states=bool(closed), active="Building")
 
     def door_states(self, states: Mapping[str, float], stamp: float) -> None:
-        """Record doors that move."""
+        """Record how far doors are open, by id: 0 closed, 1 open; ``stamp`` is the simulated time [s]."""
         if self._building is not None:
             self._stream.at(stamp, self._stage)
             self._building.move(states)
@@ -289,7 +289,15 @@ class Recorder:
         *,
         iou: Mapping[str, float] | None = None,
     ) -> None:
-        """Record what would be predicted by what is known now, while the robot still explores."""
+        """Record the prediction on the map so far, while the robot still explores.
+
+        Args:
+            observed: The map so far.
+            doors: Closed doors seen so far.
+            prediction: Made of both.
+            stamp: Simulated time [s].
+            iou: Of each room, by door id, where the truth is known.
+        """
         self._stream.at(stamp, self._stage)
         self._draw_prediction(observed, doors, prediction, iou or {}, stamp=stamp)
 

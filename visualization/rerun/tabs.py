@@ -52,7 +52,12 @@ class Contents:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Parts of a recording, and their place: ``bounds`` are ``x_min, y_min, x_max, y_max`` [m] in the map frame."""
+    """Parts that a recording holds, and the extent of the map, to which views are zoomed.
+
+    Attributes:
+        holds: Parts of the recording.
+        bounds: ``x_min, y_min, x_max, y_max`` in the map frame [m].
+    """
 
     holds: Contents
     bounds: Bounds

@@ -152,7 +152,7 @@ def _plan_name(value: Any, path: Path) -> str:
 
 
 class _Reader:
-    """Reads fields and names the element that is wrong."""
+    """Reader of fields that names the element that is wrong."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

@@ -27,7 +27,7 @@ NOTICED = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """What a file holds, to compare the plan with.
+    """Content of a file, to compare the plan with.
 
     Attributes:
         rooms: How many; ``None`` where the format knows no rooms.

@@ -15,7 +15,7 @@ MOST_CLOSED = 15
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """What the generator is asked for.
+    """Request to the generator.
 
     Attributes:
         kind: ``office`` or ``school``.

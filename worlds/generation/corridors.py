@@ -64,7 +64,7 @@ class Skeleton:
 
 @dataclass(frozen=True, slots=True)
 class Measures:
-    """What a building of one kind and size measures [m]."""
+    """Dimensions of a building of one kind and size [m]."""
 
     width: float
     depths: tuple[float, float]

@@ -1,4 +1,7 @@
-"""How often the true cost of coverage lies in the interval that a prediction's completions give."""
+"""How often the true cost of coverage lies in the interval that a prediction's completions give.
+
+Tours are planned with the default ``CoverageConfig``: a robot of 0.20 m radius, whatever drove the sample.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -66,12 +66,12 @@ class SampleResult:
 
 @dataclass(frozen=True, slots=True)
 class Extras:
-    """Work beside predicting and scoring.
+    """Optional work on a sample, beside predicting and scoring.
 
     Attributes:
-        tours: Plan coverage tours, where the sample tells ``|R|``.
-        probability: Write each cell's probability.
-        completions: Tell the cost of coverage from so many completions.
+        tours: Whether to plan coverage tours, where the sample tells how many rooms there are (``|R|``).
+        probability: Whether to write the probability of every cell.
+        completions: Number of completions from which the cost of coverage is estimated; 0 for no estimate.
     """
 
     tours: bool
@@ -217,7 +217,7 @@ class Starts:
         self._found: dict[FacesConfig, tuple[Started, float]] = {}
 
     def of(self, config: FacesConfig) -> tuple[Started, float]:
-        """Find what a method starts from, and the seconds that this took when it was done."""
+        """Find lines, faces and initial faces under these settings, once; returns them and the seconds it took then."""
         from closedrooms.predictor.paper.initial_layouts import start_rooms
 
         faces = FacesConfig(**{item.name: getattr(config, item.name) for item in fields(FacesConfig)})

@@ -19,6 +19,7 @@ from closedrooms.core.files.incoming import (
     read_text,
     reading,
 )
+from closedrooms.core.files.yaml_text import parse_yaml
 
 
 def refusal(path: Path, what: str = "a plan") -> str:
@@ -47,6 +48,19 @@ def test_names_that_no_file_system_takes_are_one_line() -> None:
         with pytest.raises(InvalidInputError):
             read_text(Path(name), what="a plan")
         assert not is_file(Path(name))
+
+
+@pytest.mark.parametrize("ending", ["json", "yaml"])
+@pytest.mark.parametrize("levels", [MAX_DEPTH, MAX_DEPTH + 1])
+def test_the_deepest_nesting_is_read_and_one_level_more_refused(tmp_path: Path, ending: str, levels: int) -> None:
+    path = tmp_path / f"a.{ending}"
+    path.write_text('{"a": ' + "[" * (levels - 1) + "]" * (levels - 1) + "}")
+    read = read_json if ending == "json" else parse_yaml
+    if levels == MAX_DEPTH:
+        assert read(path, what="a plan").keys() == {"a"}
+    else:
+        with pytest.raises(InvalidInputError, match=f"nested {MAX_DEPTH} levels deep"):
+            read(path, what="a plan")
 
 
 @pytest.mark.parametrize("name", ["x" * 300, "a\0b", "circle/below", "gone"])

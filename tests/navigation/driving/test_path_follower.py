@@ -9,7 +9,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.path_follower import Track, free_distance, limit_speed, near_points, steer
+from closedrooms.navigation.driving.path_follower import Track, free_distance, limit_speed, near_points, steer
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
 

@@ -10,7 +10,7 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.path_follower import (
+from closedrooms.navigation.driving.path_follower import (
     Steering,
     Track,
     free_distance,
@@ -38,7 +38,7 @@ CRAWL, SHORT_LOOKAHEAD = 0.08, 0.25
 
 
 class Driver:
-    """Follows one path at a time.
+    """Follower of one path at a time, with recoveries.
 
     Attributes:
         state: What the last command was about; ``stuck`` is reported once, before the recovery begins.

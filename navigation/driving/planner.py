@@ -9,7 +9,7 @@ import numpy as np
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.door import Point
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.costmap import Costmap, Field, traversable
+from closedrooms.navigation.driving.costmap import Costmap, Field, traversable
 
 # How far the robot's own estimate may lie inside an obstacle's margin before no path can start [m].
 START_RADIUS = 0.8

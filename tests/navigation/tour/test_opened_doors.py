@@ -4,7 +4,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.navigation.opened_doors import ReopenedMap
+from closedrooms.navigation.tour.opened_doors import ReopenedMap
 
 # A corridor along x, 2 m wide; in its upper wall at y = 1 a door from x = 2.05 to x = 2.95, a room of 3 m behind it.
 DOOR = ClosedDoor("d00", (2.5, 1.0), ((2.05, 1.0), (2.95, 1.0)), 0.9)

@@ -22,8 +22,8 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.control_loop import LoopLog, run_loop
-from closedrooms.navigation.opened_doors import ReopenedMap
-from closedrooms.navigation.tour_follower import TourFollower, TourOutcome, TourPlan
+from closedrooms.navigation.tour.opened_doors import ReopenedMap
+from closedrooms.navigation.tour.tour_follower import TourFollower, TourOutcome, TourPlan
 from closedrooms.predictor.inpainting import inpaint
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction
@@ -43,7 +43,7 @@ class Driven:
 
 
 class CellWorld:
-    """Walls are cells, the door is a row of them; the robot is a disc that stops at both."""
+    """World whose walls are cells, its door a row of them; the robot is a disc that stops at both."""
 
     period = 0.1
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.met_obstacles import BARRIER_STEP, barrier
+from closedrooms.navigation.driving.met_obstacles import BARRIER_STEP, barrier
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
 METRES = st.floats(-20.0, 20.0)

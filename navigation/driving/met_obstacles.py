@@ -9,7 +9,7 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.path_follower import near_points
+from closedrooms.navigation.driving.path_follower import near_points
 
 # Scan points this close to the footprint of a stuck robot are what holds it [m].
 TOUCHING = 0.12

@@ -90,7 +90,7 @@ def _nanoseconds(stamp: float) -> int:
 
 
 class _Messages:
-    """Makes messages of ROS 2."""
+    """Maker of ROS 2 messages."""
 
     def __init__(self) -> None:
         from rosbags.typesys import Stores, get_typestore

@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.mapping.logs import bag_limits, read_run
+from closedrooms.mapping.logs import read_run
+from closedrooms.mapping.logs.bags import bag_limits
 
 rosbags = pytest.importorskip("rosbags", reason="the optional extra 'bags' is not installed")
 

@@ -9,7 +9,7 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import wrap_angle
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.logs.transform_tree import Mount
+from closedrooms.mapping.logs.bags.transform_tree import Mount
 
 LARGEST_VIEW = 2.0 * math.pi + 0.1
 """No sweep looks further around [rad], one beam and rounding more than a turn."""

@@ -9,7 +9,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import mark_doorways
-from closedrooms.navigation.prediction_monitor import SURPRISE, PredictionMonitor, difference
+from closedrooms.navigation.tour.prediction_monitor import SURPRISE, PredictionMonitor, difference
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.predictor.revision import Predict, overlay, update
 
@@ -22,11 +22,11 @@ COMPARE_INTERVAL = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Revision:
-    """What was learnt at one time.
+    """Knowledge gained at one time.
 
     Attributes:
         doors: Doors of the rooms that were looked into since the revision before; empty where only walls moved.
-        stamp: When [s].
+        stamp: Timestamp [s].
         before: All rooms as predicted before.
         after: All rooms as revised.
         changed: Doors of the rooms whose shape changed, looked into or beside such.

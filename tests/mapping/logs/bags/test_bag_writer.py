@@ -7,11 +7,11 @@ import pytest
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.logs.bag_options import BagOptions
-from closedrooms.mapping.logs.bag_writer import START, write_bag
-from closedrooms.mapping.logs.clicked_points import is_bag, read_clicked_points
+from closedrooms.mapping.logs.bags.bag_options import BagOptions
+from closedrooms.mapping.logs.bags.bag_writer import START, write_bag
+from closedrooms.mapping.logs.bags.clicked_points import is_bag, read_clicked_points
+from closedrooms.mapping.logs.bags.rosbag import read_bag
 from closedrooms.mapping.logs.recorded_run import RecordedRun
-from closedrooms.mapping.logs.rosbag import read_bag
 
 rosbags = pytest.importorskip("rosbags", reason="the optional extra 'bags' is not installed")
 MOUNT = (0.12, -0.03, 0.4)

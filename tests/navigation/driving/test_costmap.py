@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.costmap import Costmap, NavigationMap, pooled
+from closedrooms.navigation.driving.costmap import Costmap, NavigationMap, pooled
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
 

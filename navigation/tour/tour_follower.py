@@ -13,15 +13,15 @@ from closedrooms.core.room import Room
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.costmap import NavigationMap
 from closedrooms.navigation.decider import Decider, Situation
-from closedrooms.navigation.met_obstacles import touching_points
-from closedrooms.navigation.path_back import cells_near, path_back
-from closedrooms.navigation.path_check import fits_along
-from closedrooms.navigation.planner import plan_path, reachable_cells
-from closedrooms.navigation.prediction_monitor import changed_rooms
-from closedrooms.navigation.remaining_tour import VISITED, RemainingTour
-from closedrooms.navigation.revised_prediction import RevisedPrediction, Revision
+from closedrooms.navigation.driving.costmap import NavigationMap
+from closedrooms.navigation.driving.met_obstacles import touching_points
+from closedrooms.navigation.driving.path_back import cells_near, path_back
+from closedrooms.navigation.driving.path_check import fits_along
+from closedrooms.navigation.driving.planner import plan_path, reachable_cells
+from closedrooms.navigation.tour.prediction_monitor import changed_rooms
+from closedrooms.navigation.tour.remaining_tour import VISITED, RemainingTour
+from closedrooms.navigation.tour.revised_prediction import RevisedPrediction, Revision
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.predictor.revision import Predict
 
@@ -42,7 +42,7 @@ MAX_LAST_LOOKS = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TourPlan:
-    """What is to be driven.
+    """Tour to be driven.
 
     Attributes:
         prediction: The completed map that the tour was planned on.
@@ -59,7 +59,7 @@ class TourPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TourOutcome:
-    """What became of a tour.
+    """Outcome of a driven tour.
 
     Attributes:
         prediction: As it stands at the end.
@@ -77,7 +77,7 @@ class TourOutcome:
 
 
 class TourFollower(Decider):
-    """Decides where to drive next on a coverage tour.
+    """Decider that follows a coverage tour.
 
     Attributes:
         status: How it ended, ``None`` before: ``complete`` when every vertex was visited or found to be out of reach.

@@ -7,7 +7,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import is_folder
 from closedrooms.core.remarks import Remark
-from closedrooms.mapping.logs.rosbag import opened_bag
+from closedrooms.mapping.logs.bags.rosbag import opened_bag
 
 POINT = "geometry_msgs/msg/PointStamped"
 BAGS = {".mcap", ".db3", ".bag"}

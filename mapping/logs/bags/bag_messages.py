@@ -8,9 +8,9 @@ from typing import Any
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
-from closedrooms.mapping.logs.bag_options import BagOptions
-from closedrooms.mapping.logs.bag_scans import ECHOES, SCAN
-from closedrooms.mapping.logs.transform_tree import TransformTree, clean_name, transform_matrix
+from closedrooms.mapping.logs.bags.bag_options import BagOptions
+from closedrooms.mapping.logs.bags.bag_scans import ECHOES, SCAN
+from closedrooms.mapping.logs.bags.transform_tree import TransformTree, clean_name, transform_matrix
 
 ODOMETRY = "nav_msgs/msg/Odometry"
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
@@ -19,7 +19,7 @@ MAX_SCANS = 2_000_000
 
 @dataclass(slots=True)
 class BagMessages:
-    """What was read, in the order of the bag; each with the time of its recording [s].
+    """Messages of a bag, in their order there; each with the time of its recording [s].
 
     Attributes:
         scans: Messages of the scans.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BagOptions:
-    """What to take from a bag, and what it does not say; options of ``map``, which reads other logs too.
+    """Choice of topics and frames, and facts that a bag lacks; options of ``map``, which reads other logs too.
 
     Attributes:
         scan_topic: Topic of the scans, where it holds several.

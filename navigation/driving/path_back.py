@@ -10,8 +10,8 @@ import numpy as np
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import Point
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.costmap import Costmap, traversable
-from closedrooms.navigation.planner import start_cell
+from closedrooms.navigation.driving.costmap import Costmap, traversable
+from closedrooms.navigation.driving.planner import start_cell
 
 # How far from a place the robot may end up where it does not fit on the place itself [m].
 GOAL_RADIUS = 0.4

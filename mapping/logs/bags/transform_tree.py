@@ -25,7 +25,7 @@ MOST_TILT = math.radians(15.0)
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """Where a lidar sits: its pose in the plane of the robot, and whether its z axis points down."""
+    """Mounting of a lidar: its pose in the plane of the robot, and whether its z axis points down."""
 
     pose: Pose2
     upside_down: bool
@@ -82,11 +82,16 @@ class TransformTree:
         return {name for pair in self._links for name in pair}
 
     def find(self, name: str, *, beside: str = "") -> str | None:
-        """Find the frame of that name, else the only one of that name under another prefix or namespace.
+        """Find a frame by its name: the exact one, else the only one that ends in it (or that it ends in).
+
+        Where none does, ``base_link`` stands for ``base_footprint`` and the other way round (REP-120).
 
         Args:
             name: As a message says it.
-            beside: A frame whose prefix is preferred, where several fit.
+            beside: A frame whose prefix decides where several end in the name.
+
+        Returns:
+            Name of the frame in the tree; ``None`` where none fits, or several do.
         """
         name, frames = clean_name(name), self.frames
         if name in frames:
@@ -105,7 +110,7 @@ class TransformTree:
         return twins[0] if len(twins) == 1 else None
 
     def rigid(self, start: str) -> dict[str, FloatArray]:
-        """Collect all frames that do not move against ``start``, each with ``start_T_frame``, shape (4, 4)."""
+        """Collect all frames rigidly connected to ``start``, each with ``start_T_frame``, shape (4, 4)."""
         reached = {start: np.eye(4)}
         waiting = deque([start])
         while waiting:
@@ -117,7 +122,7 @@ class TransformTree:
         return reached
 
     def _steady_neighbours(self, name: str) -> Iterator[tuple[str, FloatArray]]:
-        """Yield the frames that are fixed to a frame, with the transform there, (4, 4)."""
+        """Yield the frames that are rigidly connected to a frame by one transform, with it, shape (4, 4)."""
         for (parent, child), link in self._links.items():
             if not (link.static or (link.steady and not _drifts(parent, child))):
                 continue
@@ -182,7 +187,11 @@ class TransformTree:
         return roots[0] if roots else None
 
     def odometry(self, lidar: str) -> "TransformOdometry | None":
-        """Find the transform by which the odometry moves the robot that carries the lidar."""
+        """Find the transform by which the odometry moves the robot that carries the lidar.
+
+        Returns:
+            Its track; ``None`` where the lidar's frame is unknown or no moving transform is an odometry's.
+        """
         frame = self.find(lidar)
         if frame is None:
             return None
@@ -250,7 +259,7 @@ def _planar(matrix: FloatArray) -> tuple[float, float, float]:
 
 
 def clean_name(name: str) -> str:
-    """Strip from a frame's name the slash that old tf began it with."""
+    """Strip blanks, then slashes, from both ends of a frame's name: old tf began names with a slash."""
     return name.strip().strip("/")
 
 

@@ -6,7 +6,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.driver import Driver
+from closedrooms.navigation.driving.driver import Driver
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
 PATH = np.array([(0.0, 0.0), (3.0, 0.0)])

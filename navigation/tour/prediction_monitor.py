@@ -26,7 +26,7 @@ CHANGED = 0.5
 
 
 class PredictionMonitor:
-    """Compares the map with the prediction and remembers since when they have been as they are."""
+    """Comparison of the map with the prediction over time: since when they have been as they are."""
 
     def __init__(self) -> None:
         self._known_before: dict[str, float] | None = None

@@ -5,7 +5,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.costmap import clearance_field
+from closedrooms.navigation.driving.costmap import clearance_field
 
 
 def fits_along(grid: OccupancyGrid, points: FloatArray, config: RobotNavigation) -> bool:

@@ -15,14 +15,20 @@ from closedrooms.core.files.incoming import check_regular, is_file, is_folder, r
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.logs.bag_limits import limited
-from closedrooms.mapping.logs.bag_messages import MAX_SCANS, BagMessages, choose_connections, read_messages, stamp_of
-from closedrooms.mapping.logs.bag_options import BagOptions
-from closedrooms.mapping.logs.bag_scans import ranges_of, scan_of, sector_of
+from closedrooms.mapping.logs.bags.bag_limits import limited
+from closedrooms.mapping.logs.bags.bag_messages import (
+    MAX_SCANS,
+    BagMessages,
+    choose_connections,
+    read_messages,
+    stamp_of,
+)
+from closedrooms.mapping.logs.bags.bag_options import BagOptions
+from closedrooms.mapping.logs.bags.bag_scans import ranges_of, scan_of, sector_of
+from closedrooms.mapping.logs.bags.transform_tree import Mount, TransformTree, clean_name
 from closedrooms.mapping.logs.clocks import Times, forward, scan_and_odometry_times
 from closedrooms.mapping.logs.recorded_odometry import bridge_jumps, jump_remarks, odometry_at
 from closedrooms.mapping.logs.recorded_run import RecordedRun
-from closedrooms.mapping.logs.transform_tree import Mount, TransformTree, clean_name
 
 SUFFIXES = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite": ".db3"}
 """What the files of a bag begin with, and how their names should end."""

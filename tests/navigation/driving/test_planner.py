@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.costmap import Costmap, NavigationMap
-from closedrooms.navigation.planner import Path, plan_path, reachable_cells
+from closedrooms.navigation.driving.costmap import Costmap, NavigationMap
+from closedrooms.navigation.driving.planner import Path, plan_path, reachable_cells
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
 

@@ -12,7 +12,7 @@ from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.coverage.config import CoverageConfig, GraphConfig
 from closedrooms.coverage.graph.line_of_sight import is_clear
 from closedrooms.coverage.tour.tour_planner import plan_coverage
-from closedrooms.navigation.remaining_tour import RemainingTour, open_tour
+from closedrooms.navigation.tour.remaining_tour import RemainingTour, open_tour
 
 FRAME = GridFrame(0.05, 0.0, 0.0, 170, 300)
 PLAIN = CoverageConfig(graph=GraphConfig(clutter_filter=False))
