@@ -1,6 +1,6 @@
 """Shapes: how much two overlap; which cells of a grid one holds, its outline passes, and which lie in doorways."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import shapely
@@ -29,35 +29,43 @@ def cells_inside(shape: Shape, frame: GridFrame) -> BoolArray:
     return mask
 
 
-def fill_shape(shape: Shape, frame: GridFrame, mask: BoolArray) -> None:
-    """Mark the cells of a frame whose centre lies in a shape, on a mask that may hold others.
+def fill_shape(shape: BaseGeometry, frame: GridFrame, mask: BoolArray) -> None:
+    """Mark the cells of a frame whose centre lies in a shape: :func:`fill_shapes` of one."""
+    fill_shapes([shape], frame, mask)
 
-    Row by row: from its first side to its second, third to fourth, ... A centre on an upright side does not lie in it;
-    on a slanted one rounding decides.
+
+def fill_shapes(shapes: Iterable[BaseGeometry], frame: GridFrame, mask: BoolArray) -> None:
+    """Mark the cells of a frame whose centre lies in one of some areas, on a mask that may hold others.
+
+    A centre on an outline lies in the area above it, or to its right: areas that touch leave no gap and share no cell.
 
     Args:
-        shape: Metres, in the coordinates of the frame.
+        shapes: Areas, may overlap; metres, in the coordinates of the frame.
         frame: Of the mask.
         mask: Added to.
     """
-    if shape.is_empty:
+    polygons = [part for shape in shapes for part in shapely.get_parts(shape) if not part.is_empty]
+    rings = [frame.to_corners(ring) for polygon in polygons for ring in _oriented_rings(polygon)]
+    if not rings:
         return
-    x = frame.to_points(np.stack((np.zeros(frame.cols, dtype=np.int64), np.arange(frame.cols)), axis=-1))[:, 0]
-    y = frame.to_points(np.stack((np.arange(frame.rows), np.zeros(frame.rows, dtype=np.int64)), axis=-1))[:, 1]
-    low, high = _sides(shape)
-    # Rows that each side crosses: its lower end belongs to it, its upper one does not.
-    first, after = np.searchsorted(y, low[:, 1]), np.searchsorted(y, high[:, 1])
-    side = np.repeat(np.arange(len(low)), after - first)
-    row = np.arange(side.size) - np.repeat(np.cumsum(after - first) - after, after - first)
-    rise = (y[row] - low[side, 1]) / (high[side, 1] - low[side, 1])
-    crossing = low[side, 0] + rise * (high[side, 0] - low[side, 0])
-    order = np.lexsort((crossing, row))
-    row, crossing = row[order], crossing[order]
-    left, right = np.searchsorted(x, crossing[::2], side="right"), np.searchsorted(x, crossing[1::2])
-    # A centre on the outline does not lie in the shape: rows through corners may run along a side.
-    corner = np.isin(y[row[::2]], shapely.get_coordinates(shape)[:, 1])
-    for r, c0, c1, asked in zip(row[::2].tolist(), left.tolist(), right.tolist(), corner.tolist(), strict=True):
-        mask[r, c0:c1] |= shapely.contains_xy(shape, x[c0:c1], y[r]) if asked else True
+    starts, ends = (np.concatenate([ring[part] for ring in rings]) for part in (slice(-1), slice(1, None)))
+    (x0, y0), (x1, y1) = starts.T, ends.T
+    # Rows whose centre line the edge crosses: half open, so that a shared corner counts once.
+    first = np.clip(np.ceil(np.minimum(y0, y1) - 0.5), 0, frame.rows).astype(np.int64)
+    last = np.clip(np.ceil(np.maximum(y0, y1) - 0.5), 0, frame.rows).astype(np.int64)
+    count = np.maximum(last - first, 0)
+    edge = np.repeat(np.arange(count.size), count)
+    row = first[edge] + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    x = x0[edge] + (row + 0.5 - y0[edge]) * ((x1 - x0)[edge] / (y1 - y0)[edge])
+    col = np.clip(np.ceil(x - 0.5), 0, frame.cols).astype(np.int64)
+    # Outer rings run counter-clockwise: going right one enters an area where its outline goes down.
+    turn = np.where(y1 < y0, 1.0, -1.0)[edge]
+    if not row.size:
+        return
+    (r0, c0), (r1, c1) = (row.min(), col.min()), (row.max() + 1, col.max() + 1)
+    winding = np.zeros((r1 - r0, c1 - c0))
+    np.add.at(winding, (row - r0, col - c0), turn)
+    mask[r0:r1, c0:c1] |= (np.cumsum(winding, axis=1) > 0.5)[:, : frame.cols - c0]
 
 
 def mark_doorways(doors: Sequence[ClosedDoor], frame: GridFrame, *, reach: float) -> BoolArray:
@@ -93,12 +101,10 @@ def trace_outline(shape: Shape, frame: GridFrame, mask: BoolArray) -> None:
             mask[cells[:, 0], cells[:, 1]] = True
 
 
-def _sides(shape: Shape) -> tuple[FloatArray, FloatArray]:
-    """Find the lower and the upper end of every side of a shape that is not level [m], shape (n, 2) each."""
-    points, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(shape)), return_index=True)
-    same = ring[1:] == ring[:-1]
-    start, end = points[:-1][same], points[1:][same]
-    upward = (start[:, 1] < end[:, 1])[:, None]
-    low, high = np.where(upward, start, end), np.where(upward, end, start)
-    slanted = low[:, 1] < high[:, 1]
-    return low[slanted], high[slanted]
+def _oriented_rings(polygon: Polygon) -> list[FloatArray]:
+    """List the rings of a polygon, the outer one to the left and holes to the right around, shape (n, 2) each."""
+    rings = []
+    for number, ring in enumerate([polygon.exterior, *polygon.interiors]):
+        points = shapely.get_coordinates(ring)
+        rings.append(points if ring.is_ccw == (number == 0) else points[::-1])
+    return rings

@@ -12,6 +12,7 @@ from closedrooms.core.door import Point
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
+from closedrooms.core.shapes import fill_shapes
 from closedrooms.worlds.closing import hidden_rooms
 from closedrooms.worlds.geometry import LEAF_THICKNESS, WallAxes, areal, rectangles, room_interiors, wall_area
 from closedrooms.worlds.plan import FloorPlan
@@ -37,37 +38,10 @@ def rasterise(plan: FloorPlan, frame: GridFrame, map_T_world: Pose2) -> Occupanc
 
 
 def _fill(areas: Iterable[BaseGeometry], frame: GridFrame, map_T_world: Pose2) -> BoolArray:
-    """Mark cells whose centre lies in one of ``areas`` (building frame); areas that touch leave no gap."""
-    polygons = [p for area in areas for p in shapely.get_parts(area) if not p.is_empty]
-    rings = [ring for p in polygons for ring in _oriented_rings(p)]
-    if not rings:
-        return np.zeros(frame.shape, dtype=np.bool_)
-    starts = np.concatenate([frame.to_corners(map_T_world.transform(ring[:-1])) for ring in rings])
-    ends = np.concatenate([frame.to_corners(map_T_world.transform(ring[1:])) for ring in rings])
-    (x0, y0), (x1, y1) = starts.T, ends.T
-    # Rows whose centre line the edge crosses: half open, so that a shared corner counts once.
-    first = np.clip(np.ceil(np.minimum(y0, y1) - 0.5), 0, frame.rows).astype(np.int64)
-    last = np.clip(np.ceil(np.maximum(y0, y1) - 0.5), 0, frame.rows).astype(np.int64)
-    count = np.maximum(last - first, 0)
-    edge = np.repeat(np.arange(count.size), count)
-    row = first[edge] + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    x = x0[edge] + (row + 0.5 - y0[edge]) * ((x1 - x0)[edge] / (y1 - y0)[edge])
-    col = np.clip(np.ceil(x - 0.5), 0, frame.cols).astype(np.int64)
-    # Shells run counter-clockwise: going right one enters an area where its boundary goes down.
-    turn = np.where(y1 < y0, 1.0, -1.0)[edge]
-    width = frame.cols + 1
-    winding = np.bincount(row * width + col, weights=turn, minlength=frame.rows * width)
-    inside: BoolArray = np.cumsum(winding.reshape(frame.rows, width), axis=1)[:, :-1] > 0.5
-    return inside
-
-
-def _oriented_rings(polygon: Polygon) -> list[np.ndarray]:
-    """List the rings of a polygon, the outer one to the left and holes to the right around, shape (n, 2) each."""
-    rings = []
-    for number, ring in enumerate([polygon.exterior, *polygon.interiors]):
-        points = shapely.get_coordinates(ring)
-        rings.append(points if ring.is_ccw == (number == 0) else points[::-1])
-    return rings
+    """Mark cells whose centre lies in one of ``areas`` (building frame)."""
+    mask = np.zeros(frame.shape, dtype=np.bool_)
+    fill_shapes([shapely.transform(area, map_T_world.transform) for area in areas], frame, mask)
+    return mask
 
 
 def true_rooms(plan: FloorPlan, closed: Collection[str], map_T_world: Pose2) -> list[Room]:

@@ -27,9 +27,19 @@ def _filled(shape, resolution):
 
 @given(boxes(), st.sampled_from([1.0, 0.5]))
 @settings(max_examples=100, deadline=None)
-def test_upright_sides_fill_the_cells_whose_centre_lies_inside_of_them(shape, resolution):
+def test_upright_sides_fill_the_cells_whose_centre_lies_inside_or_on_the_left_or_lower_side(shape, resolution):
     mask, points = _filled(shape, resolution)
-    assert (mask == shapely.contains(shape, points)).all()
+    x, y = shapely.get_x(points), shapely.get_y(points)
+    assert (mask == shapely.contains_xy(shape, x + 1e-7, y + 1e-7)).all()
+
+
+@given(boxes(), PLACES, st.booleans(), st.sampled_from([1.0, 0.5]))
+@settings(max_examples=100, deadline=None)
+def test_a_shape_that_is_cut_in_two_shares_its_cells_out(shape, at, upright, resolution):
+    ends = (at, 99) if upright else (99, at)
+    sides = shapely.box(-99, -99, *ends), shapely.box(99, 99, -99 if not upright else at, at if not upright else -99)
+    masks = [_filled(shape.intersection(side).buffer(0), resolution)[0] for side in sides]
+    assert (np.sum(masks, axis=0) == _filled(shape, resolution)[0]).all()
 
 
 @given(HULLS, st.sampled_from([1.0, 0.5]))
