@@ -29,8 +29,9 @@ LEAST_DRAWN = 100
 # Drawn is what differs from the commonest colour by so much in any channel; in plots, whose axes are grey, what has
 # colour: channels apart by so much.
 DIFFERS, COLOURED = 24, 48
-# Columns of a plot with colour in them, at least: the mark of a legend takes ten, a curve or bars hundreds [pixels].
-LEAST_COLUMNS = 24
+# Columns of a plot with colour in them, at least: the mark of a legend takes ten; a curve along the upper edge shows
+# only its rise [pixels].
+LEAST_COLUMNS = 14
 # Three dots in the upper right corner of a view say that it is still being loaded [pixels].
 LOADING = (64, 24)
 # The headless window: menu, bar of tabs or title of a view, collapsed time panel, and what of a view may
