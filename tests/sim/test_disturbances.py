@@ -7,17 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from shapely.geometry import Point, box
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
 from closedrooms.sim.building import building_solids
 from closedrooms.sim.config import Body, FaultConfig, SimConfig, noise_level
-from closedrooms.sim.glass import comes_back, glazed
+from closedrooms.sim.glass import comes_back, glass_area, glazed
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.formats.native import read_plan, write_plan
 from closedrooms.worlds.geometry import wall_area
-from closedrooms.worlds.plan import FloorPlan
+from closedrooms.worlds.plan import FloorPlan, PlanRoom, Wall
 
 QUIET = noise_level("none")
 DOORS = ["hinged", "double", "sliding"]
@@ -221,3 +222,17 @@ def test_disturbances_that_make_no_sense_are_refused() -> None:
     ):
         with pytest.raises(InvalidInputError):
             make()
+
+
+def test_a_plan_of_glass_alone_is_glass_all_over_and_other_walls_that_meet_it_stay_whole() -> None:
+    walls = tuple(Wall(f"w{i}", segment, 0.2) for i, segment in enumerate((((0, 0), (4, 0)), ((4, 0), (4, 3)))))
+    room = PlanRoom("r0", "hall", shapely.box(0, 0, 4, 3))
+    plan = FloorPlan(name="l", rooms=(room,), walls=walls, doors=(), openings=(), start=(1.0, 1.0, 0.0))
+    solid = shapely.box(-1, -1, 5, 4)
+    all_glass = dataclasses.replace(plan, walls=tuple(dataclasses.replace(w, material="glass") for w in walls))
+    both = glass_area(all_glass, solid).area
+    one = glass_area(with_glass(plan, "w0"), solid).area
+    # Two strips, 4 and 3 m by 0.2 m, that share a corner of 0.1 x 0.1 m.
+    assert both == pytest.approx(0.8 + 0.6 - 0.01)
+    assert one == pytest.approx(0.8 - 0.01)
+    assert glass_area(plan, solid).is_empty
