@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
@@ -38,6 +38,8 @@ SOLID = 0.10
 """Distance from a solid surface up to which what was seen through is its noise [m]."""
 FRAME = 0.7
 """How far beyond what was hit a pane goes on up to the solid wall in its line [m]: less than a door is wide."""
+MARGIN = 0.10
+"""How far a pane goes on in any case [m]: two cells, or beams slip through between its end and the wall."""
 FARTHEST = 2.0
 """How far beyond what was hit a pane goes on at most, all in all [m]."""
 SAMPLES = 16
@@ -221,7 +223,7 @@ class Panes:
                 inside = ((cells >= 0) & (cells < np.array(frame.shape))).all(axis=1)
                 if occupied[cells[inside, 0], cells[inside, 1]].any() or np.hypot(*(may_be - place).T).min() < step:
                     solid = float(t)
-            ends.append(end + solid * direction)
+            ends.append(end + (solid + MARGIN) * direction)
         return np.array(ends)
 
 
@@ -304,14 +306,14 @@ def _line(places: FloatArray) -> FloatArray | None:
     length = float(np.ptp(t))
     if length < LENGTH or spread[1] / math.sqrt(len(places)) > THICK:
         return None
-    return middle + np.outer([t.min(), t.max()], axes[0])
+    return np.asarray(middle + np.outer([t.min(), t.max()], axes[0]))
 
 
 def _like(line: FloatArray, others: FloatArray) -> FloatArray | None:
     """Find the pane that has nearly the same ends, in either order."""
     for other in others:
         if min(np.abs(line - other).max(), np.abs(line - other[::-1]).max()) < CHANGED:
-            return other
+            return np.asarray(other)
     return None
 
 
@@ -338,15 +340,14 @@ def before_glass(beams: Beams, map_T_robot: Pose2, segments: FloatArray) -> Beam
 def _cut(points: FloatArray, origin: FloatArray, segments: FloatArray) -> FloatArray:
     """Move points that lie behind a segment, seen from ``origin``, onto it; shape (n, 2)."""
     result = points - origin
-    for a, b in segments - origin:
-        turn = a[0] * b[1] - a[1] * b[0]
-        if turn < 0.0:
-            a, b, turn = b, a, -turn
+    for ends in segments - origin:
+        turn = float(ends[0, 0] * ends[1, 1] - ends[0, 1] * ends[1, 0])
+        a, b = ends if turn >= 0.0 else ends[::-1]
         x, y = result[:, 0], result[:, 1]
         within = np.flatnonzero((a[0] * y - a[1] * x > 0.0) & (x * b[1] - y * b[0] > 0.0))
         # The beam to p meets the line through a and b at t p.
         beam = result[within]
-        t = turn / (beam[:, 0] * (b[1] - a[1]) - beam[:, 1] * (b[0] - a[0]))
+        t = abs(turn) / (beam[:, 0] * (b[1] - a[1]) - beam[:, 1] * (b[0] - a[0]))
         crossed = (t > 0.0) & ((1.0 - t) * np.hypot(*beam.T) > DEPTH)
         result[within[crossed]] *= t[crossed, None]
     moved: FloatArray = result + origin

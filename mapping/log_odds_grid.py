@@ -161,7 +161,7 @@ class EvidenceGrid:
             places = hits * self._percent.shape[1]
             places += passes.astype(np.int32)
             self._cells[rows, cols] = self._percent.ravel().take(places)
-            self._dirty, self._redrawn = None, self._dirty
+            self._redrawn, self._dirty = self._dirty, None
         cells = self._cells.copy()
         cells.flags.writeable = False  # so that it is not copied again
         self._grid = OccupancyGrid(self._lattice.frame, cells)

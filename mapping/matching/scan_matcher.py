@@ -17,11 +17,6 @@ from closedrooms.mapping.motion import UncertainMotion
 ADVANTAGE = 0.03
 """Mean likelihood by which a searched pose must beat the refined odometry to replace it."""
 
-TOLD = 0.06
-"""Share of the surfaces seen that must lie across a direction for the scan to tell how far the robot went in it."""
-SAME_SURFACE = 0.5
-"""Largest step from point to point along a surface [m]."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Match:
@@ -81,7 +76,7 @@ def match_scan(
         start = search_heading(field, points, guess, sigma_angle, config.window_sigmas)
     direct = refined(start)
     if direct.score >= doubted and motion.unmeasured is None:
-        return Match(_held(direct.pose, guess, points, sigma_distance), direct.score, direct.hessian)
+        return Match(direct.pose, direct.score, direct.hessian)
     if motion.unmeasured is None:
         window = SearchWindow(
             min(max(config.window_sigmas * sigma_distance, 3 * field.lattice.resolution), config.max_window),
@@ -99,33 +94,3 @@ def match_scan(
     if best.score < config.lost_score:
         return None
     return Match(best.pose, best.score, best.hessian)
-
-
-def _held(pose: Pose2, guess: Pose2, points: FloatArray, sigma: float) -> Pose2:
-    """Hold a match to what the odometry leaves open in a direction that next to nothing in the scan tells.
-
-    Along a corridor a few points tell how far the robot went. Where they are somebody who walks ahead of it, as fast as
-    it drives, the best match has it stand still (solution remapping in degenerate directions, after Zhang, Kaess and
-    Singh, ICRA 2016).
-
-    Args:
-        pose: As matched, ``map_T_robot``.
-        guess: As the odometry says.
-        points: Scan points in the robot frame, in beam order, about equally far apart, shape (n, 2) [m].
-        sigma: Standard deviation of the odometry [m].
-    """
-    dx, dy = pose.x - guess.x, pose.y - guess.y
-    if dx * dx + dy * dy <= sigma * sigma:
-        return pose
-    steps = np.diff(points, axis=0)
-    lengths = np.hypot(steps[:, 0], steps[:, 1])
-    along = steps[lengths < SAME_SURFACE] / np.maximum(lengths[lengths < SAME_SURFACE], 1e-9)[:, None]
-    # A point tells the place across its surface: the direction that most surfaces lie along is the one least told.
-    values, axes = np.linalg.eigh(along.T @ along)
-    if values[0] >= TOLD * values.sum():
-        return pose
-    c, s = math.cos(pose.theta), math.sin(pose.theta)
-    ux, uy = c * axes[0, 1] - s * axes[1, 1], s * axes[0, 1] + c * axes[1, 1]
-    off = dx * ux + dy * uy
-    back = off - min(max(off, -sigma), sigma)
-    return Pose2(pose.x - back * ux, pose.y - back * uy, pose.theta)
