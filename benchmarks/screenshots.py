@@ -6,10 +6,13 @@ views are empty: what a view shows between its frame and its title is one colour
 """
 
 import contextlib
+import os
+import signal
 import socket
+import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -26,11 +29,13 @@ LEAST_DRAWN = 100
 # Drawn is what differs from the commonest colour by so much in any channel; in plots, whose axes are grey, what has
 # colour: channels apart by so much.
 DIFFERS, COLOURED = 24, 48
-# The headless window of 1920 x 1080: menu, bar of tabs or title of a view, collapsed time panel, and what of a view may
+# The headless window: menu, bar of tabs or title of a view, collapsed time panel, and what of a view may
 # belong to the line between two [pixels].
 MENU, BAR, TIME_PANEL, EDGE = 38, 28, 29, 4
 # How often a picture is asked for before the viewer counts as gone.
 TRIES = 5
+# How long a viewer may take to start and to load [s], and between two questions.
+LONGEST_START, PAUSE = 120.0, 0.2
 Area = tuple[float, float, float, float]
 PLOTS = {"TimeSeries", "BarChart", "StateTimeline"}
 
@@ -45,14 +50,18 @@ class ScreenshotConfig:
     """Folder for ``<tab>.png``."""
     tabs: tuple[str, ...] = ()
     """Names of the tabs; all by default."""
+    unchanging: tuple[str, ...] = ()
+    """Names of the tabs that show the same at all moments: one picture each of both timelines."""
     sim_times: tuple[float, ...] = ()
     """Times of the simulation to go to [s]; the end by default."""
     stages: tuple[int, ...] = ()
     """Steps of the timeline ``stage`` to go to."""
-    settle: float = 1.0
-    """How long the viewer may draw before a picture is taken [s]; four times as long to load."""
+    patience: float = 10.0
+    """How long a view may stay empty before it counts as empty [s]."""
+    window: tuple[int, int] = (1920, 1080)
+    """Width and height of the window [pixels]; without a GPU a picture takes time by its size."""
     width: int = 1400
-    """Width of the pictures [pixels]."""
+    """Width of the pictures [pixels]; wider ones are made smaller."""
     port: int = 0
     """Port of the viewer that is started; a free one by default: at a port in use it would be another one's."""
 
@@ -77,14 +86,8 @@ class Shot:
 def take(config: ScreenshotConfig) -> list[Shot]:
     """Start a viewer, open the recording, take one picture a tab and moment."""
     config.out.mkdir(parents=True, exist_ok=True)
-    moments: list[tuple[str, dict[str, Any]]] = [
-        *((f"t{at:05.0f}", {"timeline": "sim_time", "duration": at}) for at in config.sim_times),
-        *((f"stage{at:02d}", {"timeline": "stage", "sequence": at}) for at in config.stages),
-    ]
     shots = []
-    with ViewerClient.spawn(headless=True, port=config.port or _free_port(), executable_path=_viewer()) as viewer:
-        viewer.open(str(config.recording.resolve()))
-        time.sleep(4 * config.settle)
+    with _open_viewer(config) as viewer:
         blueprint = viewer.get_blueprint().blueprint
         for name, choices in list(_tabs(blueprint)):
             if config.tabs and name.split(" - ")[0] not in config.tabs:
@@ -92,17 +95,85 @@ def take(config: ScreenshotConfig) -> list[Shot]:
             for container, tab in choices:
                 blueprint[container]["ContainerBlueprint"]["active_tab"] = tab
             viewer.set_blueprint(blueprint, of="recording")
-            for moment, where in moments or [("end", {})]:
+            for moment, where in _moments(config, unchanging=name.split(" - ")[0] in config.unchanging):
                 if where:
                     rest = {key: value for key, value in where.items() if key != "timeline"}
                     viewer.set_time(where["timeline"], play_state="paused", **rest)
-                time.sleep(config.settle)
+                picture, empty = _take_full_picture(viewer, blueprint, config.patience)
                 path = config.out / f"{_file_name(name)}-{moment}.png"
-                picture = _take_picture(viewer)
-                shots.append(Shot(name, moment, path, tuple(_find_empty(viewer, blueprint, picture))))
+                shots.append(Shot(name, moment, path, empty))
                 picture.thumbnail((config.width, config.width))
                 picture.save(path)
     return shots
+
+
+def _moments(config: ScreenshotConfig, *, unchanging: bool) -> list[tuple[str, dict[str, Any]]]:
+    """List the moments to go to, with their names; of a tab that does not change the first of each timeline."""
+    most = 1 if unchanging else None
+    moments: list[tuple[str, dict[str, Any]]] = [
+        *((f"t{at:05.0f}", {"timeline": "sim_time", "duration": at}) for at in config.sim_times[:most]),
+        *((f"stage{at:02d}", {"timeline": "stage", "sequence": at}) for at in config.stages[:most]),
+    ]
+    return moments or [("end", {})]
+
+
+@contextlib.contextmanager
+def _open_viewer(config: ScreenshotConfig) -> Iterator[ViewerClient]:
+    """Start a viewer of its own without a window, with the recording loaded."""
+    port = config.port or _free_port()
+    size = "x".join(map(str, config.window))
+    command = [_viewer(), "--headless", "--hide-welcome-screen", "--port", str(port), "--window-size", size]
+    # The launcher leaves its viewer behind unless both are ended.
+    process = subprocess.Popen(command, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        viewer = _connect(f"rerun+http://127.0.0.1:{port}/proxy")
+        viewer.open(str(config.recording.resolve()))
+        _wait_until(lambda: bool(viewer.get_state().views) and not viewer.get_state().loading)
+        yield viewer
+    finally:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def _connect(address: str) -> ViewerClient:
+    """Connect to a viewer that is just being started."""
+    found: list[ViewerClient] = []
+
+    def answers() -> bool:
+        with contextlib.suppress(Exception):  # the client raises several kinds while nobody listens yet
+            viewer = ViewerClient(address)
+            viewer.get_state()
+            found.append(viewer)
+        return bool(found)
+
+    _wait_until(answers)
+    return found[0]
+
+
+def _wait_until(done: Callable[[], bool]) -> None:
+    """Wait for the viewer.
+
+    Raises:
+        TimeoutError: It takes longer than :data:`LONGEST_START`.
+    """
+    end = time.monotonic() + LONGEST_START
+    while not done():
+        if time.monotonic() > end:
+            raise TimeoutError(f"the viewer is not there after {LONGEST_START:g} s")
+        time.sleep(PAUSE)
+
+
+def _take_full_picture(
+    viewer: ViewerClient, blueprint: dict[str, Any], patience: float
+) -> tuple[Image.Image, tuple[str, ...]]:
+    """Take pictures until no view is empty, or for so long [s]; returns the last one and what is empty on it."""
+    end = time.monotonic() + patience
+    while True:
+        picture = _take_picture(viewer)
+        empty = tuple(_find_empty(viewer, blueprint, picture))
+        if not empty or time.monotonic() > end:
+            return picture, empty
+        time.sleep(PAUSE)
 
 
 def _take_picture(viewer: ViewerClient) -> Image.Image:
@@ -119,10 +190,10 @@ def _free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def _viewer() -> str | None:
+def _viewer() -> str:
     """Find the viewer that came with this Python's rerun-sdk, whatever the search path."""
     beside = Path(sys.executable).with_name("rerun")
-    return str(beside) if beside.exists() else None
+    return str(beside) if beside.exists() else "rerun"
 
 
 def _tabs(blueprint: dict[str, Any]) -> Iterator[tuple[str, list[tuple[str, str]]]]:

@@ -78,17 +78,23 @@ COMMANDS = (
     Command(
         "worlds list",
         "List the bundled worlds, one a line, its name first.",
-        "pipeline.config:ListWorlds",
+        "pipeline.worlds_config:ListWorlds",
         "cli.work:list_worlds",
     ),
     Command(
-        "worlds show", "Draw a floor plan.", "pipeline.config:ShowWorld", "cli.work:show_world", needs=("matplotlib",)
+        "worlds show",
+        "Draw a floor plan.",
+        "pipeline.worlds_config:ShowWorld",
+        "cli.work:show_world",
+        needs=("matplotlib",),
     ),
-    Command("worlds generate", "Generate a floor plan.", "pipeline.config:GenerateWorld", "cli.work:generate_world"),
+    Command(
+        "worlds generate", "Generate a floor plan.", "pipeline.worlds_config:GenerateWorld", "cli.work:generate_world"
+    ),
     Command(
         "worlds convert",
         "Convert a floor plan to another format.",
-        "pipeline.config:ConvertWorld",
+        "pipeline.worlds_config:ConvertWorld",
         "cli.work:convert_world",
     ),
     Command(

@@ -75,6 +75,7 @@ def _own_process() -> None:
 
 
 def _here() -> str:
+    """Find the current directory, empty where it is gone."""
     try:
         return os.getcwd()  # noqa: PTH109 (as the interpreter spells it)
     except OSError:
@@ -91,6 +92,7 @@ def _leave(number: int) -> None:
 
 
 def _status(words: list[str], stop: Stop) -> int:
+    """Do what the line says and return the exit status; what goes wrong is said in one line."""
     try:
         return _main(words)
     except UsageError as error:
@@ -118,6 +120,7 @@ def _status(words: list[str], stop: Stop) -> int:
 
 
 def _last_words(number: int) -> str:
+    """Say how a signal of a number ended the command."""
     what = "interrupted" if number == INTERRUPTED - 128 else "terminated"
     return f"{what}; nothing half-written was left behind"
 

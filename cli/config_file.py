@@ -49,11 +49,13 @@ def read_settings(path: Path, command: str, config: type[Any]) -> dict[str, Any]
 
 
 def _inputs(manifest: Mapping[str, Any]) -> dict[str, Any]:
-    """List what a result was made from: its paths; of a dataset its worlds and how many samples were wanted."""
+    """List what a result was made from: its paths; of a dataset its worlds, how many samples and which files."""
     paths = manifest.get("paths")
     inputs = {name: value for name, value in paths.items() if value is not None} if isinstance(paths, dict) else {}
     if isinstance(manifest.get("worlds"), dict):
-        inputs["worlds"] = list(manifest["worlds"])
+        inputs.setdefault("worlds", list(manifest["worlds"]))
+    if manifest.get("layout") == "shards":
+        inputs |= {"format": "shards", "shard_mb": manifest.get("shard_mb")}
     return inputs | {name: manifest[name] for name in ("repetitions", "max_closed") if name in manifest}
 
 

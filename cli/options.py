@@ -26,7 +26,7 @@ Switch = tyro.conf.FlagCreatePairsOff[bool]
 
 @dataclass(frozen=True, kw_only=True)
 class SharedOptions:
-    """What every command takes."""
+    """Options of every command."""
 
     config: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Settings, JSON or TOML, or the ``run.json`` of a result to repeat; options on the line win."""
@@ -45,14 +45,17 @@ class SharedOptions:
 
 
 def load(place: str) -> Any:
-    """Load what stands at ``module:name``; the module is imported, so that a command imports no more than it needs."""
+    """Load what stands at ``module:name``, the module relative to ``closedrooms``.
+
+    It is imported only now, so that a command imports no more than it needs.
+    """
     module, name = place.split(":")
     return getattr(importlib.import_module(f"closedrooms.{module}"), name)
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Named:
-    """What decides which other options there are and what they begin with; read ahead of the rest."""
+    """Options that decide which others there are and what their defaults are; read ahead of the rest."""
 
     config: Path | None = None
     method: str | None = None
@@ -188,6 +191,7 @@ def _starts(config: type[Any], line: _Named, saved: Mapping[str, Any]) -> dict[s
 
 
 def _method(line: _Named, saved: Mapping[str, Any], config: type[Any]) -> Any:
+    """Find the method of a command: the line's, the file's, or the usual one."""
     standard = next(item.default for item in fields(config) if item.name == "method")
     return line.method or saved.get("method", standard)
 

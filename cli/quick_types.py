@@ -20,6 +20,8 @@ def tell_quickly() -> None:
 
 
 def _quick(theirs: Check) -> Check:
+    """Make a check of types that takes typeguard only where a plain comparison does not do."""
+
     def is_instance(kind: Any, value: Any) -> bool:
         if isinstance(kind, types.UnionType) or get_origin(kind) is Union:
             return any(is_instance(option, value) for option in get_args(kind))

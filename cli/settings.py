@@ -100,6 +100,7 @@ def _converted(hint: Any, value: Any, key: str, current: Any) -> Any:
 
 
 def _sequence(hint: Any, value: Any, key: str) -> tuple[Any, ...]:
+    """Convert a list of a file to a tuple of the types that a field wants."""
     items = get_args(hint)
     endless = items[-1] is Ellipsis
     if not isinstance(value, list | tuple) or not (endless or len(value) == len(items)):
@@ -112,6 +113,11 @@ def _sequence(hint: Any, value: Any, key: str) -> tuple[Any, ...]:
 
 
 def _scalar(kind: Any, value: Any, key: str) -> Any:
+    """Convert a single value of a file to the type that a field wants.
+
+    Raises:
+        InvalidInputError: It is of another type, or no finite number.
+    """
     if kind is float and isinstance(value, int | float) and not isinstance(value, bool):
         if not math.isfinite(value):
             raise _wrong(key, value, "a finite number")

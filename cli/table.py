@@ -14,7 +14,7 @@ from tyro._errors import on_parse_error
 from closedrooms.cli.command_list import ABOUT, COMMANDS, GROUPS, HELP, HELP_ALL, Command
 from closedrooms.cli.options import option_names, options_class
 from closedrooms.cli.quick_types import tell_quickly
-from closedrooms.cli.usage import Place, UsageError, explain
+from closedrooms.cli.usage import LinePosition, UsageError, explain
 from closedrooms.core.errors import InvalidInputError
 
 MARKERS = (
@@ -80,7 +80,7 @@ def named_command(words: Sequence[str]) -> Command | None:
 
 @dataclass(frozen=True)
 class _NotAsked:
-    """Stands for the options of the commands that a line does not name, which nobody looks at."""
+    """Stand-in for the options of the commands that a line does not name, which nobody looks at."""
 
 
 def _table(chosen: Command | None, options: type[Any] | None, *, completing: bool) -> Any:
@@ -106,6 +106,7 @@ def _table(chosen: Command | None, options: type[Any] | None, *, completing: boo
 
 
 def _row(name: str, description: str, options: Any) -> Any:
+    """Make a row of tyro's table of subcommands."""
     about = tyro.conf.subcommand(
         name=name, description=description, prefix_name=False, constructor_factory=lambda: options
     )
@@ -113,20 +114,23 @@ def _row(name: str, description: str, options: Any) -> Any:
 
 
 def _description(command: Command, options: type[Any] | None) -> str:
+    """Write what ``--help`` says of a command, and which settings it hides."""
     if options is None or not options.about["hidden"]:
         return command.summary
     groups = ", ".join(f"--{name}.*" for name in options.about["hidden"])
     return f"{command.summary} --help-all shows the settings of each stage too: {groups}."
 
 
-def _place(words: Sequence[str], command: Command | None, options: type[Any] | None) -> Place:
+def _place(words: Sequence[str], command: Command | None, options: type[Any] | None) -> LinePosition:
     """Find where on the line tyro stopped: before a command, or among its options."""
     if command is not None and options is not None:
         method = options.about["method"]
-        return Place(tuple(words), f"closedrooms {command.name}", options=tuple(option_names(options)), method=method)
+        return LinePosition(
+            tuple(words), f"closedrooms {command.name}", options=tuple(option_names(options)), method=method
+        )
     group = words[0] if words and words[0] in GROUPS else None
     if group is not None:
         names = [c.name.split()[1] for c in COMMANDS if c.name.split()[0] == group]
-        return Place(tuple(words), f"closedrooms {group}", commands=tuple(names))
+        return LinePosition(tuple(words), f"closedrooms {group}", commands=tuple(names))
     names = list(dict.fromkeys(c.name.split()[0] for c in COMMANDS))
-    return Place(tuple(words), "closedrooms", commands=tuple(names))
+    return LinePosition(tuple(words), "closedrooms", commands=tuple(names))

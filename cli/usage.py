@@ -15,12 +15,12 @@ GONE = {
 
 
 class UsageError(Exception):
-    """What was typed is no command that there is (exit status 2)."""
+    """A command line that cannot be understood: exit status 2."""
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """Where on a line something was not understood.
+class LinePosition:
+    """Place on a command line where something was not understood.
 
     Attributes:
         words: The whole line.
@@ -37,7 +37,7 @@ class Place:
     method: str | None = None
 
 
-def explain(event: Any, place: Place) -> str | None:
+def explain(event: Any, place: LinePosition) -> str | None:
     """Explain a failure to parse in one line; ``None`` where tyro's own words have to do.
 
     Args:
@@ -52,28 +52,28 @@ def explain(event: Any, place: Place) -> str | None:
     return None if tell is None else tell(event, place)
 
 
-def _missing_command(event: Any, place: Place) -> str:  # noqa: ARG001
+def _missing_command(event: Any, place: LinePosition) -> str:  # noqa: ARG001
     return f"no command after {place.prog}; expected one of {', '.join(place.commands)}"
 
 
-def _missing_arguments(event: Any, place: Place) -> str:
+def _missing_arguments(event: Any, place: LinePosition) -> str:
     names = ", ".join(_shown(missing.arg) for missing in event.missing_arguments)
     return f"missing {names}; see {place.prog} --help"
 
 
-def _wrong_choice(event: Any, place: Place) -> str:  # noqa: ARG001
+def _wrong_choice(event: Any, place: LinePosition) -> str:  # noqa: ARG001
     return f"{_shown(event.argument)}: {unknown('value', event.value, event.choices)}"
 
 
-def _missing_value(event: Any, place: Place) -> str:  # noqa: ARG001
+def _missing_value(event: Any, place: LinePosition) -> str:  # noqa: ARG001
     return f"{_shown(event.argument)} lacks a value"
 
 
-def _wrong_value(event: Any, place: Place) -> str:  # noqa: ARG001
+def _wrong_value(event: Any, place: LinePosition) -> str:  # noqa: ARG001
     return str(event.message) if event.argument is None else f"{_shown(event.argument)}: {event.message}"
 
 
-_TOLD: dict[str, Callable[[Any, Place], str]] = {
+_TOLD: dict[str, Callable[[Any, LinePosition], str]] = {
     "MissingSubcommand": _missing_command,
     "MissingArgs": _missing_arguments,
     "InvalidChoice": _wrong_choice,
@@ -82,7 +82,7 @@ _TOLD: dict[str, Callable[[Any, Place], str]] = {
 }
 
 
-def _unknown_word(word: str, place: Place) -> str:
+def _unknown_word(word: str, place: LinePosition) -> str:
     """Say that a word has no meaning there, and what was meant."""
     if not word.startswith("-"):
         return unknown("command", word, place.commands) if place.commands else f"unexpected argument {word!r}"
@@ -114,7 +114,7 @@ def _nearest_option(option: str, known: Sequence[str]) -> str:
     return by_name or by_end.get(nearest(option.rpartition(".")[2], by_end), "")
 
 
-def _strange(place: Place) -> list[str]:
+def _strange(place: LinePosition) -> list[str]:
     """List words that look like options of the command and are none; what follows ``--`` is an argument."""
     words = place.words[: place.words.index("--")] if "--" in place.words else place.words
     known = {*place.options, *(f"no-{option}" for option in place.options), "help", "help-all"}
@@ -122,6 +122,7 @@ def _strange(place: Place) -> list[str]:
 
 
 def _option(word: str) -> str:
+    """Write a word of the line as options are spelled: no dashes ahead, no value, dashes for underscores."""
     return word.lstrip("-").partition("=")[0].replace("_", "-")
 
 

@@ -14,7 +14,7 @@ class ClosedroomsError(Exception):
 
 
 class InvalidInputError(ClosedroomsError):
-    """Something that came in is not what was expected.
+    """An input that cannot be used: a file, an option or an argument other than expected.
 
     The message reads ``what; expected ...: where``, the path last, on one line. Texts of the file stand in it as a
     terminal may show them (:func:`closedrooms.core.names.shown`).
@@ -30,7 +30,7 @@ class InvalidInputError(ClosedroomsError):
 
 
 class OutputError(ClosedroomsError):
-    """The output folder cannot be written, or holds something that is not ours."""
+    """An output folder that cannot be written, or that holds files which closedrooms did not write."""
 
     def __init__(self, what: str) -> None:
         super().__init__(shown(what, longest=LONGEST_EXPECTED))

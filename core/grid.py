@@ -71,7 +71,10 @@ class GridFrame:
         return np.stack((x, y), axis=-1).astype(np.float64)
 
     def to_corners(self, points: FloatArray) -> FloatArray:
-        """Convert map points ``(x, y)`` to continuous cells ``(col, row)`` from the lower-left corner, (..., 2)."""
+        """Convert points ``(x, y)`` [m] to continuous ``(col, row)`` [cells], both of shape (..., 2).
+
+        (0, 0) is the lower-left corner of cell (0, 0), whose centre is at (0.5, 0.5).
+        """
         origin = np.array([self.origin_x, self.origin_y])
         corners: FloatArray = (np.asarray(points, dtype=np.float64) - origin) / self.resolution
         return corners
@@ -170,7 +173,14 @@ class OccupancyGrid:
         return self if frame == self.frame else OccupancyGrid(frame, handed_over(self.cells_on(frame)))
 
     def cells_on(self, frame: GridFrame) -> CellArray:
-        """Copy the cells that :meth:`on` gives to draw in them, int8, shape ``frame.shape``."""
+        """Copy the cells in a window ``frame``, as :meth:`on` does, to an array that the caller may change.
+
+        Returns:
+            Cells, int8, shape ``frame.shape``.
+
+        Raises:
+            InvalidInputError: See :meth:`on`.
+        """
         shift = np.array([self.frame.origin_x - frame.origin_x, self.frame.origin_y - frame.origin_y])
         cells_shift = shift / frame.resolution
         if (

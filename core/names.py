@@ -33,6 +33,7 @@ def shown(text: object, *, longest: int = LONGEST_SHOWN) -> str:
 
 
 def _escaped(character: str) -> str:
+    """Escape a character that a terminal would act on or not show."""
     if unicodedata.category(character) not in UNSHOWABLE:
         return character
     return character.encode("unicode_escape", "surrogatepass").decode("ascii")

@@ -49,3 +49,8 @@ class Report:
             "failures": dict(self.failures),
             "remarks": [remark.as_json() for remark in self.remarks],
         }
+
+
+def counted(number: int, noun: str) -> str:
+    """Write a number with its noun, one that takes an s where there are several."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -1,4 +1,8 @@
-"""What the robot is like: said once, for the simulation that moves it and for whoever plans for it."""
+"""What the robot is like: for the simulation that moves it and for the navigation that plans its paths.
+
+Tours have a radius of their own, ``coverage.config.GraphConfig.robot_radius``: ``run`` hands this one over, ``cover``
+reads that one, and ``evaluate`` plans every tour with its default of 0.20 m.
+"""
 
 import math
 from dataclasses import dataclass, fields

@@ -1,16 +1,25 @@
-"""Shapes to cells: which cells of a grid a polygon holds, which its outline passes, and which lie in doorways."""
+"""Shapes: how much two overlap; which cells of a grid one holds, its outline passes, and which lie in doorways."""
 
 from collections.abc import Sequence
 
 import numpy as np
 import shapely
 from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame
 
 Shape = Polygon | MultiPolygon
+
+
+def polygon_iou(a: BaseGeometry, b: BaseGeometry) -> float:
+    """Compute intersection over union of two areas, 0 where both are empty."""
+    # A room whose outline touches itself (slivers at slanted walls) has no clean boundary to intersect.
+    a, b = (shape if shape.is_valid else shapely.make_valid(shape) for shape in (a, b))
+    union = a.union(b).area
+    return float(a.intersection(b).area / union) if union else 0.0
 
 
 def cells_inside(shape: Shape, frame: GridFrame) -> BoolArray:

@@ -26,7 +26,7 @@ FIRST, BETWEEN = 20, 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Possibilities:
-    """What one room may be.
+    """Shapes that one room may have, with their probabilities.
 
     Attributes:
         room: As predicted.
@@ -67,7 +67,7 @@ def _find_none(shape: Shape, probability: OccupancyGrid) -> float:
     return 1.0 - float(percent.max()) / 100.0 if percent.size else 0.0
 
 
-def draw_rooms(possible: Sequence[Possibilities], count: int, rng: np.random.Generator) -> Iterator[list[int]]:
+def sample_rooms(possible: Sequence[Possibilities], count: int, rng: np.random.Generator) -> Iterator[list[int]]:
     """Draw what all rooms together may be.
 
     Args:

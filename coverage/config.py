@@ -6,13 +6,13 @@ from typing import Literal
 
 from closedrooms.core.errors import InvalidInputError
 
-Method = Literal["default", "ortools", "paper"]
+TourMethod = Literal["default", "ortools", "paper"]
 Parts = Literal["start", "all"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class GraphConfig:
-    """How a map becomes a topological graph (paper, section 5.1)."""
+    """Settings of the topological graph of a map (paper, section 5.1)."""
 
     clutter_filter: bool = True
     """Take furniture out of the map first (ROSE's filter; paper, sections 4.2 and 5.1)."""
@@ -67,9 +67,9 @@ class GraphConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class TourConfig:
-    """How a tour is searched (paper, section 5.2)."""
+    """Settings of the search for a tour (paper, section 5.2)."""
 
-    method: Method = "default"
+    method: TourMethod = "default"
     """``default``: OR-Tools' Christofides, then Or-opt and 2-opt moves with restarts, bounded by moves.
     ``ortools``: OR-Tools' Christofides, then its tabu search, bounded by solutions. ``paper``: the same, stopped by
     convergence or after 60 s (not repeatable where the time stops it)."""

@@ -22,7 +22,7 @@ from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyG
 from closedrooms.core.random import stream
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import Shape, fill_shape, trace_outline
-from closedrooms.coverage.completions import Possibilities, draw_rooms, list_possibilities
+from closedrooms.coverage.completions import Possibilities, list_possibilities, sample_rooms
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.graph.graph_builder import build_graph
 from closedrooms.coverage.tour.tour_planner import solve_tour
@@ -31,7 +31,8 @@ from closedrooms.coverage.tour.tour_planner import solve_tour
 HELD = 0.9
 # What draws of rooms do not hold: how far tours over M and M_GT differ where both show the same (M is ragged, M_GT is
 # not), and how far rooms of one building are off together. A standard deviation, as a share of the tour's length, found
-# on drawn maps of the use `fit` (benchmarks/completions.py): the interval of `best` holds the true cost on 90 % of 69.
+# on drawn maps of the use `fit` (benchmarks/quality/completions.py): the interval of `best` holds the true cost on 90 %
+# of 69.
 COST_NOISE = 0.016
 # Unknown cells around a room [m].
 MARGIN = 0.5
@@ -42,7 +43,7 @@ WIDTH, REACH = 0.8, 0.3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CostSpread:
-    """What it costs to cover a building of which some rooms are only predicted.
+    """Distribution of the cost of covering a building of which some rooms are only predicted.
 
     Attributes:
         lengths: Of a tour over each completion [m], shape (n,), in the order drawn.
@@ -118,7 +119,7 @@ def spread_cost(
     drawn = np.array(
         [
             sum(float(cost[at]) for cost, at in zip(costs, state, strict=True))
-            for state in draw_rooms(possible, count, rng)
+            for state in sample_rooms(possible, count, rng)
         ]
     )
     # As evenly spread as can be: a few random numbers would make another interval of every seed.

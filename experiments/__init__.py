@@ -3,7 +3,9 @@
 ``dataset.dataset.dataset`` and ``robustness.sweep.robustness`` are named like their packages and so stand there.
 
 - Work: ``workers`` (local processes or a Dask cluster), ``scheduler_address`` (of the cluster).
-- Files: ``places`` (a folder or an address, as typed), ``stores`` (reading and writing files at either).
+- Files: ``places`` (a folder or an address, as typed), ``stores`` (reading and writing files at either),
+  ``claimed_folder`` (an output that a command goes on with).
+- Results: ``statistics``, ``tables`` (CSV and Parquet), ``html_page``.
 """
 
 from typing import TYPE_CHECKING

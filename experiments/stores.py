@@ -19,6 +19,7 @@ from closedrooms.experiments.places import Url
 BLOCK = 1 << 20
 """Bytes that are hashed or sent at a time."""
 WHAT = "a file of a dataset"
+DATASET_MANIFEST = "manifest.json"
 
 
 class Store(Protocol):
@@ -193,6 +194,7 @@ class Remote:
 
 @functools.lru_cache(maxsize=4)
 def _remote(url: str) -> Remote:
+    """Open an address once."""
     return Remote(Url(url))
 
 
@@ -263,6 +265,7 @@ class Summed:
 
 @contextlib.contextmanager
 def _reading(where: str) -> Iterator[None]:
+    """Turn errors of a driver into one line on what cannot be read."""
     try:
         yield
     except ClosedroomsError:
@@ -275,6 +278,7 @@ def _reading(where: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _writing(where: str) -> Iterator[None]:
+    """Turn errors of a driver into one line on what cannot be written."""
     try:
         yield
     except FileNotFoundError:
@@ -284,4 +288,5 @@ def _writing(where: str) -> Iterator[None]:
 
 
 def _line(error: Exception) -> str:
+    """Shorten the text of an error to one line."""
     return " ".join(str(error).split())[:160] or type(error).__name__

@@ -20,13 +20,13 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
 from closedrooms.core.files.unfinished import remove_unfinished
 from closedrooms.core.runtime.packages import missing_package, require
-from closedrooms.core.runtime.stopping import SIGNALS, Stop, end_in_time, handle
+from closedrooms.core.runtime.stopping import SIGNALS, Stop, end_in_time, ending_with, handle
 
 if TYPE_CHECKING:
     from distributed import Client
 
 Job = TypeVar("Job")
-Outcome = TypeVar("Outcome")
+Result = TypeVar("Result")
 
 # How often a job is handed out before it is given up: its worker may have been killed for another one's sake.
 TRIES = 3
@@ -35,7 +35,6 @@ PATIENCE = 10.0
 # How long workers may take to clear away what they have under way [s]; the parent itself has 1.4 s.
 GRACE = 1.0
 SAFE_PATH = "PYTHONSAFEPATH"
-PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 # Jobs that a cluster is given for each of its threads: one to work on, one to go on with.
 AHEAD = 2
 
@@ -48,7 +47,7 @@ class Lost:
 
 
 @dataclass(frozen=True, slots=True)
-class Crew(Generic[Job, Outcome]):
+class Crew(Generic[Job, Result]):
     """Workers who do the work, local or on a cluster.
 
     Attributes:
@@ -63,7 +62,7 @@ class Crew(Generic[Job, Outcome]):
     needs: tuple[str, ...] = ()
     by: str = "closedrooms"
 
-    def do(self, function: Callable[[Job], Outcome], jobs: Iterable[Job]) -> Iterator[tuple[Job, Outcome | Lost]]:
+    def do(self, function: Callable[[Job], Result], jobs: Iterable[Job]) -> Iterator[tuple[Job, Result | Lost]]:
         """Yield outcomes as they come, in no certain order.
 
         Jobs are taken one after the other, no more of them ahead than the workers can begin: a million cost no more
@@ -92,7 +91,8 @@ class Crew(Generic[Job, Outcome]):
             else:
                 yield from self._locally(work, jobs)
 
-    def _locally(self, work: Callable[[Job], Outcome], jobs: Iterator[Job]) -> Iterator[tuple[Job, Outcome | Lost]]:
+    def _locally(self, work: Callable[[Job], Result], jobs: Iterator[Job]) -> Iterator[tuple[Job, Result | Lost]]:
+        """Do jobs in local processes, and hand out again what a worker died of."""
         # Jobs that were under way when a worker died are retried one at a time, to find the one that kills workers.
         suspects: deque[tuple[Job, int]] = deque()
         while True:
@@ -111,10 +111,10 @@ class Crew(Generic[Job, Outcome]):
                 return
 
     def _batch(
-        self, work: Callable[[Job], Outcome], jobs: Iterator[Job], begun: dict[int, Job], workers: int
-    ) -> Iterator[tuple[Job, Outcome]]:
+        self, work: Callable[[Job], Result], jobs: Iterator[Job], begun: dict[int, Job], workers: int
+    ) -> Iterator[tuple[Job, Result]]:
         """Hand out jobs, no more at a time than there are workers: ``begun`` names those under way when one dies."""
-        under_way: dict[Future[Outcome], int] = {}
+        under_way: dict[Future[Result], int] = {}
         numbers = count()
         with hire(workers) as pool:
             while True:
@@ -177,7 +177,7 @@ def _dismiss() -> None:
         child.kill()
 
 
-def _prepared(function: Callable[[Job], Outcome], needs: tuple[str, ...], by: str, job: Job) -> Outcome:
+def _prepared(function: Callable[[Job], Result], needs: tuple[str, ...], by: str, job: Job) -> Result:
     """Do one job on a worker of any kind, which is made ready once."""
     _make_ready(needs, by)
     try:
@@ -191,6 +191,7 @@ def _prepared(function: Callable[[Job], Outcome], needs: tuple[str, ...], by: st
 
 @functools.cache
 def _make_ready(needs: tuple[str, ...], by: str) -> None:
+    """Check the packages of a worker and set up its process, once."""
     require(*needs, by=by)
     one_thread()
     keep_memory()
@@ -236,11 +237,8 @@ def _begin(parent: int) -> None:
     """Prepare a local worker: one thread, no part in the parent's Ctrl-C, and no life after the parent's."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_in_time((signal.SIGTERM,), lambda _: remove_unfinished(), patience=GRACE / 2)
-    # The kernel sends the signal when the parent ends, however it ends; it may have ended already.
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    ending_with(parent, signal.SIGTERM)()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
-    if os.getppid() != parent:
-        os._exit(1)
     one_thread()
     # Until here the signal ends the worker by itself: it has nothing under way.
     handle((signal.SIGTERM,), _Dismissal())
@@ -272,8 +270,8 @@ def _cluster(address: str) -> Iterator["Client"]:
 
 
 def _on_cluster(
-    address: str, work: Callable[[Job], Outcome], jobs: Iterator[Job]
-) -> Iterator[tuple[Job, Outcome | Lost]]:
+    address: str, work: Callable[[Job], Result], jobs: Iterator[Job]
+) -> Iterator[tuple[Job, Result | Lost]]:
     """Hand out jobs to a cluster, ``AHEAD`` times as many as it has threads at a time."""
     with _cluster(address) as client:
         from distributed import KilledWorker, as_completed
@@ -295,7 +293,7 @@ def _on_cluster(
             for future in completed:
                 job = begun.pop(future.key)
                 try:
-                    outcome: Outcome | Lost = future.result()
+                    outcome: Result | Lost = future.result()
                 except KilledWorker as error:
                     outcome = Lost(" ".join(str(error).split()))
                 future.release()

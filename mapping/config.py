@@ -8,7 +8,7 @@ from closedrooms.core.runtime.options import check_magnitudes
 
 @dataclass(frozen=True, kw_only=True)
 class MatcherConfig:
-    """How a scan is matched to the map; one set of values for every sensor and noise level."""
+    """Settings of scan matching; one set of values for every sensor and noise level."""
 
     field_sigma: float = 0.08
     """Standard deviation of the likelihood around a mapped hit [m]: sensor noise and half a cell together."""
@@ -81,7 +81,7 @@ class MatcherConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class LoopConfig:
-    """When a place is recognised and how the pose graph is solved."""
+    """Settings of place recognition, loop closure and the pose graph's solver."""
 
     enabled: bool = True
     """Close loops."""
@@ -151,7 +151,7 @@ class LoopConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class RecoveryConfig:
-    """What is done when a match contradicts what was seen before, because the odometry failed."""
+    """Settings of recovery: what happens when a match contradicts the map because the odometry failed."""
 
     enabled: bool = True
     """Look for contradictions, search wide windows and start submaps."""
@@ -178,10 +178,10 @@ class RecoveryConfig:
     max_rival: float = 0.9
     """Score of the best other pose there, as a share of the found one's, above which none is taken."""
 
-    patience: int = 10
+    lost_scans: int = 10
     """Scans in a row that fit nowhere after which a new submap is started."""
 
-    patience_distance: float = 2.5
+    lost_distance: float = 2.5
     """Distance from the last keyframe after which it is started in any case [m]."""
 
     break_length: float = 60.0
@@ -196,10 +196,10 @@ class RecoveryConfig:
     join_window: float = 2.0
     """Half width of the window in which a submap is sought in an older one, all headings [m]."""
 
-    max_speed: float = 5.0
+    possible_speed: float = 5.0
     """Speed beyond which a step of the odometry is none [m/s]: no robot indoors is as fast."""
 
-    max_turn_rate: float = 8.0
+    possible_turn_rate: float = 8.0
     """Turn rate beyond which a step of the odometry is none [rad/s]."""
 
     def __post_init__(self) -> None:
@@ -208,7 +208,7 @@ class RecoveryConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class MapperConfig:
-    """How scans become a map."""
+    """Settings of mapping, from scans to a map."""
 
     resolution: float = 0.05
     """Cell size of the map [m]."""
@@ -219,7 +219,7 @@ class MapperConfig:
     keyframe_angle: float = 0.40
     """Turn after which a scan becomes a keyframe and enters the map [rad]."""
 
-    patience: float = 2.5
+    poor_spacing: float = 2.5
     """How many times farther than usual the robot moves before a keyframe is taken at a pose that fits poorly."""
 
     max_range: float = 25.0

@@ -27,6 +27,7 @@ def fuse_doors(keyframes: Sequence[Keyframe]) -> list[ClosedDoor]:
 
 
 def _fused(name: str, sightings: list[tuple[FloatArray, float]]) -> ClosedDoor:
+    """Fuse the sightings of one door, ends in the map frame [m] with their weights: the median of each jamb."""
     first = max(sightings, key=lambda s: s[1])[0]
     ends = np.array([_ordered(segment, first) for segment, _ in sightings])  # (n, 2, 2)
     weights = np.array([weight for _, weight in sightings])
@@ -44,6 +45,7 @@ def _ordered(segment: FloatArray, like: FloatArray) -> FloatArray:
 
 
 def _weighted_median(values: FloatArray, weights: FloatArray) -> float:
+    """Find the median of values of which each counts by its weight; between two of them, their mean."""
     order = np.argsort(values, kind="stable")
     ahead = np.cumsum(weights[order])
     half = ahead[-1] / 2.0

@@ -82,4 +82,5 @@ def grown(
 
 
 def _growth(missing: int) -> int:
+    """Round cells that are missing up to whole steps of growth, 0 where none are."""
     return 0 if missing <= 0 else -(-missing // GROWTH) * GROWTH

@@ -24,7 +24,7 @@ Mask = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Imprint:
-    """What one scan at one pose counts, so that it can be counted out, or in again, without drawing it anew.
+    """Counts of one scan at one pose, so that it can be counted out, or in again, without drawing it anew.
 
     Attributes:
         row: First row of its window, on the lattice (not in the array, which grows).
@@ -114,6 +114,7 @@ class EvidenceGrid:
             yield window, mask, flat
 
     def _count(self, window: Window, mask: Mask, flat: IntArray, sign: int) -> None:
+        """Add hits (``flat``: indices in the window) and passes (``mask``) of a keyframe, or take them off."""
         rows, cols = slice(window[0], window[0] + window[2]), slice(window[1], window[1] + window[3])
         hits, passes = self._hits[rows, cols], self._passes[rows, cols]
         # A cell that several beams hit counts once: the same sum is written for each.
@@ -125,6 +126,7 @@ class EvidenceGrid:
         self._dirty = window if self._dirty is None else _union(self._dirty, window)
 
     def _crossed(self, outline: FloatArray, window: Window) -> Mask:
+        """Mark the cells that beams cross before they end: the inside of the scan's outline [m] without its rim."""
         lattice = self._lattice
         # OpenCV puts integer coordinates on cell centres.
         corner = np.array([lattice.col0 + window[1], lattice.row0 + window[0]]) + 0.5
@@ -135,6 +137,7 @@ class EvidenceGrid:
         return mask
 
     def _grow(self, low: FloatArray, high: FloatArray) -> None:
+        """Make room for a box from ``low`` to ``high``, map frame [m]."""
         padding = self._lattice.cover(low, high, margin=2)
         if padding is None:
             return

@@ -28,7 +28,6 @@ class BuiltMap:
         doors: Closed doors, where the run holds sightings.
         stamps: Times of the scans [s], shape (n,).
         trajectory: ``(x, y, theta)`` at the scans after the last optimisation, shape (n, 3).
-        online: The same as estimated at the time of each scan, shape (n, 3).
         loops: Positions of the two ends of each loop, shape (k, 2, 2) [m].
         keyframes: How many scans make the map.
         seconds: Wall-clock time of mapping alone [s].
@@ -41,7 +40,6 @@ class BuiltMap:
     doors: list[ClosedDoor]
     stamps: FloatArray
     trajectory: FloatArray
-    online: FloatArray
     loops: FloatArray
     keyframes: int
     seconds: float
@@ -98,7 +96,6 @@ def build_map(
         mapper.doors(),
         stamps,
         trajectory,
-        online,
         mapper.loops,
         len(mapper.keyframes),
         seconds,
@@ -112,7 +109,7 @@ def build_map(
 
 
 def _empty_remarks(run: RecordedRun, config: MapperConfig) -> tuple[Remark, ...]:
-    """Why a map shows no wall: as a rule, ranges in another unit."""
+    """Say why a map shows no wall: as a rule, ranges are in another unit."""
     ranges = np.concatenate([scan.ranges[scan.hits] for scan in run.scans])
     seen = f"half of the echoes are farther than {np.median(ranges):.4g} m" if ranges.size else "no echo in any scan"
     why = f"{seen}; the map takes those up to {config.max_range:g} m"

@@ -182,6 +182,7 @@ class Mapper:
     def _match(
         self, points: FloatArray, beams: Callable[[], Beams], stamp: float, before: Pose2, step: PredictedStep
     ) -> None:
+        """Match a scan from the predicted pose, and where the odometry may have failed from elsewhere too."""
         if self._motion.still and not self._moved_in_silence(points):
             return
         if self._motion.unmeasured is not None:
@@ -206,11 +207,13 @@ class Mapper:
             self._take(match)
 
     def _match_from(self, guess: Pose2, points: FloatArray) -> Match | None:
+        """Match points, robot frame [m], from a guess of ``map_T_robot``; ``None`` where they fit nowhere near."""
         config, reach = self._config.matcher, self._config.recovery.max_reach
         usual = self._usual_score
         return match_scan(self._local.field, points, guess, self._motion, usual_score=usual, config=config, reach=reach)
 
     def _take(self, match: Match) -> None:
+        """Take a match as the robot's pose, and learn from it how good matches usually are."""
         distance, angle = self._pose.distance(match.pose), abs(wrap_angle(match.pose.theta - self._pose.theta))
         if self._motion.unmeasured is None and not match.relocalised:
             self._motion = self._motion.corrected(distance, angle, self._config.matcher)
@@ -254,6 +257,7 @@ class Mapper:
     def _recover(
         self, direct: Match | None, points: FloatArray, beams: Callable[[], Beams], stamp: float
     ) -> Match | None:
+        """Search the surroundings for a pose that contradicts nothing; ``None`` where there is none."""
         recovery = self._config.recovery
         reach = min(max(recovery.reach, 1.5 * self._prediction.possible[0]), recovery.max_reach)
         match = relocalise(
@@ -274,25 +278,27 @@ class Mapper:
             self._events.note(Event.RECOVERED, stamp)
         return match
 
-    def _far(self, pose: Pose2, patience: float = 1.0) -> bool:
+    def _far(self, pose: Pose2, stretch: float = 1.0) -> bool:
         """Check whether a pose is as far from the latest keyframe as keyframes are apart."""
         latest, config = self.keyframes[-1].pose, self._config
         return (
-            latest.distance(pose) >= patience * config.keyframe_distance
-            or abs(wrap_angle(latest.theta - pose.theta)) >= patience * config.keyframe_angle
+            latest.distance(pose) >= stretch * config.keyframe_distance
+            or abs(wrap_angle(latest.theta - pose.theta)) >= stretch * config.keyframe_angle
         )
 
     def _wants_keyframe(self) -> bool:
+        """Check whether the scan goes into the map: far enough from the last one, later where it fits poorly."""
         recovery = self._config.recovery
         if not self.keyframes:
             return True
         if self._lost:
             # A map should not be given up while the next scan may still find back.
-            far = self._travelled - self.keyframes[-1].travelled > recovery.patience_distance
-            return far or self._lost >= recovery.patience
-        return self._far(self._pose, 1.0 if self._trusted else self._config.patience)
+            far = self._travelled - self.keyframes[-1].travelled > recovery.lost_distance
+            return far or self._lost >= recovery.lost_scans
+        return self._far(self._pose, 1.0 if self._trusted else self._config.poor_spacing)
 
     def _insert(self, keyframe: Keyframe) -> None:
+        """Add a keyframe to graph and local map, and close a loop where there is one."""
         if self.keyframes:
             latest = self.keyframes[-1]
             chord = latest.pose.distance(keyframe.pose)
@@ -314,6 +320,7 @@ class Mapper:
         self._local.update(self.keyframes, self._graph.graph.path_lengths, distances)
 
     def _start_submap(self, keyframe: Keyframe) -> None:
+        """Start a map of its own with a keyframe: nobody knows where it lies beside the ones before."""
         keyframe.submap = self._events.count(Event.SUBMAP) + 1
         self._events.note(Event.SUBMAP, keyframe.stamp)
         self._local.clear()

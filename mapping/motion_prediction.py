@@ -107,7 +107,7 @@ class MotionPrediction:
         resumed, self._silent = self._silent, False
         unreported, self._unreported = self._unreported, Pose2()
         seconds = max(seconds, SHORTEST_TIME) if seconds > 0.0 else UNKNOWN_TIME
-        if distance > self._config.max_speed * seconds or turn > self._config.max_turn_rate * seconds:
+        if distance > self._config.possible_speed * seconds or turn > self._config.possible_turn_rate * seconds:
             self._events.note(Event.JUMP, stamp)
             return PredictedStep(self._last, self.possible)
         if gap and (distance > GAP_MOTION[0] or turn > GAP_MOTION[1]):
@@ -121,6 +121,7 @@ class MotionPrediction:
         return PredictedStep(motion)
 
     def _without_change(self, stamp: float) -> PredictedStep:
+        """Predict a step from odometry that repeats itself: a robot that drove may be driving on unseen."""
         moving = math.hypot(self._last.x, self._last.y) > MOVING[0] or abs(self._last.theta) > MOVING[1]
         if not moving:
             self._silent = False

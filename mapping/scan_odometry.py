@@ -37,7 +37,7 @@ drifted, and putting it together is the mapper's task."""
 
 
 class ScanOdometry:
-    """Follows a robot by matching each scan with the last ones (correlative search, then refinement).
+    """Odometry by matching each scan with the last ones (correlative search, then refinement).
 
     It drifts as odometry does; the mapper takes it for odometry.
     """
@@ -121,6 +121,7 @@ class ScanOdometry:
         return match.score, match.pose
 
     def _remember(self, points: FloatArray) -> None:
+        """Add a scan to the surroundings; after some scans those are drawn anew from the last few."""
         if len(self._last) == SURROUNDINGS:
             self._stale += 1
         self._last.append((self._pose, points))

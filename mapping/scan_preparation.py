@@ -18,7 +18,7 @@ TOGETHER = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedScan:
-    """What the mapper takes from a scan.
+    """Parts of a scan that the mapper uses.
 
     Attributes:
         points: The points that are matched, robot frame, shape (n, 2) [m].

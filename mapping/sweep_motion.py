@@ -11,7 +11,7 @@ from closedrooms.core.scan import LaserScan
 
 @dataclass(frozen=True, slots=True)
 class SweepMotion:
-    """How the robot moves while a sweep is taken, by its odometry.
+    """Motion of the robot while a sweep is taken, by its odometry.
 
     Attributes:
         forward: Speed along the heading [m/s].

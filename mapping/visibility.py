@@ -14,7 +14,7 @@ FEW_POINTS = 15
 
 
 def conflict(a: Beams, b: Beams, a_T_b: Pose2) -> float | None:
-    """Share of the surfaces of one scan, of those that the other could see, that lie where its beams passed.
+    """Measure the share of one scan's surfaces in the other's view that lie where the beams of that one passed.
 
     Unlike a low match score it tells a wrong pose from a view of what was not seen before: new surfaces lie beyond what
     the other scan saw.
@@ -33,7 +33,7 @@ def conflict(a: Beams, b: Beams, a_T_b: Pose2) -> float | None:
 
 
 def _passed_through(beams: Beams, points: FloatArray) -> float | None:
-    """Share of the points, shape (n, 2) in the frame of the scan, in its view that lie well before its ends."""
+    """Measure which share of the points in a scan's view, shape (n, 2), its frame, lies well before its ends."""
     outline = beams.outline - beams.origin
     bearings, ranges = np.arctan2(outline[:, 1], outline[:, 0]), np.hypot(outline[:, 0], outline[:, 1])
     seen = ranges > 0.0

@@ -1,8 +1,6 @@
 """Decisions on the estimated map: where to look next, how to drive there, and how to follow a coverage tour.
 
-- ``control_loop``: sense, map, decide, move. Two deciders: ``explorer`` and ``tour_follower``.
-- Exploring: ``frontiers``, ``goal_search``.
-- Driving: ``costmap``, ``planner``, ``path_follower``, ``driver``, ``path_check``, ``path_back``, ``met_obstacles``.
-- Following a tour: ``opened_doors``, ``prediction_monitor``, ``revised_prediction``, ``remaining_tour``.
+- ``control_loop``: sense, map, decide, move. A ``decider`` is the ``explorer`` or the tour follower in ``tour/``.
+- Exploring: ``frontiers``, ``goal_search``. Driving, which both do: ``driving/``.
 - ``config``: settings of all of these; the robot itself is ``core.robot``.
 """

@@ -12,7 +12,7 @@ WIDE_ROBOT = 0.3
 
 @dataclass(frozen=True, kw_only=True)
 class NavigationConfig:
-    """How the robot chooses where to go and how it drives there; what it is like itself stands in ``RobotConfig``."""
+    """Settings of exploring and driving; the robot itself is described in ``RobotConfig``."""
 
     clearance_margin: float = 0.03
     """Least distance kept between footprint and mapped obstacles [m]; a 0.8 m door must stay passable."""
@@ -119,7 +119,7 @@ class NavigationConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class RobotNavigation(NavigationConfig):
-    """What planning and driving read: the settings, and the robot as it is."""
+    """Settings and robot, as planning and driving read them."""
 
     robot: RobotConfig
     """Whose radius and speeds are planned with."""

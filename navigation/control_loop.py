@@ -16,14 +16,14 @@ from closedrooms.core.observation import Observation
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
+from closedrooms.navigation.decider import Decider, Ending, Situation
 
-Outcome = Literal["complete", "stuck"]
 LoopStatus = Literal["complete", "stuck", "limit", "outside"]
-REASONS: dict[Outcome, str] = {"complete": "", "stuck": "the robot could not get free"}
+REASONS: dict[Ending, str] = {"complete": "", "stuck": "the robot could not get free"}
 
 
 class Robot(Protocol):
-    """What is sensed and moved: a simulation, or a real robot."""
+    """A robot that senses and moves, simulated or real."""
 
     @property
     def period(self) -> float:
@@ -33,11 +33,11 @@ class Robot(Protocol):
         """Sense what is around the robot now."""
 
     def step(self, v: float, w: float, duration: float) -> None:
-        """Let time pass under a velocity command."""
+        """Apply a velocity command ``v`` [m/s], ``w`` [rad/s] for ``duration`` [s]."""
 
 
 class MapMaker(Protocol):
-    """What makes the map and the pose that everything is decided on."""
+    """Source of the map and the pose that everything is decided on (SLAM)."""
 
     def process(self, scan: LaserScan, odometry: Pose2, sightings: Sequence[DoorSighting] = ()) -> Pose2:
         """Take in one scan; returns ``map_T_robot``."""
@@ -46,36 +46,9 @@ class MapMaker(Protocol):
         """Draw the map so far."""
 
 
-class Decider(Protocol):
-    """What decides where to drive."""
-
-    @property
-    def status(self) -> Outcome | None:
-        """How it ended, ``None`` before."""
-
-    def command(
-        self,
-        pose: Pose2,
-        scan: LaserScan,
-        grid: Callable[[], OccupancyGrid],
-        bumps: Sequence[float] = (),
-    ) -> tuple[float, float]:
-        """Decide on speed [m/s] and turn rate [rad/s] for now.
-
-        Args:
-            pose: ``map_T_robot`` as estimated.
-            scan: What the robot sees now.
-            grid: Returns the map as estimated; only called when something is decided on it.
-            bumps: Directions from which something presses, robot frame [rad].
-
-        Returns:
-            The command; (0, 0) once ``status`` is set.
-        """
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """One turn of the loop, after it was decided.
+    """One pass of the loop, once the command is decided and before it is applied.
 
     Attributes:
         observation: What was sensed.
@@ -87,16 +60,16 @@ class Step:
 
     @property
     def stamp(self) -> float:
-        """When [s]."""
+        """Timestamp [s]."""
         return self.observation.stamp
 
 
 @dataclass(frozen=True, slots=True)
 class EarlyEnd:
-    """Why a run ends early.
+    """Status and reason of a run that ends early.
 
     Attributes:
-        status: What it ends as.
+        status: Status of the run.
         reason: One line for people.
     """
 
@@ -106,7 +79,7 @@ class EarlyEnd:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoopLog:
-    """How a run went.
+    """Outcome of a run of the loop.
 
     Attributes:
         status: ``complete`` when there was nothing left to do, ``stuck`` when the robot could not get free, ``limit``
@@ -166,7 +139,7 @@ def run_loop(
         clock.lap("sense")
         pose = mapper.process(observation.scan, observation.odometry, observation.sightings)
         clock.lap("map")
-        v, w = decider.command(pose, observation.scan, limits.grid, observation.bumps)
+        v, w = decider.command(Situation(pose, observation.scan, limits.grid, observation.bumps))
         clock.lap("navigate")
         step = Step(observation, pose)
         stamps.append(step.stamp)
@@ -186,13 +159,14 @@ def run_loop(
 def _log(
     status: LoopStatus, reason: str, stamps: Sequence[float], poses: Sequence[Pose2], clock: "StepClock"
 ) -> LoopLog:
+    """Sum up a run that has ended."""
     path = np.array([(pose.x, pose.y) for pose in poses])
     distance = sum(a.distance(b) for a, b in pairwise(poses))
     return LoopLog(status, reason, np.array(stamps), path, distance, clock.seconds)
 
 
 class Limits:
-    """How long a run may last and how large its map may grow."""
+    """Limits of a run: simulated time, processor time, and size of the map."""
 
     def __init__(self, config: NavigationConfig, mapper: MapMaker) -> None:
         self._config = config

@@ -1,7 +1,7 @@
 """Exploration: where to look next, until nothing that can be reached is left unknown."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -9,14 +9,12 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import Point
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
-from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.control_loop import Outcome
-from closedrooms.navigation.driver import Driver
+from closedrooms.navigation.decider import Decider, Situation
+from closedrooms.navigation.driving.met_obstacles import barrier, touching_points
+from closedrooms.navigation.driving.path_check import fits_along
 from closedrooms.navigation.frontiers import still_unknown
 from closedrooms.navigation.goal_search import Goal, GoalSearch
-from closedrooms.navigation.met_obstacles import barrier, touching_points
-from closedrooms.navigation.path_check import fits_along
 
 # The path is checked this far ahead of the robot [m].
 CHECK_AHEAD = 3.0
@@ -30,8 +28,8 @@ CHANCES = 2
 SETTLE = 0.4
 
 
-class Explorer:
-    """Chooses goals on the estimated map and drives to them until no reachable frontier is left.
+class Explorer(Decider):
+    """Frontier exploration on the estimated map, until no reachable frontier is left.
 
     Greedy choice of the nearest frontier, with hysteresis: a goal is kept until its frontier is known, it is reached,
     its path is blocked, or a clearly nearer one turns up, which may happen ``max_switches`` times a goal. Every goal
@@ -43,10 +41,8 @@ class Explorer:
     """
 
     def __init__(self, config: RobotNavigation) -> None:
-        self.config = config
-        self.status: Outcome | None = None
+        super().__init__(config)
         self.goal: Goal | None = None
-        self._driver = Driver(config)
         self._search = GoalSearch(config)
         self._chosen: list[tuple[Point, int]] = []
         self._switches = 0
@@ -65,40 +61,29 @@ class Explorer:
         """Searches for a goal so far; changes when ``frontiers``, ``goal`` or its path do."""
         return self._search.count
 
-    def command(
-        self,
-        pose: Pose2,
-        scan: LaserScan,
-        grid: Callable[[], OccupancyGrid],
-        bumps: Sequence[float] = (),
-    ) -> tuple[float, float]:
-        """Decide on speed [m/s] and turn rate [rad/s] for now, see ``Decider.command``."""
-        now = scan.stamp
-        driver = self._driver
-        if self.status is not None:
-            return (0.0, 0.0)
-        if driver.state in {"stuck", "recovering"}:
-            return driver.command(pose, scan, now, bumps)
-        if self.goal is not None and now - self._checked_at >= self.config.check_interval - 1e-9:
-            self._check(pose, grid(), now)
-        if self.goal is None and not self._choose(pose, grid(), now):
-            return (0.0, 0.0)
-        assert self.goal is not None
-        if self._facing_since is not None:
-            return self._look(pose, grid, now)
-        command = driver.command(pose, scan, now, bumps)
-        if driver.state == "arrived":
-            self._facing_since = now
-        elif driver.state == "stuck":
-            self._search.map.add_obstacles(touching_points(pose, scan, self.config, bumps))
-            if driver.recoveries % HELD_UP == 0:
-                # What the scan does not show (glass, a sill) holds the robot: what lies behind is reached another way,
-                # or not at all, and the search goes on elsewhere.
-                self._search.map.add_obstacles(barrier(pose, driver.ahead(SAME_PLACE), self.config))
-            self.goal = None
-            if driver.recoveries > self.config.max_recoveries and not self._second_chance():
-                self.status = "stuck"
-        return command
+    def _has_goal(self, now: Situation) -> bool:
+        """Check the goal every so often, and search the nearest frontier where there is none."""
+        if self.goal is not None and now.stamp - self._checked_at >= self.config.check_interval - 1e-9:
+            self._check(now.pose, now.grid(), now.stamp)
+        return self.goal is not None or self._choose(now.pose, now.grid(), now.stamp)
+
+    def _drive(self, now: Situation) -> tuple[float, float]:
+        """Follow the path, and at its end face what is still unknown."""
+        return super()._drive(now) if self._facing_since is None else self._look(now.pose, now.grid, now.stamp)
+
+    def _arrive(self, now: Situation) -> None:
+        self._facing_since = now.stamp
+
+    def _get_stuck(self, now: Situation) -> None:
+        """Note obstacles where the robot is held up, across the path when that happens again and again."""
+        self._search.map.add_obstacles(touching_points(now.pose, now.scan, self.config, now.bumps))
+        if self._driver.recoveries % HELD_UP == 0:
+            # What the scan does not show (glass, a sill) holds the robot: what lies behind is reached another way,
+            # or not at all, and the search goes on elsewhere.
+            self._search.map.add_obstacles(barrier(now.pose, self._driver.ahead(SAME_PLACE), self.config))
+        self.goal = None
+        if self._driver.recoveries > self.config.max_recoveries:
+            self._second_chance()
 
     def _check(self, pose: Pose2, grid: OccupancyGrid, now: float) -> None:
         """Drop a goal that has become known; plan anew where the path is blocked or something nearer has turned up."""
@@ -175,6 +160,7 @@ class Explorer:
         return (0.0, 0.0)
 
     def _forget(self) -> None:
+        """Forget goal and path."""
         self.goal, self._facing_since, self._switches = None, None, 0
         self._driver.stop()
 

@@ -9,8 +9,8 @@ import numpy.typing as npt
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.costmap import Image, NavigationMap
-from closedrooms.navigation.planner import nonzero_cells
+from closedrooms.navigation.driving.costmap import Image, NavigationMap
+from closedrooms.navigation.driving.planner import nonzero_cells
 
 CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 SQUARE = np.ones((3, 3), dtype=np.uint8)

@@ -10,9 +10,9 @@ from closedrooms.core.door import Point
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.costmap import Costmap, NavigationMap, pooled, traversable
+from closedrooms.navigation.driving.costmap import Costmap, NavigationMap, pooled, traversable
+from closedrooms.navigation.driving.planner import Path, PathSearch, reachable_cells, start_cell
 from closedrooms.navigation.frontiers import Frontiers, find_frontiers, seen_from
-from closedrooms.navigation.planner import Path, PathSearch, reachable_cells, start_cell
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +31,7 @@ class Goal:
 
 
 class GoalSearch:
-    """Finds the nearest frontier that can be looked at from a place that the robot can reach.
+    """Search for the nearest frontier that can be looked at from a place that the robot can reach.
 
     Attributes:
         map: The map that is searched; obstacles that the robot met are added there.

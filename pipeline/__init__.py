@@ -1,7 +1,7 @@
 """Whole jobs: a run in a simulated building, and each of its stages on anybody's files.
 
-- One command a file: ``run``, ``predict``, ``map``, ``cover``, ``propose_doors``, ``edit``, ``view``, ``world_files``;
-  their options: ``config``, ``propose_doors_config``, ``view_config``. Doors of a user: ``given_doors``.
+- One command a file: ``run``, ``predict``, ``map``, ``cover``, ``propose_doors``, ``edit``, ``view``, ``world_files``.
+  Their options: ``config``, ``worlds_config``, ``propose_doors_config``, ``view_config``. Doors given: ``given_doors``.
 - Parts of a run: ``survey`` (explore and map), ``bounds``, ``drive``; several runs: ``runs``.
 - ``reporting/``: progress, figures, tables, ``run.json``.
 

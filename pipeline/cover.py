@@ -9,7 +9,7 @@ import numpy as np
 from closedrooms.core.door import ClosedDoor, Point
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import write_doors, write_features
-from closedrooms.core.files.outgoing import check_output_folder, output_folder
+from closedrooms.core.files.output_folders import check_output_folder, output_folder
 from closedrooms.core.files.rosmap import RosMap, read_ros_map, write_map
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.report import Report

@@ -12,8 +12,8 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import RobotNavigation
 from closedrooms.navigation.control_loop import LoopLog, Step, run_loop
-from closedrooms.navigation.opened_doors import ReopenedMap
-from closedrooms.navigation.tour_follower import DOOR_WAIT, TourFollower, TourOutcome, TourPlan
+from closedrooms.navigation.tour.opened_doors import ReopenedMap
+from closedrooms.navigation.tour.tour_follower import DOOR_WAIT, TourFollower, TourOutcome, TourPlan
 from closedrooms.pipeline.bounds import Outline
 from closedrooms.pipeline.reporting.live_recording import DriveRecording
 from closedrooms.pipeline.reporting.run_log import RunLog
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DriveResult:
-    """How a tour was driven.
+    """Outcome of driving a tour.
 
     Attributes:
         log: Status, travelled distance and path.
@@ -41,7 +41,7 @@ class DriveResult:
 
 
 class Porter:
-    """Opens the closed doors of a building for a robot that drives a tour.
+    """Opener of a building's closed doors for a robot that drives a tour.
 
     Doors of rooms that are to be seen first open one after the other, each when the robot is done with the one before;
     when none of them is left, all others do.
@@ -74,7 +74,7 @@ class Porter:
 
 @dataclass(frozen=True, kw_only=True)
 class DriveSettings:
-    """What a drive goes by: the configurations of the stages that go on while it lasts."""
+    """Settings of a drive: the configurations of the stages that go on while it lasts."""
 
     navigation: RobotNavigation
     mapper: MapperConfig

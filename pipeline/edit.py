@@ -24,7 +24,7 @@ from closedrooms.predictor.prediction import Prediction
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EditedPrediction:
-    """What came of one prediction of the page.
+    """Outcome of one prediction of the page.
 
     Attributes:
         prediction: In the frame of the grid; ``None`` where the whole failed.

@@ -16,8 +16,8 @@ def given_doors(path: Path, remarks: list[Remark]) -> list[ClosedDoor]:
 
     Raises:
         InvalidInputError: See :func:`closedrooms.core.files.geojson.read_doors`,
-            :func:`closedrooms.mapping.logs.clicked_points.read_clicked_points`.
+            :func:`closedrooms.mapping.logs.bags.clicked_points.read_clicked_points`.
     """
-    from closedrooms.mapping.logs.clicked_points import is_bag, read_clicked_points
+    from closedrooms.mapping.logs.bags.clicked_points import is_bag, read_clicked_points
 
     return read_clicked_points(path, remarks=remarks) if is_bag(path) else read_doors(path, remarks=remarks)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.files.geojson import write_doors
-from closedrooms.core.files.outgoing import check_output_folder, output_folder
+from closedrooms.core.files.output_folders import check_output_folder, output_folder
 from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.files.tum import write_trajectory
 from closedrooms.core.pose import Pose2
@@ -18,7 +18,7 @@ from closedrooms.mapping.map_builder import BuiltMap, build_map
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import align
 from closedrooms.pipeline.config import MapConfig
-from closedrooms.pipeline.reporting.log_observer import LogWatch
+from closedrooms.pipeline.reporting.log_observer import TRACKS, LogWatch
 from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
 from closedrooms.pipeline.reporting.stopwatch import Stopwatch
@@ -62,6 +62,7 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> Report:
     ):
         observer.configuration(manifest["configuration"])
         log_watch = LogWatch(observer, run)
+        log_watch.begin()
         progress.stage("map", len(run.scans))
 
         def step(number: int, map_T_robot: Pose2, mapper: Mapper) -> None:
@@ -89,15 +90,9 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> Report:
 
 def _rows(built: BuiltMap) -> list[tuple[str, str]]:
     """List the rows of the table for people."""
-    names = {
-        "odometry": "raw odometry",
-        "scans_alone": "scans alone",
-        "online": "as estimated on the way",
-        "final": "final",
-    }
     errors = {
         text: f"{built.errors[name][0]:.3f} m, {math.degrees(built.errors[name][1]):.2f} deg"
-        for name, text in names.items()
+        for name, text in TRACKS.items()
         if name in built.errors
     }
     gaps = find_gaps(built.stamps)
@@ -113,6 +108,7 @@ def _rows(built: BuiltMap) -> list[tuple[str, str]]:
 
 
 def _metrics(built: BuiltMap) -> dict[str, Any]:
+    """List the figures of ``run.json``."""
     errors = {name: {"ate_m": round(m, 5), "ate_rad": round(rad, 6)} for name, (m, rad) in built.errors.items()}
     return {
         "scans": len(built.stamps),
@@ -124,6 +120,7 @@ def _metrics(built: BuiltMap) -> dict[str, Any]:
 
 
 def _write(folder: Path, run: RecordedRun, built: BuiltMap) -> None:
+    """Write map, trajectories, doors and picture; the reference is aligned with the trajectory first."""
     from closedrooms.visualization.summary import draw_map
 
     write_map(folder / "map", built.grid)
@@ -137,6 +134,7 @@ def _write(folder: Path, run: RecordedRun, built: BuiltMap) -> None:
 
 @contextlib.contextmanager
 def _recording(config: MapConfig, path: Path) -> Iterator["Recorder"]:
+    """Open a recording named after the log, or none."""
     if not config.record:
         yield no_recording()
         return

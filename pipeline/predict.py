@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import write_doors, write_rooms
-from closedrooms.core.files.outgoing import check_output_folder, output_folder
+from closedrooms.core.files.output_folders import check_output_folder, output_folder
 from closedrooms.core.files.rosmap import RosMap, read_ros_map, write_map, write_raw_map
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.report import Report
@@ -129,6 +129,7 @@ def _figures(room: Room) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def _recording(config: PredictConfig, grid: OccupancyGrid, path: Path) -> Iterator["Recorder"]:
+    """Open a recording that shows what is known of the map, or none."""
     if not config.record:
         yield no_recording()
         return

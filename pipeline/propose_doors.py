@@ -7,7 +7,7 @@ import numpy as np
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.geojson import Feature, write_features
+from closedrooms.core.files.geojson import GeoFeature, write_features
 from closedrooms.core.files.outgoing import new_files
 from closedrooms.core.files.rosmap import RosMap, read_ros_map
 from closedrooms.core.report import Report
@@ -35,6 +35,7 @@ def doors_map(config: DoorsConfig, *, progress: Progress | None = None) -> Repor
 
 
 def _doors_map(config: DoorsConfig, progress: Progress, watch: Stopwatch) -> Report:
+    """Read the map, propose doors, write them and, on demand, their picture."""
     with watch.stage("read"):
         progress.stage("read")
         read = read_ros_map(config.map, allow_outside=config.allow_outside)
@@ -80,7 +81,7 @@ def _on_map(read: RosMap, door: DoorProposal) -> DoorProposal:
     return replace(door, segment=((x0, y0), (x1, y1)))
 
 
-def _feature(name: str, door: DoorProposal) -> Feature:
+def _feature(name: str, door: DoorProposal) -> GeoFeature:
     from shapely.geometry import LineString
 
     return LineString(door.segment), _properties(name, door)

@@ -2,49 +2,44 @@
 
 import contextlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.geojson import write_doors, write_features, write_rooms
-from closedrooms.core.files.outgoing import check_output_folder, output_folder
-from closedrooms.core.files.rosmap import write_map, write_raw_map
-from closedrooms.core.files.tum import write_trajectory
+from closedrooms.core.files.output_folders import check_output_folder, output_folder
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.names import file_name
-from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
 from closedrooms.core.report import Report
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.cost_spread import CostSpread, spread_cost
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
-from closedrooms.coverage.tour.tour_features import make_tour_features
 from closedrooms.coverage.tour.tour_planner import plan_coverage
-from closedrooms.mapping.logs.bag_writer import check_bags, write_bag
+from closedrooms.mapping.logs.bags.bag_writer import check_bags, write_bag
 from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.navigation.tour_follower import TourPlan
+from closedrooms.navigation.tour.tour_follower import TourPlan
 from closedrooms.pipeline.bounds import check_size, check_width, too_narrow
 from closedrooms.pipeline.config import RunConfig
-from closedrooms.pipeline.drive import DriveResult, DriveSettings, drive_tour
-from closedrooms.pipeline.reporting.drive_report import draw_drive, drive_features, drive_metrics
+from closedrooms.pipeline.drive import DriveSettings, drive_tour
 from closedrooms.pipeline.reporting.live_recording import GrowingPrediction
-from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
+from closedrooms.pipeline.reporting.manifest import resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
 from closedrooms.pipeline.reporting.report import markdown, run_report
+from closedrooms.pipeline.reporting.run_directory import Finding, run_figures, stopped_stages, write_run_files
 from closedrooms.pipeline.reporting.run_log import RunLog
-from closedrooms.pipeline.reporting.run_metrics import run_metrics
 from closedrooms.pipeline.reporting.scores import room_iou
 from closedrooms.pipeline.reporting.stopwatch import Stopwatch
-from closedrooms.pipeline.survey import Survey, Truth, survey_building, true_building
+from closedrooms.pipeline.reporting.story import describe_robot, summarise_run
+from closedrooms.pipeline.survey import Survey, survey_building, true_building
 from closedrooms.predictor.methods import predict
-from closedrooms.predictor.prediction import Prediction, free_probability
+from closedrooms.predictor.prediction import Prediction
 from closedrooms.sim.simulation import Simulation
 from closedrooms.visualization.rerun.opening import open_recording
 from closedrooms.worlds.closing import check_closed, closable_rooms, draw_closed
-from closedrooms.worlds.library import load_world
+from closedrooms.worlds.library import load_world, world_source
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.truth import true_rooms
 
@@ -53,31 +48,6 @@ if TYPE_CHECKING:
 
 DEFAULT_CLOSED = 5
 START = (0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Finding:
-    """What a run finds out; maps on one frame.
-
-    Attributes:
-        survey: What the robot brought home.
-        prediction: The rooms behind the closed doors.
-        truth: What is really there.
-        tours: By the map that they were planned on: ``closed``, ``predicted``, ``truth``.
-        missing: Why there is no tour, by the same names.
-        notes: What their planning says.
-        spread: What covering the building may cost, on demand.
-        driven: How the predicted tour was driven, on demand.
-    """
-
-    survey: Survey
-    prediction: Prediction
-    truth: Truth
-    tours: dict[str, CoverageTour]
-    missing: dict[str, str]
-    notes: list[str]
-    spread: CostSpread | None = None
-    driven: DriveResult | None = None
 
 
 # What says where a run is written and watched, and how many there are, but nothing of its result.
@@ -100,7 +70,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
     """
     progress, watch = progress or Silent(), Stopwatch()
     if config.sim.robot_urdf is not None:
-        from closedrooms.sim.robot_urdf import with_own_robot
+        from closedrooms.sim.robot.robot_urdf import with_own_robot
 
         config = replace(config, sim=with_own_robot(config.sim))
     with watch.stage("world"):
@@ -116,7 +86,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
     manifest: dict[str, Any] = {
         "command": "run",
         "configuration": resolved(config, leave_out=ASIDE),
-        "paths": {"world": input_path(config.world)},
+        "paths": {"world": world_source(config.world)},
         "world": plan.name,
         "seed": config.seed,
         "closed": list(closed),
@@ -131,6 +101,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
     ):
         recorder.configuration(manifest["configuration"])
         recorder.building(sim.plan, sim.world_T_map.inverse(), closed)
+        recorder.note(describe_robot(config))
         log, mapper = RunLog(sim, progress, keep_scans=config.keep_scans or config.bag), Mapper(config.mapper)
         found = _find_out(config, closed, log, mapper, recorder, progress, watch)
         remarks = [
@@ -138,18 +109,19 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
             *mapper.events,
             *too_narrow(plan, closed, sim.world_T_map, config.navigation.for_robot(config.sim.robot)),
         ]
-        manifest |= _figures(plan, closed, sim.world_T_map.inverse(), found)
+        manifest |= run_figures(plan, closed, sim.world_T_map.inverse(), found)
         manifest["remarks"] = [remark.as_json() for remark in remarks]
+        recorder.note(summarise_run(manifest["metrics"]))
         with watch.stage("write"):
             progress.stage("write")
-            _write(staging, found, manifest["metrics"])
+            write_run_files(staging, found, manifest["metrics"])
             if config.keep_scans:
                 write_scans(staging / "scans.npz", log.recorded(), estimate=mapper.trajectory()[1])
             if config.bag:
                 write_bag(staging / "sensed", log.recorded())
         manifest["durations"] = watch.seconds()
         title = f"{plan.name}, seed {config.seed}, noise {config.noise}"
-        result = run_report(folder, title, manifest, stopped=_stopped(found), remarks=remarks)
+        result = run_report(folder, title, manifest, stopped=stopped_stages(found), remarks=remarks)
         recorder.table(markdown(result))
     return result
 
@@ -261,7 +233,7 @@ def _spread(
     config: RunConfig,
     recorder: "Recorder",
 ) -> CostSpread | None:
-    """What covering the building may cost, where asked for and where there is a tour on the predicted map."""
+    """Estimate what covering the building may cost, where asked for and where there is a tour on the predicted map."""
     if not config.completions or "predicted" not in tours:
         return None
     spread = spread_cost(
@@ -282,66 +254,3 @@ def _spread(
 def _coverage(config: RunConfig) -> CoverageConfig:
     """Set the tours for the robot that is simulated."""
     return replace(config.coverage, graph=replace(config.coverage.graph, robot_radius=config.sim.robot.radius))
-
-
-def _figures(plan: FloorPlan, closed: Sequence[str], map_T_world: Pose2, found: Finding) -> dict[str, Any]:
-    """List what ``run.json`` says of a finding."""
-    survey, log, prediction = found.survey, found.survey.exploration, found.prediction
-    metrics = run_metrics(plan, closed, map_T_world, survey, prediction, found.truth, found.tours)
-    if found.spread is not None:
-        truth = found.tours.get("truth")
-        metrics["completions"] = found.spread.figures(None if truth is None else truth.length)
-    if found.driven is not None:
-        metrics["drive"] = drive_metrics(found.driven, plan, map_T_world, found.truth, found.tours.get("truth"))
-    seen = [door.id for door in survey.doors]
-    return {
-        "exploration": {
-            "status": log.status,
-            "simulated_s": round(log.seconds, 3),
-            "scans": log.scans,
-            "distance_m": round(log.distance, 3),
-            "plans": survey.searches,
-            **({"reason": log.reason} if log.reason else {}),
-        },
-        "metrics": metrics,
-        "doors": {"seen": seen, "not_seen": sorted(set(closed) - set(seen)), "failures": prediction.failures},
-        "notes": [*found.missing.values(), *found.notes],
-    }
-
-
-def _stopped(found: Finding) -> dict[str, str]:
-    """Say which stage ended before it was done, and why."""
-    logs = {"exploration": found.survey.exploration} | ({} if found.driven is None else {"drive": found.driven.log})
-    stopped = {stage: f"{log.status}, {log.reason}" for stage, log in logs.items() if log.status != "complete"}
-    return stopped | ({"cover": "; ".join(found.missing.values())} if found.missing else {})
-
-
-def _write(folder: Path, found: Finding, metrics: Mapping[str, Any]) -> None:
-    """Write every data file of the run directory, then the pictures."""
-    from closedrooms.visualization.summary import draw_summary
-
-    survey, prediction, truth, driven = found.survey, found.prediction, found.truth, found.driven
-    write_map(folder / "map", survey.grid)
-    write_map(folder / "predicted", prediction.grid)
-    write_map(folder / "truth", truth.grid)
-    write_doors(folder / "doors.geojson", survey.doors)
-    write_rooms(folder / "rooms.geojson", prediction.rooms)
-    write_raw_map(folder / "probability", free_probability(prediction, survey.grid))
-    write_rooms(folder / "truth_rooms.geojson", truth.rooms)
-    write_trajectory(folder / "trajectory.tum", survey.stamps, survey.estimate)
-    write_trajectory(folder / "trajectory_truth.tum", survey.stamps, survey.truth)
-    features = [f for name, tour in found.tours.items() for f in make_tour_features(tour, name)]
-    write_features(folder / "tour.geojson", features + ([] if driven is None else drive_features(driven)))
-    if driven is not None:
-        draw_drive(folder / "drive.png", driven, truth.rooms)
-    draw_summary(
-        folder / "summary.png",
-        survey.grid,
-        prediction,
-        survey.doors,
-        truth=truth.grid,
-        truth_rooms=truth.rooms,
-        room_iou=metrics["room_iou"],
-        tours=found.tours,
-        trajectory=survey.estimate,
-    )

@@ -76,6 +76,7 @@ HEAD = ("run", "doors seen", "area mapped", "ATE", "IoU mean", "tour error")
 
 
 def _row(name: str, figures: Mapping[str, Any]) -> tuple[str, ...]:
+    """Make the row of one run in the table of several, see ``HEAD``."""
     metrics = figures["metrics"]
     return (
         name,

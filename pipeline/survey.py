@@ -8,6 +8,7 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
+from closedrooms.core.report import counted
 from closedrooms.core.room import Room
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import NavigationConfig
@@ -18,6 +19,7 @@ from closedrooms.pipeline.reporting.live_recording import ExplorationRecording, 
 from closedrooms.pipeline.reporting.progress import Progress, Silent
 from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.pipeline.reporting.stopwatch import Stopwatch
+from closedrooms.pipeline.reporting.story import known_area
 from closedrooms.visualization.no_recording import no_recording
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.truth import rasterise, true_rooms, truth_bounds
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Survey:
-    """What the robot brought home.
+    """Map, poses and doors that the robot brought home from a simulated building, the truth beside it.
 
     Attributes:
         grid: The map M.
@@ -89,7 +91,7 @@ def survey_building(
     )  # fmt: skip
     end = float(exploration.stamps[-1])
     went = f"{exploration.status} after {exploration.seconds:.1f} s and {exploration.distance:.1f} m"
-    recorder.note(f"exploration {went}", end)
+    recorder.note(f"exploration {went}: {exploration.reason or 'nothing that can be reached is left unknown'}", end)
     for name, seconds in exploration.wall_seconds.items():
         watch.add(name, seconds)
     with watch.stage("finish map"):
@@ -101,7 +103,10 @@ def survey_building(
         recorder.trajectory(stamps, poses)
         recorder.map(grid, end, final=True)
         recorder.doors(doors, end)
-        recorder.note(f"map finished: {len(mapper.loops)} loops closed, {len(doors)} closed doors seen")
+        known = f"{known_area(grid):.0f} m² known, {counted(len(mapper.loops), 'loop')} closed"
+        recorder.note(f"map finished: {known}, {counted(len(doors), 'closed door')} seen")
+        for remark in mapper.events:
+            recorder.note(str(remark))
     return Survey(grid, doors, exploration, explorer.searches, stamps, poses, log.truth)
 
 

@@ -8,14 +8,16 @@ import socket
 import subprocess
 import sys
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import quote
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
 from closedrooms.core.files.incoming import check_regular, is_file, is_folder, read_json
-from closedrooms.core.files.outgoing import MANIFEST
+from closedrooms.core.files.output_folders import MANIFEST
 from closedrooms.core.files.schema import check_schema
 from closedrooms.core.runtime.packages import require
+from closedrooms.core.runtime.stopping import ending_with
 from closedrooms.pipeline.reporting.progress import Progress
 from closedrooms.pipeline.view_config import ViewConfig
 
@@ -87,6 +89,11 @@ def find_viewer() -> str:
     Raises:
         ViewerError: It is not there.
     """
+    # The viewer itself: the script of this name only starts it, and leaves it behind where it is killed.
+    package = find_spec("rerun_cli")
+    itself = Path(package.origin).with_name("rerun") if package is not None and package.origin else None
+    if itself is not None and os.access(itself, os.X_OK):
+        return str(itself)
     beside = shutil.which("rerun", path=str(Path(sys.executable).parent))
     viewer = beside or shutil.which("rerun")
     if viewer is None:
@@ -101,10 +108,11 @@ def _wait_for(words: Sequence[str]) -> None:
         ViewerError: It ended in an error, told by its last line.
     """
     try:
-        # `rerun` is a script that starts the viewer itself: a group of their own lets both be ended.
+        # A group of its own lets it be ended with whatever it starts; killed ourselves, we leave nobody behind.
         viewer = subprocess.Popen(
-            words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
-        )
+            words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True,
+            preexec_fn=ending_with(os.getpid(), signal.SIGKILL),  # noqa: PLW1509 (it takes no lock)
+        )  # fmt: skip
     except OSError as error:
         raise ViewerError(f"cannot start {words[0]}: {error.strerror}") from error
     last = ""

@@ -1,9 +1,9 @@
 """From a map and its closed doors to the rooms behind them (paper, sections 3 and 4).
 
 ``methods`` is the registry: every method by name, also those of other packages (CONTRIBUTING.md says how to add one);
-``config`` holds their settings. ``paper/``, ``best/`` and ``baselines`` are the methods, ``structure/`` what a grid
-shows to all of them. ``prediction`` is the result; ``disjoint_rooms`` and ``inpainting`` finish it, ``confidence/``
-says how sure it is, ``revision`` goes on with it as knowledge arrives.
+``config`` holds their settings. ``paper/`` (also rose), ``best/``, ``learned/`` and ``baselines`` are the methods,
+``structure/`` is what a grid shows to all of them. ``prediction`` is the result; ``disjoint_rooms`` and ``inpainting``
+finish it, ``confidence/`` says how sure it is, ``revision`` goes on with it as knowledge arrives.
 """
 
 from typing import TYPE_CHECKING
@@ -13,6 +13,7 @@ from closedrooms.core.runtime.lazy import lazy_face
 if TYPE_CHECKING:
     from closedrooms.predictor.config import BestConfig as BestConfig
     from closedrooms.predictor.config import FacesConfig as FacesConfig
+    from closedrooms.predictor.config import LearnedConfig as LearnedConfig
     from closedrooms.predictor.config import MethodConfig as MethodConfig
     from closedrooms.predictor.config import PaperConfig as PaperConfig
     from closedrooms.predictor.config import RoseConfig as RoseConfig
@@ -26,7 +27,7 @@ __getattr__, __dir__, __all__ = lazy_face(
     __name__,
     {
         "methods": ("METHODS", "Method", "find_method", "predict"),
-        "config": ("BestConfig", "FacesConfig", "MethodConfig", "PaperConfig", "RoseConfig"),
+        "config": ("BestConfig", "FacesConfig", "LearnedConfig", "MethodConfig", "PaperConfig", "RoseConfig"),
         "prediction": ("Prediction",),
     },
 )

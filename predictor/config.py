@@ -17,7 +17,7 @@ RoomOrder = Literal["smallest-first", "largest-first", "by-position"]
 
 @dataclass(frozen=True, kw_only=True)
 class LinesConfig:
-    """How walls become lines (paper, section 3.1). Defaults: read in the authors' published structure extraction."""
+    """Settings of wall lines (paper, section 3.1). Defaults: read in the authors' published structure extraction."""
 
     resolution: float = 0.05
     """Cell size that a map is brought to before walls are looked for [m]."""
@@ -74,7 +74,7 @@ class LinesConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class DirectionsConfig:
-    """Which directions of walls count, by mean shift over the angles of segments (paper, section 3.1)."""
+    """Choice of wall directions, by mean shift over the angles of segments (paper, section 3.1)."""
 
     min_segment: float = 0.50
     """Shorter segments have no say in which directions there are [m]: ten cells tell a direction to 6 degrees."""
@@ -126,7 +126,7 @@ class Weights:
 
 @dataclass(frozen=True, kw_only=True)
 class MethodConfig:
-    """What every method of ours reads."""
+    """Settings that every method of ours reads."""
 
     clutter_area: float = 4.0
     """What free space surrounds and covers less than this counts as free where walls are looked for [m2]: furniture."""

@@ -13,6 +13,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Protocol
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.names import shown
 from closedrooms.core.nearest import nearest
 from closedrooms.predictor.config import BestConfig, FacesConfig, LearnedConfig, PaperConfig, RoseConfig
 
@@ -26,7 +27,7 @@ DEFAULT_METHOD = "best"
 
 
 class Predictor(Protocol):
-    """What a method does."""
+    """Function that predicts rooms."""
 
     def __call__(self, grid: "OccupancyGrid", doors: "Sequence[ClosedDoor]", config: Any) -> "Prediction":
         """Predict the rooms behind ``doors``; trouble with one door stands in ``failures`` and stops no other."""
@@ -130,7 +131,7 @@ _OURS = (
 
 
 class _Methods(Mapping[str, Method]):
-    """Ours first, then those of other packages by name; a package is imported when its method is asked for."""
+    """Our methods, then those of other packages by name; a package is imported when its method is asked for."""
 
     def __getitem__(self, name: str) -> Method:
         for method in _OURS:
@@ -161,7 +162,10 @@ def find_method(name: str) -> Method:
     except KeyError:
         near = nearest(name, METHODS)
         meant = f" (did you mean {near}?)" if near else ""
-        raise InvalidInputError(f"unknown method {name!r}{meant}", expected=f"one of {', '.join(METHODS)}") from None
+        known = ", ".join(METHODS)
+        raise InvalidInputError(
+            f"unknown method {shown(name, longest=80)!r}{meant}", expected=f"one of {known}"
+        ) from None
 
 
 def predict(
@@ -199,6 +203,7 @@ def predict(
 
 @cache
 def _entries() -> tuple[Any, ...]:
+    """List the entry points by which other packages add methods."""
     # Only who names a method that is not ours, or asks for all, waits for this.
     from importlib.metadata import entry_points
 

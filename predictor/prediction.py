@@ -57,7 +57,7 @@ class PredictionTrace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WeighedRoom:
-    """What a method weighed for one room: its candidates, and why one of them was taken.
+    """Candidates that a method weighed for one room, and why one of them was taken.
 
     Attributes:
         doors: Ids of the doors that lead to it.
@@ -81,7 +81,7 @@ class WeighedRoom:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WeighedTrace:
-    """What a method that weighs whole rooms saw and weighed; all coordinates in the map frame [m].
+    """Evidence and candidates of a method that weighs whole rooms; all coordinates in the map frame [m].
 
     Attributes:
         faces: Wall faces ``x0, y0, x1, y1``, shape (n, 4).

@@ -9,11 +9,12 @@ from shapely.geometry import Polygon
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.sim.config import SimConfig
 from closedrooms.sim.contacts import Obstacles, edges_of
-from closedrooms.sim.differential_drive import Drive
 from closedrooms.sim.door_leaves import door_leaves
 from closedrooms.sim.doors import Door, HungDoor, PlacedDoor
 from closedrooms.sim.glass import glass_area
-from closedrooms.sim.physics_world import FURNITURE, PANE, WALLS, Colour, PhysicsWorld, upright
+from closedrooms.sim.physics_world import PhysicsWorld
+from closedrooms.sim.robot.differential_drive import Drive
+from closedrooms.sim.solids import FURNITURE, PANE, WALLS, Colour, upright
 from closedrooms.worlds.extrusion import extrude
 from closedrooms.worlds.geometry import areal, door_gap, wall_area
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
@@ -88,6 +89,7 @@ class Building:
         self._opening = [door for door in self._opening if door.opens]
 
     def _add_static(self, area: Polygon | shapely.MultiPolygon, height: float | None, colour: Colour) -> list[int]:
+        """Extrude an area, building frame [m], to a height [m] or that of the walls; returns its bodies."""
         vertices, triangles = extrude(area) if height is None else extrude(area, height=height)
         return self._physics.add_static(vertices, upright(vertices, triangles), colour)
 
@@ -101,6 +103,11 @@ def building_solids(plan: FloorPlan) -> Polygon | shapely.MultiPolygon:
 
 
 def _check_doors(plan: FloorPlan, wanted: Collection[str], inner: Collection[str]) -> None:
+    """Check that doors to close or open lie between two rooms.
+
+    Raises:
+        InvalidInputError: One does not; the message lists those that do.
+    """
     for name in wanted:
         if name not in inner:
             known = f"one of {', '.join(inner)}" if inner else "none: this plan has no doors between rooms"

@@ -12,7 +12,8 @@ from shapely.geometry import MultiPolygon, Polygon
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.random import stream
 from closedrooms.sim.contacts import Obstacles, leaf_edges
-from closedrooms.sim.physics_world import PERSON, PhysicsWorld, upright
+from closedrooms.sim.physics_world import PhysicsWorld
+from closedrooms.sim.solids import PERSON, upright
 from closedrooms.worlds.extrusion import extrude
 from closedrooms.worlds.plan import FloorPlan
 
@@ -30,7 +31,7 @@ TRIES = 40
 
 
 class Mover(Protocol):
-    """Something that moves by itself."""
+    """Person or thing that moves by itself."""
 
     @property
     def outline(self) -> Polygon:
@@ -64,7 +65,7 @@ class _Body:
 
 
 class Floor:
-    """Where people can walk: cells of free floor that hang together with the robot's start."""
+    """Floor that people can walk on: free cells that hang together with the robot's start."""
 
     def __init__(self, plan: FloorPlan, solids: Polygon | MultiPolygon, start: tuple[float, float]) -> None:
         x0, y0, x1, y1 = shapely.union_all([room.polygon for room in plan.rooms]).bounds

@@ -107,7 +107,7 @@ LIDAR_PRESETS: Mapping[str, LidarConfig] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True)
 class NoiseConfig:
-    """How wrong the lidar and the odometry are.
+    """Errors of lidar and odometry.
 
     The odometry's figures are standard deviations after one metre driven or one full turn. Errors have zero mean and a
     variance that grows linearly with the travelled distance (Thrun, Burgard, Fox: Probabilistic Robotics, section 5.4,
@@ -199,7 +199,7 @@ def lidar_preset(name: str) -> LidarConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class FaultConfig:
-    """What fails on the robot; nothing by default."""
+    """Failures of the robot's sensors and odometry; none by default."""
 
     lost_scans: float = 0.0
     """Share of sweeps that arrive without a measurement [0..1]."""

@@ -25,7 +25,7 @@ LeafName = tuple[str, int]
 
 
 class Moved(NamedTuple):
-    """Where the disc got to [m], and whether something stopped or turned it."""
+    """Place that the disc got to [m], and whether something stopped or turned it."""
 
     x: float
     y: float

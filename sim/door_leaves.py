@@ -119,6 +119,7 @@ def _opening_side(plan: FloorPlan, door: PlanDoor) -> FloatArray:
 def _hinged_leaf(
     jamb: FloatArray, free: FloatArray, half: float, side: FloatArray, solids: Solids, swing: float
 ) -> Leaf:
+    """Hang a leaf at a jamb so that it turns to ``side`` by ``swing`` [rad], or until it meets a solid."""
     along = (free - jamb) / np.linalg.norm(free - jamb)
     leaf = Leaf(
         corners=_rectangle(jamb, free, half),

@@ -9,7 +9,8 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.sim.config import SimConfig
 from closedrooms.sim.contacts import Obstacles, leaf_edges
 from closedrooms.sim.door_leaves import Leaf
-from closedrooms.sim.physics_world import MovingPart, PhysicsWorld, upright
+from closedrooms.sim.physics_world import PhysicsWorld
+from closedrooms.sim.solids import MovingPart, upright
 from closedrooms.worlds.extrusion import extrude
 from closedrooms.worlds.plan import PlanDoor
 
@@ -180,6 +181,7 @@ class HungDoor:
                 self._let_go(link)
 
     def _let_go(self, link: int) -> None:
+        """Leave a leaf to push and friction, no motor."""
         friction = SLIDE_FRICTION if self.leaves[link].slides else HINGE_FRICTION
         self._physics.brake_joint(self.body, link, friction)
 

@@ -19,7 +19,7 @@ ON_WALL = 0.4
 
 
 class Faults:
-    """Spoils what was measured, each fault by a stream of its own."""
+    """Faults applied to measurements, each by a random stream of its own."""
 
     def __init__(self, config: FaultConfig, plan: FloorPlan, seed: int) -> None:
         self.config = config
@@ -93,5 +93,6 @@ def phantom_places(plan: FloorPlan, count: int, seed: int) -> list[tuple[Point, 
 
 
 def _moved(b_T_a: Pose2, point: Point) -> Point:
+    """Transform a point from frame a to frame b [m]."""
     pose = b_T_a @ Pose2(*point)
     return (pose.x, pose.y)

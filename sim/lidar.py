@@ -108,6 +108,7 @@ class Lidar:
         return expected
 
     def _shoot(self, start: FloatArray, directions: FloatArray, lengths: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Cast rays up to ``lengths`` [m]: distances, infinity without a hit, and bodies hit, -1 without."""
         starts = np.full((*start.shape[:-1], 3), self.config.height)
         starts[..., :2] = start
         ends = np.full((len(directions), 3), self.config.height)

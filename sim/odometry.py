@@ -8,7 +8,7 @@ import numpy as np
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
 from closedrooms.sim.config import NoiseConfig
-from closedrooms.sim.differential_drive import Motion
+from closedrooms.sim.robot.driven_robot import Motion
 
 # Draws are fetched from the generator so many at a time.
 BLOCK = 1024
@@ -71,5 +71,6 @@ class Odometry:
 
 
 def _normals(rng: np.random.Generator) -> Iterator[float]:
+    """Draw standard normal numbers for ever, a block at a time."""
     while True:
         yield from rng.standard_normal(BLOCK).tolist()

@@ -1,12 +1,7 @@
 """PyBullet behind an interface of its own: bodies, joints and rays, nothing about buildings."""
 
 import contextlib
-import ctypes
-import ctypes.util
-import os
-import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from operator import itemgetter
 from types import TracebackType
 from typing import Any, Self
@@ -14,8 +9,9 @@ from typing import Any, Self
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
-from closedrooms.core.errors import InvalidInputError
 from closedrooms.sim.config import STEPS
+from closedrooms.sim.pybullet_process import check_display, import_pybullet, quiet
+from closedrooms.sim.solids import LEAF, WALLS, Colour, MovingPart, volume
 
 # PyBullet returns nothing at exactly 16384 rays and raises above (MAX_RAY_INTERSECTION_BATCH_SIZE).
 MAX_RAYS = 16_383
@@ -39,41 +35,6 @@ LEAF_DENSITY = 210.0
 GRAVITY = 9.81
 # Damping of a leaf's joint [Nm s/rad or N s/m].
 LEAF_DAMPING = 1.0
-# A face whose normal is steeper than this against the floor is floor or ceiling.
-UPRIGHT = 0.5
-
-
-Colour = tuple[float, float, float, float]
-WALLS, FURNITURE, LEAF, PANE, PERSON = (
-    (0.75, 0.76, 0.8, 1.0), (0.62, 0.5, 0.38, 1.0), (0.75, 0.4, 0.2, 1.0), (0.5, 0.8, 0.95, 0.4), (0.95, 0.6, 0.1, 1.0),
-)  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MovingPart:
-    """A solid on one joint.
-
-    Attributes:
-        vertices: Shape (n, 3), metres, world frame, at joint position 0.
-        triangles: Shape (m, 3).
-        slides: Prismatic along ``axis``, else revolute around it.
-        anchor: A point of the axis, world frame [m].
-        axis: Direction of the axis, right-handed.
-    """
-
-    vertices: FloatArray
-    triangles: IntArray
-    slides: bool
-    anchor: tuple[float, float, float]
-    axis: tuple[float, float, float]
-
-
-def upright(vertices: FloatArray, triangles: IntArray) -> IntArray:
-    """Keep the triangles that stand: horizontal rays meet no others, and fewer make rays a third faster."""
-    a, b, c = (vertices[triangles[:, i]] for i in range(3))
-    normals = np.cross(b - a, c - a)
-    standing: IntArray = triangles[np.abs(normals[:, 2]) <= UPRIGHT * np.linalg.norm(normals, axis=1)]
-    return standing
 
 
 class PhysicsWorld:
@@ -94,7 +55,7 @@ class PhysicsWorld:
     def __enter__(self) -> Self:
         if self._window:
             check_display()
-        self._bullet = _import_pybullet()
+        self._bullet = import_pybullet()
         with quiet() if self._window else contextlib.nullcontext():
             self._client = self._bullet.connect(self._bullet.GUI if self._window else self._bullet.DIRECT)
         if self._client < 0:
@@ -174,7 +135,10 @@ class PhysicsWorld:
         self.has_glass = True
 
     def move_body(self, body: int, x: float, y: float) -> None:
-        """Put a static body, its origin first at the world's, at ``(x, y)`` [m]; rays see it at once."""
+        """Teleport a body without mass, made around the world's origin, to ``(x, y)`` [m]; rays see it at once.
+
+        It has no speed: contacts on the way are not found.
+        """
         self._bullet.resetBasePositionAndOrientation(
             body, [x, y, 0.0], [0.0, 0.0, 0.0, 1.0], physicsClientId=self._client
         )
@@ -213,7 +177,7 @@ class PhysicsWorld:
         bullet, client = self._bullet, self._client
         sizes = [np.ptp(part.vertices, axis=0) for part in parts]
         centres = [(part.vertices.min(axis=0) + part.vertices.max(axis=0)) / 2.0 for part in parts]
-        masses = [LEAF_DENSITY * _volume(part) for part in parts]
+        masses = [LEAF_DENSITY * volume(part) for part in parts]
         n = len(parts)
         body: int = bullet.createMultiBody(
             0.0,
@@ -249,7 +213,10 @@ class PhysicsWorld:
         return body
 
     def drive_joint(self, body: int, link: int, target: float, *, force: float, speed: float) -> None:
-        """Let a motor move a joint to ``target`` [rad or m] at ``speed`` [1/s] with at most ``force`` [Nm or N]."""
+        """Let a motor move a joint to ``target`` [rad or m] at ``speed`` [rad/s or m/s] by ``force`` [Nm or N].
+
+        Force and speed are upper limits: a joint that is blocked stays.
+        """
         self._bullet.setJointMotorControl2(
             body, link, self._bullet.POSITION_CONTROL, targetPosition=target, force=force, maxVelocity=speed,
             physicsClientId=self._client,
@@ -296,6 +263,7 @@ class PhysicsWorld:
     def _cast(
         self, start: FloatArray, ends: FloatArray, mask: int, *, normals: bool
     ) -> tuple[FloatArray, IntArray, FloatArray]:
+        """Cast rays as :meth:`cast` at bodies of some groups, in batches that PyBullet takes."""
         n = len(ends)
         fractions, bodies = np.empty(n), np.empty(n, dtype=np.int64)
         found = np.zeros((n if normals else 0, 3))
@@ -343,63 +311,3 @@ class PhysicsWorld:
         if shape < 0:
             raise RuntimeError(f"PyBullet took no mesh of {len(vertices)} vertices, {len(triangles)} triangles")
         return shape
-
-
-def check_display() -> None:
-    """Make sure that there is a display: without one PyBullet ends the whole process when it opens its window.
-
-    Raises:
-        InvalidInputError: There is none, or it does not answer.
-    """
-    if sys.platform != "linux":
-        return
-    display = os.environ.get("DISPLAY", "")
-    library = ctypes.util.find_library("X11")
-    if display and library:
-        x11 = ctypes.CDLL(library)
-        x11.XOpenDisplay.restype = ctypes.c_void_p
-        handle = x11.XOpenDisplay(display.encode())
-        if handle:
-            x11.XCloseDisplay.argtypes = [ctypes.c_void_p]
-            x11.XCloseDisplay(handle)
-            return
-    shown = f"DISPLAY is {display!r}" if display else "DISPLAY is not set"
-    raise InvalidInputError(f"no display for PyBullet's window ({shown})", expected="an X server, or no --gui")
-
-
-def _volume(part: MovingPart) -> float:
-    """Compute the volume of the upright prism that a part is [m^3]; its triangles are its sides alone."""
-    a, b, c = (part.vertices[part.triangles[:, i]] for i in range(3))
-    # The divergence of (x, y, 0) is 2, and top and bottom do not count.
-    flux = np.cross(b - a, c - a) * (a + b + c)
-    return float(abs(flux[:, :2].sum()) / 12.0)
-
-
-def _import_pybullet() -> Any:
-    """Import PyBullet without the line that it writes to the terminal from C."""
-    if "pybullet" in sys.modules:
-        return sys.modules["pybullet"]
-    with quiet():
-        import pybullet
-    return pybullet
-
-
-@contextlib.contextmanager
-def quiet() -> Iterator[None]:
-    """Keep what PyBullet writes from C off the terminal."""
-    try:
-        kept = [os.dup(number) for number in (1, 2)]
-    except OSError:  # there is no terminal to keep quiet
-        yield
-        return
-    sys.stdout.flush()
-    silent = os.open(os.devnull, os.O_WRONLY)
-    try:
-        for number in (1, 2):
-            os.dup2(silent, number)
-        yield
-    finally:
-        for number, descriptor in zip((1, 2), kept, strict=True):
-            os.dup2(descriptor, number)
-            os.close(descriptor)
-        os.close(silent)

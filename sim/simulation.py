@@ -20,15 +20,16 @@ from closedrooms.sim.building import Building, gap_from
 from closedrooms.sim.bystanders import Floor, MovedBox, Person
 from closedrooms.sim.config import FaultConfig, NoiseConfig, SimConfig
 from closedrooms.sim.contacts import SKIN, distance
-from closedrooms.sim.differential_drive import RAMP_SECONDS, Drive
 from closedrooms.sim.faults import Faults
 from closedrooms.sim.glass import glazed
 from closedrooms.sim.lidar import Lidar
 from closedrooms.sim.odometry import Odometry
 from closedrooms.sim.physics_world import PhysicsWorld
-from closedrooms.sim.robot_model import TRACK_SHARE, RobotModel, make_model
-from closedrooms.sim.robot_urdf import read_robot
-from closedrooms.sim.wheeled_robot import WheeledRobot
+from closedrooms.sim.robot.differential_drive import RAMP_SECONDS, Drive
+from closedrooms.sim.robot.driven_robot import DrivenRobot
+from closedrooms.sim.robot.robot_model import TRACK_SHARE, RobotModel, make_model
+from closedrooms.sim.robot.robot_urdf import read_robot
+from closedrooms.sim.robot.wheeled_robot import WheeledRobot
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start_pose import start_pose
@@ -73,7 +74,7 @@ class Simulation:
             self._building = Building(self.plan, self._closed, self.config, physics)
             start, robot = self.world_T_map, self.config.robot
             self._check_start()
-            self._drive: Drive | WheeledRobot = (
+            self._drive: DrivenRobot = (
                 WheeledRobot(
                     physics, self._model or make_model(robot, self.config.lidar.height), robot, start.as_tuple()
                 )
@@ -189,11 +190,15 @@ class Simulation:
         self._path = path[max(first, 0) :]
 
     def true_ranges(self, world_T_robot: Pose2) -> FloatArray:
-        """Measure without noise from anywhere, shape (beams,) [m], infinity without a return."""
+        """Measure without noise from any pose; rays pass glass as if it were not there.
+
+        Returns:
+            Ranges [m], shape (beams,), infinity without a return.
+        """
         return self._lidar.cast(world_T_robot)[0]
 
     def step(self, v: float, w: float, duration: float) -> None:
-        """Let time pass under a velocity command.
+        """Apply a velocity command ``v`` [m/s], ``w`` [rad/s] for ``duration`` [s].
 
         The drive follows the command within its limits and touches what it meets; doors that open move on.
 
@@ -241,6 +246,11 @@ class Simulation:
         return [Polygon(corners) for corners in door.corners()]
 
     def _check_start(self) -> None:
+        """Check that the robot has room where it starts.
+
+        Raises:
+            InvalidInputError: A wall, door or furniture is nearer than its radius.
+        """
         start, radius = self.world_T_map, self.config.robot.radius
         near = distance(start.x, start.y, self._building.obstacles.near(start.x, start.y))
         free = min(gap_from(self._building.solids, start.x, start.y), near)
@@ -252,5 +262,6 @@ class Simulation:
 
 
 def _moved(b_T_a: Pose2, point: Point) -> Point:
+    """Transform a point from frame a to frame b [m]."""
     pose = b_T_a @ Pose2(*point)
     return (pose.x, pose.y)

@@ -144,7 +144,7 @@ OPENING_METHODS = {"read_text", "read_bytes", "open"}
 # Not incoming files: the null device, the lock of a dataset.
 ALLOWED = {
     "cli/commands.py": {"os.open"},
-    "sim/physics_world.py": {"os.open"},
+    "sim/pybullet_process.py": {"os.open"},
     "experiments/dataset/layout.py": {"(folder / LOCK).open"},
     "experiments/stores.py": {"self._files.open", "temporary.open"},  # of fsspec; what is written
 }

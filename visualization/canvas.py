@@ -132,6 +132,7 @@ class Canvas:
         return np.asarray(image)
 
     def _fixed(self, points: FloatArray) -> npt.NDArray[np.int32]:
+        """Convert places [m] to OpenCV's pixels in fixed-point numbers, none too far out for it."""
         x0, _, _, y1 = self._bounds
         points = np.clip(np.asarray(points, dtype=np.float64), -1e300, 1e300)  # the product below stays finite
         u, v = (points[:, 0] - x0) * self.scale - 0.5, (y1 - points[:, 1]) * self.scale - 0.5

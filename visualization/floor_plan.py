@@ -95,6 +95,7 @@ def _write_title(figure: Any, name: str, rest: str) -> None:
 
 
 def _colour(label: str) -> str:
+    """Choose a room's colour by a word in its label."""
     label = label.lower()
     return next((colour for word, colour in COLOURS.items() if word in label), OTHER)
 

@@ -110,6 +110,7 @@ def draw_map(path: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor], traje
 def _map_panel(
     bounds: "Bounds", grid: OccupancyGrid, doors: Sequence[ClosedDoor], trajectory: FloatArray | None
 ) -> Panel:
+    """Draw the map with its doors and the estimated path."""
     canvas = _canvas(bounds)
     canvas.grid(grid)
     if trajectory is not None and len(trajectory):
@@ -128,6 +129,7 @@ def _prediction_panel(
     room_iou: Mapping[str, float],
     palette: Mapping[str, colours.Colour],
 ) -> Panel:
+    """Draw the completed map, rooms in the colours of their doors, with their IoU where it is known."""
     canvas = _canvas(bounds)
     canvas.grid(prediction.grid)
     _draw_rooms(canvas, prediction.rooms, palette, room_iou)
@@ -147,6 +149,7 @@ def _truth_panel(
     prediction: "Prediction",
     palette: Mapping[str, colours.Colour],
 ) -> Panel:
+    """Draw the true map and rooms, the outlines of the predicted ones over them."""
     canvas = _canvas(bounds)
     canvas.grid(truth)
     _draw_rooms(canvas, rooms, palette, {})
@@ -158,6 +161,7 @@ def _truth_panel(
 def _tour_panel(
     bounds: "Bounds", grid: OccupancyGrid, tour: "CoverageTour", title: str, *, doors: Sequence[ClosedDoor] = ()
 ) -> Panel:
+    """Draw a tour over the graph and the map that it was planned on."""
     canvas = _canvas(bounds)
     canvas.grid(grid)
     graph, path = tour.graph, np.asarray(tour.path, dtype=np.float64).reshape(-1, 2)
@@ -218,6 +222,7 @@ def _bounds(grids: Sequence[OccupancyGrid], shapes: Sequence[BaseGeometry] = ())
 
 
 def _canvas(bounds: "Bounds") -> "Canvas":
+    """Make an empty panel that shows ``bounds`` [m]."""
     from closedrooms.visualization.canvas import Canvas
 
     x_min, y_min, x_max, y_max = bounds

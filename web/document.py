@@ -8,20 +8,22 @@ from typing import Any
 from closedrooms.core.door import ClosedDoor, Point, Segment
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.names import is_name, shown
-from closedrooms.core.numbers import FARTHEST, MAX_DOORS, WIDEST
+from closedrooms.core.numbers import FARTHEST, WIDEST
 from closedrooms.predictor.methods import find_method
 
 # A door that nothing tells the width of [m]: what the methods draw where they do not know (section 3.7).
 USUAL_WIDTH = 0.80
 # Narrowest door that can be drawn [m]: less is a slip of the pointer.
 NARROWEST = 0.20
+# More doors than this take a browser half a minute to draw.
+MOST_DOORS = 300
 # Steps that can be undone.
 MOST_STEPS = 1000
 
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """All that a person decides; every change gives a new one.
+    """Decisions of a person on the page, immutable: every change gives a new document.
 
     Attributes:
         method: How rooms are predicted.
@@ -35,6 +37,11 @@ class Document:
     settings: Any
     doors: tuple[ClosedDoor, ...] = ()
     dismissed: frozenset[Point] = frozenset()
+
+    def __post_init__(self) -> None:
+        if len(self.doors) > MOST_DOORS:
+            expected = f"at most {MOST_DOORS} on the page (closedrooms predict takes more)"
+            raise InvalidInputError(f"{len(self.doors)} doors", expected=expected)
 
     def door(self, name: str) -> ClosedDoor:
         """Find a door by its id.
@@ -58,14 +65,16 @@ class Document:
         Raises:
             InvalidInputError: Too many doors, or a place, a width or a name that no door can have.
         """
-        if len(self.doors) >= MAX_DOORS:
-            raise InvalidInputError(f"{len(self.doors)} doors", expected=f"at most {MAX_DOORS}")
         name = name or self.free_name()
         self._check_name(name)
         return replace(self, doors=(*self.doors, _drawn(name, segment, width)))
 
     def without_door(self, name: str) -> "Document":
-        """Delete a door."""
+        """Delete a door.
+
+        Raises:
+            InvalidInputError: No such door.
+        """
         self.door(name)
         return replace(self, doors=tuple(door for door in self.doors if door.id != name))
 
@@ -73,7 +82,7 @@ class Document:
         """Give a door another id.
 
         Raises:
-            InvalidInputError: Another door has it, or it is none.
+            InvalidInputError: No door ``name``, or ``new`` is another door's or no name at all.
         """
         new = new.strip()
         if new == name:
@@ -82,25 +91,45 @@ class Document:
         return self._changed(name, lambda door: replace(door, id=new))
 
     def placed(self, name: str, segment: Segment) -> "Document":
-        """Draw a door from jamb to jamb at another place."""
+        """Draw a door from jamb to jamb at another place.
+
+        Raises:
+            InvalidInputError: No such door, or a place or a width that no door can have.
+        """
         return self._changed(name, lambda door: replace(_drawn(name, segment, None), state=door.state))
 
     def shifted(self, name: str, by: Point) -> "Document":
-        """Move a door by metres along x and y."""
+        """Move a door by metres along x and y.
+
+        Raises:
+            InvalidInputError: No such door, or a place that no door can have.
+        """
         return self._changed(name, lambda door: _moved(door, by))
 
     def turned(self, name: str, angle: float) -> "Document":
-        """Turn a door about its middle [rad], counter-clockwise; one that is a bare point becomes a line first."""
+        """Turn a door about its middle [rad], counter-clockwise; one that is a bare point becomes a line first.
+
+        Raises:
+            InvalidInputError: No such door, or one that is too narrow or too wide to be drawn.
+        """
         (x0, y0), (x1, y1) = as_segment(self.door(name))
         return self.aimed(name, math.atan2(y1 - y0, x1 - x0) + angle)
 
     def aimed(self, name: str, angle: float) -> "Document":
-        """Lay a door along a direction of the map frame [rad]."""
+        """Turn a door about its mid-point until it lies along a direction of the map frame [rad].
+
+        Raises:
+            InvalidInputError: No such door, or one that is too narrow or too wide to be drawn.
+        """
         door = self.door(name)
         return self.placed(name, _around(door.midpoint, angle, _length(as_segment(door))))
 
     def widened(self, name: str, width: float) -> "Document":
-        """Give a door another width [m], its middle stays."""
+        """Give a door another width [m], its middle stays.
+
+        Raises:
+            InvalidInputError: No such door, or a width that no door can have.
+        """
         door = self.door(name)
         if not width > 0.0:
             raise InvalidInputError(f"a door of {width:g} m", expected=f"{NARROWEST:g} to {WIDEST:g} m")
@@ -180,6 +209,8 @@ def as_segment(door: ClosedDoor) -> Segment:
 
 
 def _rounded(door: ClosedDoor) -> ClosedDoor:
+    """Round a door to 0.1 mm, so that a file written and read again is the same."""
+
     def place(point: Point) -> Point:
         return (round(point[0], 4) + 0.0, round(point[1], 4) + 0.0)
 
@@ -209,6 +240,12 @@ def _drawn(name: str, segment: Segment, width: float | None) -> ClosedDoor:
 
 
 def _moved(door: ClosedDoor, by: Point) -> ClosedDoor:
+    """Shift a door by metres along x and y.
+
+    Raises:
+        InvalidInputError: The place is not finite or too far away.
+    """
+
     def move(point: Point) -> Point:
         x, y = point[0] + by[0], point[1] + by[1]
         if not (math.isfinite(x) and math.isfinite(y) and max(abs(x), abs(y)) <= FARTHEST):
@@ -220,6 +257,7 @@ def _moved(door: ClosedDoor, by: Point) -> ClosedDoor:
 
 
 def _around(middle: Point, angle: float, length: float) -> Segment:
+    """Place a segment of a length [m] and direction [rad] around a middle."""
     dx, dy = math.cos(angle) * length / 2, math.sin(angle) * length / 2
     return ((middle[0] - dx, middle[1] - dy), (middle[0] + dx, middle[1] + dy))
 

@@ -75,6 +75,7 @@ class DoorList:
                 field = ui.input(value=name).props('dense borderless aria-label="name of the door"').classes("col-grow")
                 field.props["data-door"] = name
                 field.on("change", lambda: self._done(session.rename(name, str(field.value))))
+                field.on("keydown.enter", js_handler="event => event.target.blur()")
                 self._plain("my_location", "select", lambda: self._select(None if chosen else name))
                 self._button("rotate_left", "turn left", self._turn(name, TURN))
                 self._button("rotate_right", "turn right", self._turn(name, -TURN))
@@ -92,6 +93,7 @@ class DoorList:
             turn = ui.number("direction [°]", value=round(math.degrees(math.atan2(y1 - y0, x1 - x0)), 1), step=1)
             for field in (width, turn):
                 field.props("dense").classes("w-28")
+                field.on("keydown.enter", js_handler="event => event.target.blur()")
         width.on("change", lambda: self._typed(width, name, Document.widened))
         turn.on("change", lambda: self._typed(turn, name, _aimed))
 

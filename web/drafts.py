@@ -23,11 +23,11 @@ MOST_BYTES = 10_000_000
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """What was kept.
+    """Document that was kept for a visitor.
 
     Attributes:
         document: As it stood.
-        saved: When, seconds since the epoch.
+        saved: Time of keeping it, seconds since the epoch.
     """
 
     document: Document
@@ -101,6 +101,7 @@ class Drafts:
                 stem.with_suffix(ending).unlink(missing_ok=True)
 
     def _stem(self, visitor: str, map_path: Path) -> Path:
+        """Name the draft of a visitor and a map so that neither can be read from it."""
         key = json.dumps([visitor, str(map_path.resolve())])
         return self.folder / hashlib.sha256(key.encode("utf-8", "surrogateescape")).hexdigest()[:32]
 

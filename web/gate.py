@@ -78,15 +78,18 @@ def read_cookies(scope: Scope) -> dict[str, str]:
 
 
 def _same(given: str, token: str) -> bool:
+    """Compare a token in a time that tells nothing of it."""
     return secrets.compare_digest(given.encode("utf-8", "replace"), token.encode())
 
 
 def _cookie(name: str, value: str) -> bytes:
+    """Write a ``Set-Cookie`` header; only the visitor's outlives the browser."""
     age = f"; Max-Age={REMEMBERED}" if name == VISITOR else ""
     return f"{name}={value}; Path=/; HttpOnly; SameSite=Strict{age}".encode()
 
 
 async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:
+    """Answer a request without a token: 403, or a closed socket."""
     if scope["type"] == "websocket":
         await receive()
         await send({"type": "websocket.close", "code": 1008})

@@ -1,11 +1,11 @@
 """The map to pan and zoom: Leaflet in a flat coordinate system, its units metres of the grid's frame."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from nicegui import ui
-from shapely.geometry import LineString, mapping
+from shapely.geometry import MultiLineString, mapping
 from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.door import Point, Segment
@@ -19,6 +19,7 @@ attributionControl: false, keyboard: false, doubleClickZoom: false}"""
 SCRIPT = """
 const map = getElement(%d).map;
 L.control.scale({imperial: false, maxWidth: 160}).addTo(map);
+let focused = null;  // the door that has it; every change draws all doors anew
 map.on('layeradd', ({layer}) => {
   const handle = layer.options.handle;
   if (!handle || layer.told) return;
@@ -28,13 +29,23 @@ map.on('layeradd', ({layer}) => {
   shape.style.setProperty('--colour', handle.colour);
   shape.dataset.label = handle.label;
   layer.setIcon(L.divIcon({html: shape, className: '', iconSize: null}));
-  layer.getElement().setAttribute('aria-label', handle.kind + ' ' + handle.name);
+  const element = layer.getElement();
+  element.setAttribute('aria-label', handle.kind + ' ' + handle.name);
+  if (handle.kind === 'door' || handle.kind === 'chosen') {
+    if (focused === handle.name && document.activeElement === document.body) element.focus({preventScroll: true});
+    element.addEventListener('focus', () => { focused = handle.name; });
+    element.addEventListener('blur', () => setTimeout(() => { if (element.isConnected) focused = null; }));
+  }
   const tell = type => emitEvent('handle',
     {type, kind: handle.kind, name: handle.name, x: layer.getLatLng().lng, y: layer.getLatLng().lat});
   for (const type of ['click', 'dragend']) layer.on(type, () => tell(type));
   layer.on('keypress', ({originalEvent}) => originalEvent.key === 'Enter' && tell('click'));
 });
-document.addEventListener('keydown', e => (e.ctrlKey || e.metaKey) && e.key === 's' && e.preventDefault());
+document.addEventListener('keydown', e => {  // from within a field too
+  if (!(e.ctrlKey || e.metaKey) || e.key.toLowerCase() !== 's') return;
+  e.preventDefault();
+  if (!e.repeat) emitEvent('save');
+});
 true;
 """
 CSS = """
@@ -55,13 +66,13 @@ CSS = """
 .handle-proposal::after { border-style: dashed; }
 .handle-note { width: 0; height: 0; border: 0; background: none; pointer-events: none; }
 .handle-note::after { left: 0; bottom: 0; transform: translate(-50%, 50%); border: 0; font-weight: 600;
-  background: rgba(255, 255, 255, .8); }
+  white-space: pre; text-align: center; line-height: 15px; background: rgba(255, 255, 255, .8); }
 """
 
 
 @dataclass(frozen=True, slots=True)
 class HandleEvent:
-    """Something happened to a handle.
+    """Event of a handle.
 
     Attributes:
         type: ``click`` or ``dragend``.
@@ -139,9 +150,10 @@ class MapBoard:
         options = {"style": style, "interactive": False}
         self._add(group, self._map.generic_layer(name="geoJSON", args=[mapping(geometry), options]))
 
-    def line(self, group: str, segment: Segment, **style: Any) -> None:
-        """Draw a segment [m]."""
-        self.shape(group, LineString(segment), **style)
+    def lines(self, group: str, segments: Sequence[Segment], **style: Any) -> None:
+        """Draw segments of one style [m]."""
+        if segments:
+            self.shape(group, MultiLineString(segments), **style)
 
     def handle(
         self,
@@ -185,6 +197,7 @@ def css(colour: Colour) -> str:
 
 
 def _point(args: Any) -> Point:
+    """Read the place of an event of the map [m]: its lng is x, its lat y."""
     place = args["latlng"]
     return (float(place["lng"]), float(place["lat"]))
 

@@ -1,16 +1,20 @@
 """What a session holds, drawn on the map."""
 
+import numpy as np
+
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.names import shown
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.coverage.tour.tour_features import make_tour_features
 from closedrooms.visualization.colours import INK, TOURS, Colour, room_colours
 from closedrooms.web.map_board import MapBoard, css
-from closedrooms.web.pictures import map_url
+from closedrooms.web.pictures import Bounds, paint_map
 from closedrooms.web.session import EditSession
 
 # Rooms are filled this much where the slider is all on the side of the prediction.
 FILL = 0.35
+# Room around the map, as a share of its longer side: a room behind an outer wall still shows.
+AROUND = 0.08
 
 
 class MapLayers:
@@ -23,14 +27,21 @@ class MapLayers:
 
     def __init__(self, board: MapBoard, session: EditSession) -> None:
         self._board, self._session = board, session
-        self._drawn: tuple[OccupancyGrid, str] | None = None
+        self._drawn: tuple[OccupancyGrid, tuple[str, Bounds]] | None = None
         self.share, self.with_completed = 1.0, False
 
     def draw_map(self) -> None:
         """Draw the map below all else and show what is known of it."""
-        grid = self._session.sheet.read.grid
-        self._board.picture("map", map_url(grid), grid.frame.bounds)
-        self._board.show(self._session.sheet.bounds)
+        self._board.picture("map", *paint_map(self._session.sheet.read.grid))
+        self.show_all()
+
+    def show_all(self) -> None:
+        """Fit the view to what is known and to the rooms that are predicted, with some room around them."""
+        rooms = () if self._session.outcome is None else self._session.outcome.rooms
+        boxes = np.array([self._session.sheet.bounds, *(room.polygon.bounds for room in rooms)])
+        (x0, y0), (x1, y1) = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+        around = AROUND * max(x1 - x0, y1 - y0)
+        self._board.show((float(x0 - around), float(y0 - around), float(x1 + around), float(y1 + around)))
 
     def fade(self, share: float) -> None:
         """Go between map and prediction."""
@@ -45,27 +56,29 @@ class MapLayers:
     def draw_doors(self) -> None:
         """Draw the doors with their handles; those of the selected one's jambs too."""
         self._board.clear("doors")
-        colours = self._colours()
-        for door in self._session.document.doors:
-            segment, chosen = self._session.segment(door), door.id == self._session.selected
-            self._board.line("doors", segment, color="#000", weight=9, lineCap="butt")
-            self._board.line("doors", segment, color=css(colours[door.id]), weight=5, lineCap="butt")
+        colours, doors = self._colours(), self._session.document.doors
+        segments = {door.id: self._session.segment(door) for door in doors}
+        # A layer a colour, not one a door: each costs a message.
+        self._board.lines("doors", list(segments.values()), color="#000", weight=9, lineCap="butt")
+        for colour in dict.fromkeys(colours[door.id] for door in doors):
+            own = [segments[door.id] for door in doors if colours[door.id] == colour]
+            self._board.lines("doors", own, color=css(colour), weight=5, lineCap="butt")
+        for door in doors:
+            chosen, colour = door.id == self._session.selected, colours[door.id]
             middle = self._session.sheet.point_on_grid(door.midpoint)
             kind, label = "chosen" if chosen else "door", shown(door.id, longest=16)
-            self._board.handle(
-                "doors", middle, kind=kind, name=door.id, label=label, colour=colours[door.id], draggable=True
-            )
-            for jamb, point in enumerate(segment if chosen else ()):
-                self._board.handle(
-                    "doors", point, kind="jamb", name=str(jamb), label="", colour=colours[door.id], draggable=True
-                )
+            self._board.handle("doors", middle, kind=kind, name=door.id, label=label, colour=colour, draggable=True)
+            for jamb, point in enumerate(segments[door.id] if chosen else ()):
+                self._board.handle("doors", point, kind="jamb", name=str(jamb), label="", colour=colour, draggable=True)
 
     def draw_proposals(self) -> None:
         """Draw the proposals that are left, dashed, with their scores."""
         self._board.clear("proposals")
-        for number, proposal in self._session.open_proposals:
-            self._board.line("proposals", proposal.segment, color="#fff", weight=8, lineCap="butt")
-            self._board.line("proposals", proposal.segment, color=css(INK), weight=4, dashArray="6 5", lineCap="butt")
+        proposals = self._session.open_proposals
+        segments = [proposal.segment for _, proposal in proposals]
+        self._board.lines("proposals", segments, color="#fff", weight=8, lineCap="butt")
+        self._board.lines("proposals", segments, color=css(INK), weight=4, dashArray="6 5", lineCap="butt")
+        for number, proposal in proposals:
             label = f"{proposal.score:.2f}"
             self._board.handle(
                 "proposals", proposal.midpoint, kind="proposal", name=str(number), label=label, colour=INK
@@ -81,15 +94,16 @@ class MapLayers:
         if self.with_completed:
             grid = outcome.prediction.grid
             if self._drawn is None or self._drawn[0] is not grid:
-                self._drawn = (grid, map_url(grid))
-            self._board.picture("completed", self._drawn[1], grid.frame.bounds, share)
+                self._drawn = (grid, paint_map(grid))
+            self._board.picture("completed", *self._drawn[1], share)
         for room in outcome.rooms:
             colour = css(next((colours[door] for door in room.doors if door in colours), INK))
             self._board.shape(
                 "rooms", room.polygon, color=colour, weight=2, opacity=share, fillColor=colour, fillOpacity=FILL * share
             )
             place = room.polygon.representative_point()
-            label = f"{room.polygon.area:.1f} m²"
+            sure = "" if room.confidence is None else f"\n{100 * room.confidence:.0f} %"
+            label = f"{room.polygon.area:.1f} m²{sure}"
             self._board.handle(
                 "notes", (place.x, place.y), kind="note", name=label, label=label, colour=INK, opacity=share
             )

@@ -1,22 +1,25 @@
 """The page itself: what a session holds, drawn with NiceGUI; what somebody does, handed to the session."""
 
+import asyncio
 import contextlib
-import math
 import time
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 from nicegui import run, ui
-from nicegui.events import KeyEventArguments, UploadEventArguments, ValueChangeEventArguments
+from nicegui.events import UploadEventArguments, ValueChangeEventArguments
 
 from closedrooms.core.door import Point
 from closedrooms.core.errors import ClosedroomsError
+from closedrooms.core.report import counted
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.predictor.methods import METHODS
 from closedrooms.web.door_list import DoorList
+from closedrooms.web.keyboard import Keyboard
 from closedrooms.web.map_board import HandleEvent, MapBoard
 from closedrooms.web.map_layers import MapLayers
-from closedrooms.web.prompts import ask, count, icon_button, show_keys, switch, tell
+from closedrooms.web.prompts import ask, icon_button, show_keys, switch, tell
 from closedrooms.web.session import EditSession
 from closedrooms.web.settings_dialog import ask_settings
 
@@ -36,12 +39,11 @@ body { margin: 0; }
   .wide { display: none; }
 }
 """
-# What a door or the view moves at a press of an arrow, x to the right and y up.
-ARROWS = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, 1), "ArrowDown": (0, -1)}
-STEP, BIG_STEP, PAN = 0.05, 0.5, 80
-TURNS = {"[": math.radians(5), "]": -math.radians(5), "{": math.radians(45), "}": -math.radians(45)}
 # How long a browser may take to connect [s].
 PATIENCE = 30.0
+# Largest list of doors [bytes].
+MOST_BYTES = 20_000_000
+T = TypeVar("T")
 
 
 class EditPage:
@@ -61,7 +63,8 @@ class EditPage:
             with ui.column().classes("side"):
                 self._status = ui.label("").props("data-id=status role=status aria-live=polite")
                 self._list = DoorList(session, self._done, self._select)
-        self._keys = ui.keyboard(self._pressed, ignore=["input", "select", "textarea"])
+        self._keys = Keyboard(session, self._board, self._done, self._select, self._layers.show_all)
+        ui.on("save", self._save_pressed)
 
     async def start(self) -> None:
         """Draw the map once the browser is there, offer the draft, predict."""
@@ -87,12 +90,13 @@ class EditPage:
     # The bar
 
     def _bar(self) -> None:
+        """Build the bar above the map."""
         session = self._session
         with ui.row().classes("bar"):
             ui.label(session.config.map.name).classes("text-bold wide")
             self._undo = icon_button("undo", "undo (Ctrl+Z)", lambda: self._done(session.undo()))
             self._redo = icon_button("redo", "redo (Ctrl+Y)", lambda: self._done(session.redo()))
-            icon_button("add_location", "set a door in the middle of the view (N)", self._door_in_the_middle)
+            icon_button("add_location", "set a door in the middle of the view (N)", self._set_door)
             self._method = ui.select(list(METHODS), value=session.document.method, on_change=self._method_chosen)
             self._method.props("dense options-dense label=method data-id=method").classes("w-32")
             icon_button("tune", "settings of the method", self._ask_settings)
@@ -103,9 +107,12 @@ class EditPage:
                 self._slider = ui.slider(min=0, max=1, step=0.05, value=1, on_change=self._faded).classes("w-28")
                 self._slider.props('aria-label="between map and prediction" data-id=slider')
                 ui.label("prediction").classes("wide")
+            icon_button("fit_screen", "show all (0)", self._show_all)
             ui.space()
             icon_button("folder_open", "take doors from a GeoJSON file", self._pick_file)
-            self._upload = ui.upload(on_upload=self._uploaded, auto_upload=True, max_file_size=20_000_000)
+            self._upload = ui.upload(
+                on_upload=self._uploaded, on_rejected=self._refused, auto_upload=True, max_file_size=MOST_BYTES
+            )
             self._upload.classes("hidden")
             icon_button("help_outline", "keys", show_keys)
             ui.button("save", icon="save", on_click=self._save).props("dense data-id=save")
@@ -132,7 +139,18 @@ class EditPage:
     async def _uploaded(self, event: UploadEventArguments) -> None:
         content = await event.file.read()
         self._upload.reset()
-        await self._done(self._session.load_doors(event.file.name, content))
+        try:
+            told = self._session.load_doors(event.file.name, content)
+        except ClosedroomsError as error:
+            tell(f"no doors were read: {error}", bad=True)
+        else:
+            await self._done(told)
+
+    def _refused(self) -> None:
+        tell(f"no doors were read: the file has more than {MOST_BYTES // 1_000_000} MB", bad=True)
+
+    def _show_all(self) -> None:
+        self._layers.show_all()
 
     def _faded(self) -> None:
         self._layers.fade(float(self._slider.value))
@@ -151,6 +169,7 @@ class EditPage:
         self._pointer.set_text(f"x {x:.2f} m, y {y:.2f} m")
 
     async def _handled(self, event: HandleEvent) -> None:
+        """Do what a click on a handle or the end of its drag means."""
         session = self._session
         if event.kind in {"door", "chosen"} and event.type == "dragend":
             await self._done(session.drag(event.name, event.point))
@@ -161,47 +180,12 @@ class EditPage:
         elif event.kind == "proposal" and event.type == "click" and event.name.isdecimal():
             await self._done(session.accept(int(event.name)))
 
-    async def _door_in_the_middle(self) -> None:
-        await self._done(self._session.point_at(self._board.middle))
+    async def _set_door(self) -> None:
+        await self._keys.set_door()
 
     def _select(self, name: str | None) -> None:
         self._session.selected = name
         self.draw()
-
-    async def _pressed(self, event: KeyEventArguments) -> None:
-        if not event.action.keydown:
-            return
-        session, key, held = self._session, event.key.name, event.modifiers
-        if held.ctrl or held.meta:
-            work = {"z": session.redo if held.shift else session.undo, "y": session.redo}.get(key.lower())
-            if work is not None:
-                await self._done(work())
-            elif key.lower() == "s":
-                await self._save()
-        elif key in ARROWS:
-            await self._arrow(*ARROWS[key], far=bool(held.shift))
-        elif key in TURNS and session.selected is not None:
-            name = session.selected
-            await self._done(session.change(lambda document: document.turned(name, TURNS[key])))
-        elif key in {"Delete", "Backspace"} and session.selected is not None:
-            name = session.selected
-            await self._done(session.change(lambda document: document.without_door(name)))
-        elif key == "Escape":
-            self._select(None)
-        elif key in {"+", "-"}:
-            self._board.zoom(1 if key == "+" else -1)
-        elif key.lower() == "n":
-            await self._door_in_the_middle()
-        elif key.lower() == "p" and session.open_proposals:
-            await self._done(session.accept(session.open_proposals[0][0]))
-
-    async def _arrow(self, right: int, up: int, *, far: bool) -> None:
-        name = self._session.selected
-        if name is None:
-            self._board.pan(right * PAN, -up * PAN)
-            return
-        step = BIG_STEP if far else STEP
-        await self._done(self._session.change(lambda document: document.shifted(name, (right * step, up * step))))
 
     # What comes of it
 
@@ -221,7 +205,7 @@ class EditPage:
             while self._session.stale:
                 self._status.set_text("predicting ...")
                 self._tour = None
-                await run.io_bound(self._session.predict)
+                await work_aside(self._session.predict)
                 self.draw()
         finally:
             self._busy = False
@@ -229,6 +213,7 @@ class EditPage:
         await self._plan_tour()
 
     def _say_outcome(self) -> None:
+        """Say in one line what stands: rooms, time, tour."""
         outcome, doors = self._session.outcome, self._session.document.doors
         if outcome is None:
             return
@@ -237,7 +222,9 @@ class EditPage:
         elif not doors:
             text = "click on a wall where a closed door is, or on a dashed proposal"
         else:
-            text = f"{count(len(outcome.rooms), 'room')} behind {count(len(doors), 'door')}, {outcome.seconds:.2f} s"
+            text = (
+                f"{counted(len(outcome.rooms), 'room')} behind {counted(len(doors), 'door')}, {outcome.seconds:.2f} s"
+            )
         if isinstance(self._tour, str):
             text += f"; {self._tour}"
         elif self._tour is not None:
@@ -245,18 +232,25 @@ class EditPage:
         self._status.set_text(text)
 
     async def _plan_tour(self) -> None:
+        """Plan the tour of what stands, where it is wanted and nothing changes meanwhile."""
         if not self._with_tour.value or self._busy or self._session.stale:
             return
         if self._tour is None:
             self._status.set_text("planning the tour ...")
             outcome = self._session.outcome
-            tour = await run.io_bound(self._session.tour)
+            tour = await work_aside(self._session.tour)
             if outcome is self._session.outcome and not self._session.stale:
                 self._tour = tour
                 self._layers.draw_tour(self._tour)
         self._say_outcome()
 
+    async def _save_pressed(self) -> None:
+        """Save by the keyboard, but not while a question is open."""
+        if self._keys.active:
+            await self._save()
+
     async def _save(self) -> None:
+        """Save, after a question where files would be replaced."""
         session = self._session
         if session.out_is_taken and not await self._ask(
             f"{session.out} holds files already. Replace what a prediction wrote there?", "replace", "keep it"
@@ -264,14 +258,15 @@ class EditPage:
             return
         self._status.set_text(f"saving to {session.out} ...")
         try:
-            report = await run.io_bound(session.save)
+            report = await work_aside(session.save)
         except ClosedroomsError as error:
             tell(f"not saved: {error}", bad=True)
         else:
-            tell(f"saved to {report.folder}: {report.title}")
+            tell(f"saved to {Path(report.folder).resolve()}: {report.title}")
         self._say_outcome()
 
     async def _offer_draft(self) -> None:
+        """Ask whether to go on with what the last visit left unsaved."""
         try:
             draft = self._session.draft()
         except ClosedroomsError as error:
@@ -280,7 +275,7 @@ class EditPage:
         if draft is None:
             return
         when = time.strftime("%d %B, %H:%M", time.localtime(draft.saved))
-        question = f"On {when} you left {count(len(draft.document.doors), 'door')} unsaved here. Go on with them?"
+        question = f"On {when} you left {counted(len(draft.document.doors), 'door')} unsaved here. Go on with them?"
         if await self._ask(question, "go on", "begin anew"):
             told = self._session.take(draft)
             if told:
@@ -295,6 +290,23 @@ class EditPage:
         return answer
 
 
+async def work_aside(work: Callable[[], T]) -> T:
+    """Work on another thread while the page goes on.
+
+    Raises:
+        CancelledError: The server stops; NiceGUI 3 returns ``None`` then.
+    """
+
+    def wrapped() -> tuple[T]:
+        return (work(),)
+
+    result: tuple[T] | None = await run.io_bound(wrapped)
+    if result is None:
+        raise asyncio.CancelledError
+    value: T = result[0]
+    return value
+
+
 async def open_page(begin: Callable[[], EditSession]) -> None:
     """Build the page of one visitor.
 
@@ -303,12 +315,12 @@ async def open_page(begin: Callable[[], EditSession]) -> None:
     """
     ui.add_css(CSS)
     ui.page_title("closedrooms")
-    waiting = ui.label("reading the map ...").classes("q-ma-lg")
+    waiting = ui.label("reading the map and looking for closed doors ...").classes("q-ma-lg")
     # Who only fetches the page, or has left again, needs no map.
     with contextlib.suppress(TimeoutError):
         await ui.context.client.connected(timeout=PATIENCE)
         try:
-            session = await run.io_bound(begin)
+            session = await work_aside(begin)
         except ClosedroomsError as error:
             waiting.delete()
             _tell_trouble(str(error))
@@ -318,6 +330,7 @@ async def open_page(begin: Callable[[], EditSession]) -> None:
 
 
 def _tell_trouble(text: str) -> None:
+    """Show why there is no page, and a way to try again."""
     with ui.card().classes("q-ma-lg"):
         ui.label("This map cannot be read.").classes("text-bold")
         ui.label(text).props("role=alert")

@@ -10,10 +10,18 @@ from closedrooms.visualization.colours import FREE, OCCUPIED, UNKNOWN
 
 # Longest side of a picture [pixels]: what every browser draws.
 LONGEST = 4096
+Bounds = tuple[float, float, float, float]
 
 
-def map_url(grid: OccupancyGrid) -> str:
-    """Encode a map in grey as the address of a PNG that holds its own bytes; large maps are made coarser."""
+def paint_map(grid: OccupancyGrid) -> tuple[str, Bounds]:
+    """Paint what is known of a map in grey; what is large is made coarser.
+
+    Returns:
+        The address of a PNG that holds its own bytes, and where it lies: ``(x_min, y_min, x_max, y_max)`` [m].
+    """
+    known = grid.known_bounds()
+    if known is not None:
+        grid = grid.on(grid.frame.cropped(*known))
     values = np.arange(256).astype(np.uint8).view(np.int8)
     shades = np.full(256, UNKNOWN, dtype=np.uint8)
     shades[is_free(values)] = FREE
@@ -24,4 +32,4 @@ def map_url(grid: OccupancyGrid) -> str:
         rows, cols = (max(round(side * LONGEST / longest), 1) for side in picture.shape)
         picture = cv2.resize(picture, (cols, rows), interpolation=cv2.INTER_AREA).astype(np.uint8)
     data = cv2.imencode(".png", picture)[1].tobytes()
-    return f"data:image/png;base64,{base64.b64encode(data).decode()}"
+    return f"data:image/png;base64,{base64.b64encode(data).decode()}", grid.frame.bounds

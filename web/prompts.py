@@ -17,6 +17,7 @@ KEYS = (
     ("Del", "delete the selected door"),
     ("Esc", "select none"),
     ("+ -", "zoom"),
+    ("0", "show all"),
 )
 
 
@@ -55,10 +56,7 @@ def switch(about: str, work: Any) -> ui.switch:
 
 def tell(text: str, *, bad: bool = False) -> None:
     """Show a message; a bad one stays until it is closed."""
-    kind: Any = "negative" if bad else "info"
-    ui.notify(shown(text, longest=600), type=kind, multi_line=True, close_button=True, timeout=0 if bad else 6000)
-
-
-def count(number: int, noun: str) -> str:
-    """Write a number with its noun."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+    # Dark enough for white letters; Quasar's own blue is not.
+    kind, colour = ("negative", "red-10") if bad else ("info", "grey-9")
+    how: dict[str, Any] = {"type": kind, "color": colour, "close_button": True, "timeout": 0 if bad else 6000}
+    ui.notify(shown(text, longest=600), multi_line=True, **how)

@@ -1,16 +1,16 @@
 """``closedrooms edit``: serves the page on this machine until it is stopped."""
 
+import contextlib
 import secrets
 import socket
 import sys
 import threading
 import webbrowser
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
 from functools import partial
 from typing import Any
 
-from closedrooms.core.errors import OutputError
+from closedrooms.core.errors import ClosedroomsError, OutputError, reason
 from closedrooms.core.files.incoming import check_regular
 from closedrooms.core.runtime.packages import require
 from closedrooms.pipeline.reporting.progress import Progress
@@ -51,23 +51,48 @@ def edit_map(config: EditConfig, *, progress: Progress) -> list[str]:  # noqa: A
 
 
 class Desk:
-    """What the visitors of one server share: the map, once it could be read."""
+    """State that the visitors of one server share: the map, once it could be read."""
 
     def __init__(self, config: EditConfig) -> None:
         self._config, self._drafts = config, Drafts()
         self._sheet: MapSheet | None = None
         self._reading = threading.Lock()
+        self._told = ""
+
+    def prepare(self) -> None:
+        """Read the map before the first visitor comes; what is wrong with it is told to them."""
+        with contextlib.suppress(Exception):
+            self._open()
+
+    def _open(self) -> MapSheet:
+        with self._reading:
+            if self._sheet is None:
+                self._sheet = open_sheet(self._config)
+            return self._sheet
 
     def session(self, visitor: str) -> EditSession:
-        """Begin the session of a page.
+        """Begin the session of a page; what cannot be read is told on the page and in one line of the terminal.
 
         Raises:
             ClosedroomsError: The map cannot be read; the next visit tries again.
         """
-        with self._reading:
-            if self._sheet is None:
-                self._sheet = open_sheet(self._config)
-        return EditSession(self._config, self._sheet, self._drafts, visitor)
+        try:
+            sheet = self._open()
+        except Exception as error:
+            self._tell(reason(error))
+            raise ClosedroomsError(reason(error)) from error
+        session = EditSession(self._config, sheet, self._drafts, visitor)
+        if session.trouble:
+            self._tell(session.trouble)
+        return session
+
+    def _tell(self, trouble: str) -> None:
+        """Say it on the terminal, once for all visits in a row."""
+        if trouble != self._told:
+            self._told = trouble
+            with contextlib.suppress(OSError, ValueError):  # nobody listens
+                sys.stderr.write(f"closedrooms: {trouble}\n")
+                sys.stderr.flush()
 
 
 def _server(config: EditConfig, token: str, port: int) -> Any:
@@ -80,6 +105,7 @@ def _server(config: EditConfig, token: str, port: int) -> Any:
     from closedrooms.web.page import open_page
 
     desk = Desk(config)
+    threading.Thread(target=desk.prepare, daemon=True).start()
 
     async def page(request: Request) -> None:
         await open_page(partial(desk.session, request.scope["closedrooms_visitor"]))
@@ -93,14 +119,14 @@ def _server(config: EditConfig, token: str, port: int) -> Any:
     return uvicorn.Server(settings)
 
 
-@contextmanager
+@contextlib.contextmanager
 def _listening(port: int) -> Iterator[socket.socket]:
     """Open a socket on this machine alone.
 
     Raises:
         OutputError: The port is taken or not allowed.
     """
-    with closing(socket.socket(socket.AF_INET, socket.SOCK_STREAM)) as listener:
+    with contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_STREAM)) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listener.bind((HOST, port))

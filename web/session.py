@@ -2,7 +2,8 @@
 
 import math
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from closedrooms.core.door import ClosedDoor, Point, Segment
@@ -11,7 +12,7 @@ from closedrooms.core.files.geojson import read_doors
 from closedrooms.core.files.incoming import is_folder
 from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.names import file_name
-from closedrooms.core.report import Report
+from closedrooms.core.report import Report, counted
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.pipeline.config import PredictConfig
 from closedrooms.pipeline.edit import EditedPrediction, plan_edited_tour, predict_rooms, save_rooms
@@ -42,12 +43,13 @@ class EditSession:
         self.config, self.sheet = config, sheet
         self._drafts, self._visitor = drafts, visitor
         self.trouble = ""
-        doors: Sequence[ClosedDoor] = ()
+        document = Document(config.method, config.predictor)
         try:
-            doors = [] if config.doors is None else read_doors(config.doors)
+            if config.doors is not None:
+                document = replace(document, doors=as_saved(read_doors(config.doors)))
         except InvalidInputError as error:
             self.trouble = str(error)
-        self._history = History(Document(config.method, config.predictor, as_saved(doors)))
+        self._history = History(document)
         self.selected: str | None = None
         self.outcome: EditedPrediction | None = None
         self._predicted: Document | None = None
@@ -166,6 +168,12 @@ class EditSession:
         Args:
             name: Of the file, for messages.
             content: Untrusted.
+
+        Returns:
+            How many there are.
+
+        Raises:
+            InvalidInputError: They cannot be read; nothing is changed.
         """
         with tempfile.TemporaryDirectory(prefix="closedrooms-") as folder:
             path = Path(folder) / file_name(name, otherwise="doors.geojson")
@@ -173,8 +181,10 @@ class EditSession:
                 write_bytes(path, content)
                 doors = as_saved(read_doors(path))
             except ClosedroomsError as error:
-                return str(error).replace(f"{folder}/", "")
-        return self.change(lambda document: Document(document.method, document.settings, doors, document.dismissed))
+                raise InvalidInputError(str(error).replace(f"{folder}/", "")) from error
+        document = Document(self.document.method, self.document.settings, doors, self.document.dismissed)
+        told = f"{counted(len(doors), 'door')} read from {name}, in place of those that were here"
+        return self.change(lambda _: document) or told
 
     def change(self, make: Callable[[Document], Document]) -> str:
         """Make a new document of the present one; a refusal is told and changes nothing."""
@@ -248,12 +258,14 @@ class EditSession:
         return self.change(lambda _: draft.document)
 
     def _add(self, segment: Segment) -> str:
+        """Set a door on a segment, frame of the grid [m], and select it; returns what is to be told."""
         told = self.change(lambda document: document.with_door(self.sheet.segment_on_map(segment)))
         if not told:
             self.selected = self.document.doors[-1].id
         return told
 
     def _place_of(self, proposal: DoorProposal) -> Point:
+        """Say where a proposal is, map frame, to the millimetre: what tells it from others."""
         x, y = self.sheet.point_on_map(proposal.midpoint)
         return (round(x, 3), round(y, 3))
 
@@ -269,4 +281,5 @@ class EditSession:
 
 
 def _same_prediction(a: Document, b: Document) -> bool:
+    """Check whether two documents ask for the same prediction."""
     return (a.doors, a.method, a.settings) == (b.doors, b.method, b.settings)

@@ -42,6 +42,7 @@ async def ask_settings(document: Document) -> Document | None:
 
 
 def _field(row: SettingRow) -> Any:
+    """Make the field in which a setting is typed or chosen."""
     if row.kind == "switch":
         return ui.switch(row.name, value=row.shown)
     if row.kind == "choice":

@@ -76,6 +76,7 @@ def with_setting(settings: Any, name: str, value: Any) -> Any:
 
 
 def _rows(settings: Any, standard: Any, group: str) -> Iterator[SettingRow]:
+    """List the settings of a class and of those within it, with what is usual."""
     hints, texts = get_type_hints(type(settings)), _docstrings(cast("Hashable", type(settings)))
     for item in fields(settings):
         value, usual, name = getattr(settings, item.name), getattr(standard, item.name), f"{group}{item.name}"

@@ -11,6 +11,9 @@ from closedrooms.predictor.structure.door_proposals import DoorProposal, propose
 from closedrooms.web.config import EditConfig
 from closedrooms.web.snapping import WallSnapper
 
+# More than these nobody goes through one by one.
+MOST_PROPOSALS = 100
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapSheet:
@@ -58,10 +61,15 @@ def open_sheet(config: EditConfig) -> MapSheet:
     rows, cols = read.grid.frame.shape
     if min(rows, cols) < 2:
         raise InvalidInputError(f"a map of {cols} x {rows} cells", expected="at least 2 x 2", where=config.map)
-    return MapSheet(read, WallSnapper(read.grid), propose_doors(read.grid))
+    return MapSheet(read, WallSnapper(read.grid), propose_doors(read.grid)[:MOST_PROPOSALS])
 
 
 def _moved(point: Point, b_T_a: Pose2) -> Point:
+    """Transform a point from frame a to frame b [m].
+
+    Raises:
+        InvalidInputError: It is too far out to be a number.
+    """
     pose = b_T_a @ Pose2(point[0], point[1])
     if not (math.isfinite(pose.x) and math.isfinite(pose.y)):
         raise InvalidInputError(f"a point at {point}", expected="finite metres")

@@ -39,7 +39,7 @@ class Snapped:
 
 
 class WallSnapper:
-    """Finds walls near points of one map; coordinates are of the grid's frame [m]."""
+    """Search for walls near points of one map; coordinates are of the grid's frame [m]."""
 
     def __init__(self, grid: OccupancyGrid) -> None:
         self._grid = grid
@@ -118,5 +118,6 @@ class WallSnapper:
 
 
 def _segment(leaf: FloatArray, along: FloatArray, left: float, right: float) -> Segment:
+    """Cut a door from a wall: from ``left`` to ``right`` [m] along it."""
     a, b = leaf + left * along, leaf + right * along
     return ((float(a[0]), float(a[1])), (float(b[0]), float(b[1])))

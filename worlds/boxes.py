@@ -54,6 +54,7 @@ class BoxLeaf:
 
 
 def _box(a: Point, b: Point, thickness: float) -> Box:
+    """Make the box along a stretch of a wall, over its whole thickness [m]."""
     return Box((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, math.atan2(b[1] - a[1], b[0] - a[0]), math.dist(a, b), thickness)
 
 
@@ -76,10 +77,12 @@ def wall_boxes(plan: FloorPlan) -> list[Box]:
 
 
 def _key(point: Point) -> tuple[int, int]:
+    """Round a point to whole millimetres: ends that are closer are one."""
     return (round(point[0] * 1000), round(point[1] * 1000))
 
 
 def _at(segment: Segment, along: float) -> Point:
+    """Find the point at a distance along a segment [m]."""
     (x0, y0), (x1, y1) = segment
     t = along / math.dist(*segment)
     return (x0 + t * (x1 - x0), y0 + t * (y1 - y0))
@@ -100,6 +103,7 @@ def _gaps(plan: FloorPlan, wall: Segment) -> list[tuple[float, float]]:
 
 
 def _between(gaps: Sequence[tuple[float, float]], length: float) -> list[tuple[float, float]]:
+    """List the stretches between gaps from 0 to ``length`` [m]; gaps are sorted by where they begin."""
     pieces, at = [], 0.0
     for low, high in gaps:
         if low > at:

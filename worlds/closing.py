@@ -119,6 +119,7 @@ def check_closed(plan: FloorPlan, door_ids: Iterable[str]) -> tuple[str, ...]:
 
 
 def _example(plan: FloorPlan) -> str:
+    """List some sets of doors that close a room, for a message."""
     closable = closable_rooms(plan, several_doors=True)
     return "; ".join(",".join(doors) for doors in list(closable.values())[:5]) or "none here"
 
@@ -139,6 +140,7 @@ def hidden_rooms(plan: FloorPlan, closed: Collection[str]) -> list[tuple[tuple[s
 
 
 def _doors_by_room(plan: FloorPlan) -> dict[str, tuple[str, ...]]:
+    """List the doors of each room, entrances left out."""
     doors: defaultdict[str, tuple[str, ...]] = defaultdict(tuple)
     for door in plan.doors:
         for room in door.rooms:

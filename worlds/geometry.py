@@ -186,3 +186,9 @@ def distance_along(line: Segment, point: Point) -> float:
     (x0, y0), (x1, y1) = line
     length = math.hypot(x1 - x0, y1 - y0)
     return ((point[0] - x0) * (x1 - x0) + (point[1] - y0) * (y1 - y0)) / length
+
+
+def largest_part(area: BaseGeometry) -> Polygon:
+    """Choose the polygon of the largest area among the parts of a geometry, an empty one where there is none."""
+    parts = [part for part in shapely.get_parts(area) if isinstance(part, Polygon)]
+    return max(parts, key=lambda part: part.area, default=Polygon())

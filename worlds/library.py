@@ -102,6 +102,18 @@ def split_level(given: str, level: str | None = None) -> tuple[Path, str | None]
     raise InvalidInputError(f"unknown world {shown!r}{meant}", expected=f"a floor plan file or one of {names}")
 
 
+def world_source(name_or_path: str) -> str:
+    """Name a world as it is found from any folder: a bundled name as it is, a file by its whole path, then its level.
+
+    Raises:
+        InvalidInputError: Neither a name nor a file.
+    """
+    if name_or_path in bundled_names():
+        return name_or_path
+    path, level = split_level(name_or_path)
+    return str(path.resolve()) if level is None else f"{path.resolve()}:{level}"
+
+
 def _is_file_name(given: str) -> bool:
     return bool(given) and is_there(Path(given))
 

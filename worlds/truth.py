@@ -62,6 +62,7 @@ def _fill(areas: Iterable[BaseGeometry], frame: GridFrame, map_T_world: Pose2) -
 
 
 def _oriented_rings(polygon: Polygon) -> list[np.ndarray]:
+    """List the rings of a polygon, the outer one to the left and holes to the right around, shape (n, 2) each."""
     rings = []
     for number, ring in enumerate([polygon.exterior, *polygon.interiors]):
         points = shapely.get_coordinates(ring)

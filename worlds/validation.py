@@ -48,6 +48,7 @@ def validate(plan: FloorPlan, where: str = "") -> None:
 
 
 def _check_names(plan: FloorPlan, where: str) -> None:
+    """Refuse two of a kind with one id."""
     names = [
         *(("room", room.id) for room in plan.rooms),
         *(("wall", wall.id) for wall in plan.walls),
@@ -61,6 +62,7 @@ def _check_names(plan: FloorPlan, where: str) -> None:
 
 
 def _check_rooms(plan: FloorPlan, where: str) -> None:
+    """Refuse rooms that are no polygons or that overlap."""
     for room in plan.rooms:
         _check_polygon(f"room {room.id} ({room.label})", room.polygon, where)
     polygons = [room.polygon for room in plan.rooms]
@@ -78,6 +80,7 @@ def _check_rooms(plan: FloorPlan, where: str) -> None:
 
 
 def _check_polygon(name: str, polygon: Polygon, where: str) -> None:
+    """Refuse a polygon without finite coordinates, that crosses itself, or without an area."""
     points = shapely.get_coordinates(polygon)
     if not points.size or not np.isfinite(points).all() or np.abs(points).max() > MAX_COORDINATE:
         raise InvalidInputError(
@@ -92,6 +95,7 @@ def _check_polygon(name: str, polygon: Polygon, where: str) -> None:
 
 
 def _check_walls(plan: FloorPlan, where: str) -> None:
+    """Refuse a plan without walls, and walls of no length or no usual thickness."""
     if not plan.walls:
         raise InvalidInputError("a plan without walls", expected="at least one wall", where=where)
     for wall in plan.walls:
@@ -105,6 +109,7 @@ def _check_walls(plan: FloorPlan, where: str) -> None:
 
 
 def _segment_fault(name: str, segment: Segment, shortest: float) -> tuple[str, str] | None:
+    """Tell what is wrong with a segment and what was expected, ``None`` for nothing."""
     (x0, y0), (x1, y1) = segment
     if not all(math.isfinite(v) and abs(v) <= MAX_COORDINATE for v in (x0, y0, x1, y1)):
         return (f"{name} has no usable coordinates", f"metres within +-{MAX_COORDINATE:g}")
@@ -168,6 +173,7 @@ def _overlap_fault(
 
 
 def _sides_fault(name: str, passage: PlanDoor | Opening, rooms: dict[str, Polygon]) -> tuple[str, str] | None:
+    """Tell what is wrong with the rooms of a passage and what was expected, ``None`` for nothing."""
     for room in passage.rooms:
         if room is not None and room not in rooms:
             return (f"{name} leads to the unknown room {room!r}", "a room id")
@@ -223,6 +229,7 @@ def _check_furniture(plan: FloorPlan, where: str) -> None:
 
 
 def _check_start(plan: FloorPlan, where: str) -> None:
+    """Refuse a start that is no pose, in a wall or too near to one, or in no room."""
     if plan.start is None:
         return
     x, y, heading = plan.start

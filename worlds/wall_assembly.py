@@ -35,7 +35,7 @@ class RoomEdge:
 
     @property
     def length(self) -> float:
-        """Metres."""
+        """Length of the stretch [m]."""
         return math.dist(*self.segment)
 
     def point(self, along: float) -> Point:
@@ -172,7 +172,17 @@ def _coordinates(edge: RoomEdge, points: FloatArray) -> tuple[FloatArray, FloatA
 
 
 def coverage(polygons: Sequence[Polygon], *, gap: float = 0.0, snap: float = -1.0) -> list[Polygon]:
-    """Make room outlines share their edges exactly: cut overlaps, fill gaps up to ``gap`` metres."""
+    """Make room outlines share their edges exactly: cut overlaps, fill gaps up to ``gap`` metres.
+
+    Args:
+        polygons: Outlines, building frame [m].
+        gap: Widest gap that is filled [m].
+        snap: Vertices and edges closer than this become one [m]; 0 for none, below 0 for shapely's own choice by the
+            size of the outlines.
+
+    Returns:
+        One outline for each given, the largest piece of what is left of it; empty where nothing is.
+    """
     clean = shapely.coverage_clean  # type: ignore[attr-defined]  # since shapely 2.2; not in the stubs yet
     cleaned = clean(np.array(polygons, dtype=object), gap_width=gap, snapping_distance=snap)
     result = []
@@ -229,6 +239,7 @@ def _border(gap: Polygon, room: Polygon, touching: float) -> float:
 
 
 def _is_narrow(part: Polygon, width: float, least: float = 1e-3) -> bool:
+    """Check whether a part is hardly wider than ``width`` [m], and no speck."""
     return part.area > least and shapely.maximum_inscribed_circle(part, tolerance=0.02).length < width / 2 + 0.05
 
 

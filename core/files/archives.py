@@ -51,6 +51,7 @@ def read_arrays(path: Path, *, what: str, max_bytes: int = MAX_UNPACKED) -> dict
 def _check_size(
     unpacked: int, packed: int, path: Path, what: str, max_bytes: int, *, unsuspicious: int = UNSUSPICIOUS
 ) -> None:
+    """Refuse an archive that is too large, or that unpacks to far more than it takes."""
     if unpacked > max_bytes:
         raise InvalidInputError(f"an archive of {unpacked} bytes", expected=f"{what}, at most {max_bytes}", where=path)
     if unpacked > unsuspicious and unpacked > MAX_RATIO * max(packed, 1):

@@ -21,7 +21,7 @@ from closedrooms.core.numbers import FARTHEST, MAX_DOORS, MAX_ROOMS, WIDEST, che
 from closedrooms.core.remarks import Remark
 from closedrooms.core.room import Alternative, Room
 
-Feature = tuple[BaseGeometry, dict[str, Any]]
+GeoFeature = tuple[BaseGeometry, dict[str, Any]]
 MAX_FEATURES = 1_000_000
 # Other shapes of one room that are read; three are written.
 MAX_ALTERNATIVES = 100
@@ -29,7 +29,7 @@ MAX_ALTERNATIVES = 100
 LISTS = {"Point": 0, "LineString": 1, "MultiPoint": 1, "Polygon": 2, "MultiLineString": 2, "MultiPolygon": 3}
 
 
-def write_features(path: Path, features: Iterable[Feature]) -> None:
+def write_features(path: Path, features: Iterable[GeoFeature]) -> None:
     """Write geometries [m, map frame] with their properties, a line each, coordinates rounded to 0.1 mm.
 
     Raises:
@@ -47,13 +47,14 @@ def write_features(path: Path, features: Iterable[Feature]) -> None:
 
 
 def _rounded(coordinates: FloatArray) -> FloatArray:
+    """Round coordinates to 0.1 mm."""
     # Beyond 1e11 a float holds no tenth of a millimetre, and rounding would overflow in the end.
     return np.where(np.abs(coordinates) < 1e11, np.round(np.clip(coordinates, -1e11, 1e11), 4), coordinates) + 0.0
 
 
 def read_features(
     path: Path, *, what: str = "a GeoJSON FeatureCollection", remarks: list[Remark] | None = None
-) -> list[Feature]:
+) -> list[GeoFeature]:
     """Read geometries and properties of an untrusted file, as we, QGIS or geopandas write it.
 
     A bare Feature or geometry counts as a collection of one. The ``id`` of a Feature stands in its properties when
@@ -102,7 +103,8 @@ def _features(data: Any) -> list[Any] | None:
     return None
 
 
-def _read_feature(number: int, feature: Any, path: Path) -> Feature:
+def _read_feature(number: int, feature: Any, path: Path) -> GeoFeature:
+    """Read the geometry and the properties of one feature of an untrusted file."""
     try:
         geometry = feature["geometry"]
         _check_positions(geometry["coordinates"], LISTS[geometry["type"]])
@@ -143,7 +145,7 @@ def _check_positions(value: Any, depth: int) -> None:
 def write_doors(path: Path, doors: Sequence[ClosedDoor]) -> None:
     """Write closed doors: a LineString from jamb to jamb where the segment is known, else a Point."""
 
-    def feature(door: ClosedDoor) -> Feature:
+    def feature(door: ClosedDoor) -> GeoFeature:
         geometry = Point(door.midpoint) if door.segment is None else LineString(door.segment)
         properties: dict[str, Any] = {"id": door.id, "state": door.state}
         if door.width is not None:
@@ -198,7 +200,7 @@ def _parts(geometry: BaseGeometry) -> list[BaseGeometry]:
     return list(shapely.get_parts(geometry)) if isinstance(geometry, MultiLineString | MultiPoint) else [geometry]
 
 
-def _door_names(features: Sequence[Feature], path: Path, remarks: list[Remark]) -> list[str]:
+def _door_names(features: Sequence[GeoFeature], path: Path, remarks: list[Remark]) -> list[str]:
     """Name doors: as given, numbered where no name is given or several parts share one."""
     given = [_given_name(number, properties.get("id"), path) for number, (_, properties) in enumerate(features)]
     taken = {name for name in given if name is not None}
@@ -228,6 +230,7 @@ def _door_names(features: Sequence[Feature], path: Path, remarks: list[Remark]) 
 
 
 def _given_name(number: int, value: Any, path: Path) -> str | None:
+    """Read the id of a door as a text, ``None`` where there is none."""
     if value is None or value == "":
         return None
     if isinstance(value, float) and value.is_integer():
@@ -240,6 +243,7 @@ def _given_name(number: int, value: Any, path: Path) -> str | None:
 
 
 def _door(name: str, geometry: BaseGeometry, properties: dict[str, Any], path: Path) -> ClosedDoor:
+    """Make a door from its midpoint or its leaf, and what a file says of it."""
     width = properties.get("width")
     if width is not None and not (is_number(width) and 0 < width <= WIDEST):
         raise InvalidInputError(
@@ -263,7 +267,7 @@ def _door(name: str, geometry: BaseGeometry, properties: dict[str, Any], path: P
 def write_rooms(path: Path, rooms: Sequence[Room]) -> None:
     """Write predicted rooms (``kind``, ``score``, ``bounded``; ``confidence`` and ``alternatives``), or true ones."""
 
-    def feature(room: Room) -> Feature:
+    def feature(room: Room) -> GeoFeature:
         properties: dict[str, Any] = {"doors": list(room.doors)}
         if room.kind is not None:
             score = None if room.score is None else round(room.score, 6)
@@ -305,6 +309,7 @@ def read_rooms(path: Path, *, remarks: list[Remark] | None = None) -> list[Room]
 
 
 def _room(number: int, read: BaseGeometry, properties: dict[str, Any], path: Path) -> Room:
+    """Make a room from what a file says of it."""
     doors, kind, score = properties.get("doors", []), properties.get("kind"), properties.get("score")
     if not isinstance(doors, list) or not all(isinstance(d, str | int) and is_name(str(d)) for d in doors):
         raise InvalidInputError(f"room {number} with doors {repr_of(doors)}", expected="a list of ids", where=path)
@@ -321,6 +326,7 @@ def _room(number: int, read: BaseGeometry, properties: dict[str, Any], path: Pat
 
 
 def _area(number: int, read: BaseGeometry, path: Path) -> Polygon | MultiPolygon:
+    """Check that a geometry is an area, and repair one that crosses itself."""
     geometry = read if read.is_valid else _repaired(read)
     if not isinstance(geometry, Polygon | MultiPolygon) or geometry.is_empty:
         raise InvalidInputError(f"room {number} is a {geometry.geom_type}", expected="a Polygon", where=path)
@@ -328,6 +334,7 @@ def _area(number: int, read: BaseGeometry, path: Path) -> Polygon | MultiPolygon
 
 
 def _share(number: int, value: Any, name: str, path: Path) -> float | None:
+    """Check that a property is a number from 0 to 1, or not there."""
     if value is not None and not (is_number(value) and 0.0 <= value <= 1.0):
         raise InvalidInputError(f"room {number} of {name} {repr_of(value)}", expected="0 to 1", where=path)
     return value

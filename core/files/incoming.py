@@ -12,6 +12,7 @@ import json
 import os
 import stat
 from collections.abc import Iterator
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ MAX_DEPTH = 64
 """Deepest nesting of JSON, YAML and XML: the formats that are read have fewer than ten levels."""
 MAX_DIGITS = 100
 """Longest whole number: a float holds no more than 309 digits, a stamp in nanoseconds has 19."""
+READ: ContextVar[set[tuple[int, int]] | None] = ContextVar("read", default=None)
+"""Device and number of every file that was opened since somebody began to count: none of them is overwritten."""
 KINDS = {
     stat.S_ISDIR: "a folder",
     stat.S_ISFIFO: "a named pipe",
@@ -77,12 +80,16 @@ def opened(path: Path, what: str) -> Iterator[io.BufferedReader]:
         # Without O_NONBLOCK the opening of a FIFO waits for somebody to write into it.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
-            mode = os.fstat(descriptor).st_mode
+            status = os.fstat(descriptor)
+            mode = status.st_mode
             if not stat.S_ISREG(mode):
                 kind = next((name for is_kind, name in KINDS.items() if is_kind(mode)), "no regular file")
                 raise InvalidInputError(kind, expected=f"{what} in a regular file", where=path)
             # Some files of the kernel call themselves regular and have nothing to give: an error here, ``None`` later.
             os.pread(descriptor, 1, 0)
+            read = READ.get()
+            if read is not None:
+                read.add((status.st_dev, status.st_ino))
             file = os.fdopen(descriptor, "rb")
         except BaseException:
             os.close(descriptor)
@@ -102,7 +109,7 @@ def check_regular(path: Path, what: str) -> None:
 
 
 def is_file(path: Path) -> bool:
-    """Check whether a regular file of this name exists; none has a name that the system refuses."""
+    """Check whether a regular file stands at ``path``; ``False`` for a name that the system refuses (too long, NUL)."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -110,7 +117,7 @@ def is_file(path: Path) -> bool:
 
 
 def is_there(path: Path) -> bool:
-    """Check whether anything of this name exists; nothing has a name that the system refuses."""
+    """Check whether anything stands at ``path``; ``False`` for a name that the system refuses (too long, NUL)."""
     try:
         return path.exists()
     except (OSError, ValueError):
@@ -118,7 +125,7 @@ def is_there(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Check whether a folder of this name exists; none has a name that the system refuses."""
+    """Check whether a folder stands at ``path``; ``False`` for a name that the system refuses (too long, NUL)."""
     try:
         return path.is_dir()
     except (OSError, ValueError):
@@ -195,6 +202,7 @@ def parse_json(content: bytes, *, what: str, where: Path | str) -> Any:
 
 
 def _parsed(text: str, path: Path | str, what: str) -> Any:
+    """Parse untrusted JSON: bounded in depth and in digits, without infinite numbers."""
     try:
         value = json.loads(text, parse_constant=_refuse_constant, parse_int=_whole, parse_float=_finite)
     except (ValueError, RecursionError) as error:
@@ -224,16 +232,19 @@ def check_depth(value: Any, path: Path | str, what: str) -> None:
 
 
 def _refuse_constant(name: str) -> float:
+    """Refuse ``NaN`` and ``Infinity``, which Python reads."""
     raise ValueError(f"{name} is no number of JSON")
 
 
 def _whole(digits: str) -> int:
+    """Read a whole number of a bounded number of digits: Python takes quadratic time for long ones."""
     if len(digits) > MAX_DIGITS:
         raise ValueError(f"a number of {len(digits)} digits, at most {MAX_DIGITS} are read")
     return int(digits)
 
 
 def _finite(digits: str) -> float:
+    """Read a number, and refuse one that becomes infinite."""
     value = float(digits)
     if value in {float("inf"), float("-inf")}:
         raise ValueError(f"{digits[:20]} is larger than any number")

@@ -113,6 +113,7 @@ def read_picture(path: Path) -> tuple[npt.NDArray[np.uint8], BoolArray | None]:
 
 
 def _check_size(size: tuple[int, int], file_bytes: int, path: Path) -> None:
+    """Refuse a picture of more cells than a map has, or than its bytes can hold."""
     width, height = size
     most = min(MAX_CELLS, max(file_bytes * MAX_CELLS_A_BYTE, UNSUSPICIOUS_CELLS))
     if width * height > most:
@@ -122,14 +123,17 @@ def _check_size(size: tuple[int, int], file_bytes: int, path: Path) -> None:
 
 
 def _greys(image: Any) -> tuple[npt.NDArray[np.uint8], BoolArray | None]:
+    """Convert a picture to greys, 0 to 255, and where it is not transparent (``None`` where it cannot be)."""
     if "A" in image.getbands() or "transparency" in image.info:
-        rgba = np.asarray(image.convert("RGBA"))
-        return np.asarray(image.convert("L")), rgba[..., 3] > 0
+        # By way of RGBA: of a palette with transparent colours Pillow makes no greys without a warning.
+        rgba = image.convert("RGBA")
+        return np.asarray(rgba.convert("L")), np.asarray(rgba)[..., 3] > 0
     if image.mode in {"I", "I;16", "I;16B", "I;16L"}:
         return _sixteen_bits(image), None
     return np.asarray(image if image.mode == "L" else image.convert("L")), None
 
 
 def _sixteen_bits(image: Any) -> npt.NDArray[np.uint8]:
+    """Convert greys of 16 bits to 8; values up to 255 are taken as they are."""
     values = np.asarray(image).astype(np.int64)
     return (values >> 8 if values.max() > 255 else values).clip(0, 255).astype(np.uint8)

@@ -1,13 +1,6 @@
-"""The one writer: whole files or none, folders that appear complete, and nothing of anybody else's touched.
-
-A folder is replaced only when every file in it, at every depth, is one that the same command wrote and that has not
-changed since: its ``run.json`` holds the checksums. Two processes never write one folder: a lock beside it says so.
-"""
+"""The one writer: whole files or none, and nothing of anybody else's touched; ``output_folders`` for folders."""
 
 import contextlib
-import errno
-import fcntl
-import hashlib
 import json
 import os
 import stat
@@ -18,24 +11,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from closedrooms.core.errors import InvalidInputError, OutputError
-from closedrooms.core.files.incoming import read_json
-from closedrooms.core.files.schema import KEY, SCHEMA, check_schema
+from closedrooms.core.errors import OutputError
+from closedrooms.core.files.incoming import READ
 from closedrooms.core.files.unfinished import (
     clear_files,
-    clear_folders,
     final_place,
     part_of_file,
-    part_of_folder,
     unfinished,
 )
-from closedrooms.core.names import short_name
-
-MANIFEST = "run.json"
-PROGRAM = "closedrooms"
-SUMS = "sha256"
-"""Key of the manifest: SHA-256 of every file by its path in the folder; of the manifest itself without its entry."""
-MAX_MANIFEST = 50_000_000
 
 
 @dataclass(slots=True)
@@ -77,7 +60,7 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
     Raises:
         OutputError: The folder is missing, read-only or full.
     """
-    _check_name(path)
+    check_name(path)
     claims, place = _CLAIMED.get(), path.absolute()
     with clear_errors(path), contextlib.ExitStack() as here:
         clear_files(path)
@@ -111,11 +94,20 @@ def _put(claims: _Claims) -> None:
 
 
 def _check_unchanged(path: Path, before: tuple[int, ...] | None) -> None:
+    """Refuse to replace what has appeared or changed at the output since the work began."""
     if before == _identity(path):
         return
     if before is None:
         raise OutputError(f"a file has appeared at the output meanwhile; expected none: {path}")
     raise OutputError(f"the output was changed meanwhile; expected the file that was there before: {path}")
+
+
+def _check_unread(path: Path) -> None:
+    # Beside the file that the command names, what that one leads to: the picture of a map.
+    with contextlib.suppress(FileNotFoundError):
+        status = path.stat()
+        if (status.st_dev, status.st_ino) in (READ.get() or ()):
+            raise OutputError(f"the output is a file that was read; expected another one: {path}")
 
 
 def _identity(path: Path) -> tuple[int, ...] | None:
@@ -129,10 +121,11 @@ def _identity(path: Path) -> tuple[int, ...] | None:
 
 def write_json(path: Path, value: Any) -> None:
     """Write ``value`` as readable JSON (UTF-8, sorted as given, one trailing newline), whole or not at all."""
-    write_bytes(path, _json_text(value).encode())
+    write_bytes(path, json_text(value).encode())
 
 
-def _json_text(value: Any) -> str:
+def json_text(value: Any) -> str:
+    """Format a value as the readable JSON of all our files."""
     return json.dumps(value, indent=2, allow_nan=False) + "\n"
 
 
@@ -150,7 +143,7 @@ def check_new_files(paths: Iterable[Path], *, force: bool = False, sources: Iter
     """
     sources = [source for source in sources if source.exists()]
     for path in paths:
-        _check_name(path)
+        check_name(path)
         with clear_errors(path):
             if path.is_dir():
                 raise OutputError(f"the output is a folder; expected a file: {path}")
@@ -172,222 +165,25 @@ def new_files(paths: Iterable[Path], *, force: bool = False, sources: Iterable[P
     Args:
         paths: Every file that the block is going to write; they are there when it has ended.
         force: Files that are there now may be replaced.
-        sources: Files that the command reads: never replaced.
+        sources: Files that the command reads: never replaced, and nothing else that the block reads is.
 
     Raises:
-        OutputError: See :func:`check_new_files`; a file has appeared or was changed since the block began.
+        OutputError: See :func:`check_new_files`; a file has appeared or was changed since the block began, or was read
+            in it.
     """
     paths = list(paths)
     check_new_files(paths, force=force, sources=sources)
     claims = _Claims({path.absolute(): _identity(path) for path in paths})
     with claims.open:
-        token = _CLAIMED.set(claims)
+        token, counted = _CLAIMED.set(claims), READ.set(set())
         try:
             yield
+            for path in paths:
+                _check_unread(path)
         finally:
+            READ.reset(counted)
             _CLAIMED.reset(token)
         _put(claims)
-
-
-def is_ours(folder: Path, command: object = None) -> bool:
-    """Check whether every file in ``folder``, at every depth, was written by ``command`` and has not changed since.
-
-    Args:
-        folder: With a manifest.
-        command: As the manifest names it; ``None`` for parts of a dataset, whose manifests name none.
-    """
-    return _strange(folder, command) == ""
-
-
-def _strange(folder: Path, command: object) -> str:
-    """Find something in a folder that the same command did not write, or was changed since; empty for nothing."""
-    try:
-        manifest = read_json(folder / MANIFEST, what="a manifest", max_bytes=MAX_MANIFEST)
-        if manifest["program"] != PROGRAM or manifest.get("command") != command:
-            return MANIFEST
-        check_schema(manifest, folder / MANIFEST)
-        sums = dict(manifest.get(SUMS) or manifest["checksums"])
-        listed = {MANIFEST, *sums, *manifest["files"]}
-        for path in _walk(folder):
-            name = path.relative_to(folder).as_posix()
-            if name not in listed or not stat.S_ISREG(path.lstat().st_mode):
-                return name
-            # A file without a checksum is a recording of a sample: its bytes differ from run to run.
-            if name in sums and sums[name] != (_own_sum(manifest) if name == MANIFEST else _digest(path)):
-                return name
-            if name == MANIFEST and path.read_bytes() != _json_text(manifest).encode():
-                return name
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, InvalidInputError):
-        return f"no {MANIFEST} of ours"
-    return ""
-
-
-def _walk(folder: Path) -> Iterator[Path]:
-    """List everything in a folder but its folders, at every depth; an empty one counts as somebody else's file."""
-    for path in sorted(folder.iterdir()):
-        if path.is_dir() and not path.is_symlink() and any(path.iterdir()):
-            yield from _walk(path)
-        else:
-            yield path
-
-
-def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _own_sum(manifest: dict[str, Any]) -> str:
-    sums = {name: value for name, value in manifest[SUMS].items() if name != MANIFEST}
-    return hashlib.sha256(_json_text({**manifest, SUMS: sums}).encode()).hexdigest()
-
-
-def check_output_folder(folder: Path, command: object = None, *, sources: Iterable[Path | None] = ()) -> None:
-    """Fail early when ``folder`` could not be written at the end: something not ours, no right to write, a writer.
-
-    Args:
-        folder: The output.
-        command: As the manifest names it.
-        sources: Files and folders that the command reads: the output replaces none of them.
-
-    Raises:
-        OutputError: It is a file, holds anything that the same command did not write or that was changed since, or a
-            source; its parent cannot be written, or another process writes it.
-    """
-    for source in sources:
-        if source is not None and _holds(folder, source):
-            raise OutputError(f"the output folder holds what is read ({source.name}); expected another one: {folder}")
-    _check_name(folder)
-    with clear_errors(folder):
-        folder = _real(folder)
-        _check_replaceable(folder, command)
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder.parent):
-            pass
-    with only_writer(folder):
-        pass
-
-
-def _holds(folder: Path, source: Path) -> bool:
-    try:
-        return source.exists() and source.resolve().is_relative_to(folder.resolve())
-    except (OSError, ValueError):  # a name that the system refuses is said where it is read
-        return False
-
-
-def _check_replaceable(folder: Path, command: object) -> None:
-    if os.path.lexists(folder) and not folder.is_dir():
-        raise OutputError(f"the output is a file; expected a folder: {folder}")
-    if folder.is_dir() and any(folder.iterdir()):
-        strange = _strange(folder, command)
-        if strange:
-            by = f"closedrooms {command}" if command else "closedrooms"
-            raise OutputError(
-                f"the output folder holds something that {by} did not write, or that was changed since ({strange}); "
-                f"expected an empty or new one: {folder}"
-            )
-
-
-def _real(folder: Path) -> Path:
-    """Follow ``folder`` to the folder itself where it is a symbolic link to one; the link stays as it is."""
-    return folder.resolve() if folder.is_symlink() and folder.exists() else folder
-
-
-@contextlib.contextmanager
-def output_folder(folder: Path, manifest: dict[str, Any]) -> Iterator[Path]:
-    """Make a fresh folder to write into that takes the place of ``folder`` when the block ends well.
-
-    The manifest ``run.json`` is completed on leaving with ``program``, ``schema``, ``files`` and checksums; the caller
-    may still add to the dictionary inside the block. A folder of the same ``manifest["command"]`` is replaced whole. On
-    any error, Ctrl-C included, ``folder`` is left as it was. What killed processes left half-written beside it is
-    removed.
-
-    Args:
-        folder: Where the result shall be.
-        manifest: Content of ``run.json``; ``command`` names who may replace it.
-
-    Yields:
-        The temporary folder.
-
-    Raises:
-        OutputError: See :func:`check_output_folder`; a full disk.
-    """
-    command = manifest.get("command")
-    check_output_folder(folder, command)
-    folder = _real(folder)
-    with only_writer(folder) as alone:
-        staging = part_of_folder(folder)
-        with unfinished(staging, folder), clear_errors(folder):
-            clear_folders(folder, alone=alone)
-            staging.mkdir(0o700)
-            yield staging
-            _finish(staging, manifest)
-            # Hours may have passed: what was put there in the meantime is not ours.
-            _check_replaceable(folder, command)
-            _swap(staging, folder)
-
-
-def _finish(staging: Path, manifest: dict[str, Any]) -> None:
-    names = [path.relative_to(staging).as_posix() for path in _walk(staging)]
-    manifest["program"] = PROGRAM
-    manifest[KEY] = SCHEMA
-    manifest["files"] = names
-    if "checksums" not in manifest:
-        manifest[SUMS] = {name: _digest(staging / name) for name in names}
-        # As it will be read again: tuples are lists then, keys are texts.
-        manifest[SUMS][MANIFEST] = _own_sum(json.loads(_json_text(manifest)))
-    write_json(staging / MANIFEST, manifest)
-    staging.chmod(0o755)
-
-
-def _swap(staging: Path, folder: Path) -> None:
-    old = part_of_folder(folder, "old")
-    with unfinished(old, folder):
-        if folder.exists():
-            folder.replace(old)
-        staging.replace(folder)
-
-
-@contextlib.contextmanager
-def only_writer(folder: Path) -> Iterator[bool]:
-    """Hold the lock of an output folder; the kernel lets go of it when the process ends, however it ends.
-
-    Yields:
-        Whether the lock is one: not every file system knows locks.
-
-    Raises:
-        OutputError: Another process holds it, or the parent cannot be written.
-    """
-    path = folder.with_name(f".{short_name(folder.name)}.lock")
-    with clear_errors(folder):
-        lock, locked = _locked(path, folder)
-    try:
-        with unfinished(path, folder):
-            yield locked
-    finally:
-        os.close(lock)
-
-
-def _locked(path: Path, folder: Path) -> tuple[int, bool]:
-    """Open the file which now has this name, and try to lock it: its descriptor, and whether it holds the lock."""
-    while True:
-        lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # The one before may have removed the file between our opening and our locking.
-            if path.exists() and os.fstat(lock).st_ino == path.stat().st_ino:
-                return lock, True
-        except OSError as error:
-            if error.errno in {errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS}:  # a file system without locks
-                return lock, False
-            os.close(lock)
-            if error.errno in {errno.EWOULDBLOCK, errno.EACCES}:
-                raise OutputError(f"another closedrooms writes this folder; expected to be alone: {folder}") from error
-            raise
-        except BaseException:
-            os.close(lock)
-            path.unlink(missing_ok=True)
-            raise
-        os.close(lock)
 
 
 @contextlib.contextmanager
@@ -403,7 +199,12 @@ def clear_errors(where: Path) -> Iterator[None]:
         raise OutputError(f"cannot write ({error.strerror or error}): {final_place(where)}") from error
 
 
-def _check_name(path: Path) -> None:
+def check_name(path: Path) -> None:
+    """Refuse a name that no file system takes.
+
+    Raises:
+        OutputError: It cannot be encoded, or holds a NUL.
+    """
     try:
         os.fsencode(path)
     except UnicodeError as error:

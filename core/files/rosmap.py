@@ -35,7 +35,7 @@ SAME_YAW = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RosMap:
-    """A map that somebody else made.
+    """A map as read from a ROS map's files, whoever wrote them.
 
     The grid keeps the axes of its picture. Everything that the program works out lies in the frame of the grid, and is
     brought to the map frame where it is written.
@@ -60,10 +60,6 @@ class RosMap:
         """Move doors of the map frame to the frame of the grid."""
         grid_T_map = self.map_T_grid.inverse()
         return [door.moved(grid_T_map) for door in doors] if self.turned else list(doors)
-
-    def doors_on_map(self, doors: Iterable[ClosedDoor]) -> list[ClosedDoor]:
-        """Move doors of the grid's frame to the map frame."""
-        return [door.moved(self.map_T_grid) for door in doors] if self.turned else list(doors)
 
     def rooms_on_map(self, rooms: Iterable[Room]) -> list[Room]:
         """Move rooms of the grid's frame to the map frame."""
@@ -116,6 +112,7 @@ def write_raw_map(stem: Path, grid: OccupancyGrid, *, map_T_grid: Pose2 = IDENTI
 
 
 def _write(stem: Path, frame: GridFrame, pixels: npt.NDArray[np.uint8], mode: str, map_T_grid: Pose2) -> None:
+    """Write the picture and the YAML of a map."""
     import cv2
 
     picture = stem.with_name(stem.name + ".png")
@@ -254,6 +251,7 @@ def _origin(value: Any, path: Path, remarks: list[Remark]) -> tuple[float, float
 
 
 def _raw() -> CellArray:
+    """Map grey values to cells in the mode ``raw``: the occupancy in percent, unknown above 100."""
     levels = np.arange(256)
     return np.where(levels <= OCCUPIED, levels, UNKNOWN).astype(np.int8)
 
@@ -278,6 +276,7 @@ def _meanings(fields: dict[str, Any], mode: str, path: Path) -> CellArray:
 
 
 def _negate(value: Any, path: Path) -> bool:
+    """Read ``negate``, as a number or a word."""
     words = {"0": False, "1": True, "false": False, "true": True, "no": False, "yes": True}
     negate = words.get(value.strip().lower()) if isinstance(value, str) else None
     if negate is None:

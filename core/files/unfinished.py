@@ -86,6 +86,7 @@ def clear_files(path: Path) -> None:
 
 
 def _remove(path: Path, target: Path) -> None:
+    """Remove what is left half-written; an old folder goes back where its place is empty."""
     with contextlib.suppress(OSError):
         if path.suffix == ".old" and path.exists() and not os.path.lexists(target):
             path.replace(target)
@@ -108,6 +109,7 @@ def _is_own(path: Path) -> bool:
 
 
 def _is_abandoned(path: Path) -> bool:
+    """Check whether nobody has written to it for a day."""
     try:
         return time.time() - path.lstat().st_mtime > ABANDONED
     except OSError:
@@ -115,6 +117,7 @@ def _is_abandoned(path: Path) -> bool:
 
 
 def _is_alive(process: int) -> bool:
+    """Check whether there is such a process, of whatever user."""
     try:
         os.kill(process, 0)
     except (ProcessLookupError, OverflowError):

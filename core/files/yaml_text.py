@@ -125,6 +125,7 @@ def _check_events(events: Any, path: Path, what: str) -> None:
 
 
 def _check_scalar(event: Any, scan: _Scan) -> None:
+    """Refuse a merge key, and numbers of too many digits."""
     text = event.value
     if text == "<<" and event.implicit[0] and scan.at_key():
         raise scan.refuse("a YAML with a merge key (<<)")

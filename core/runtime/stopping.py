@@ -18,6 +18,7 @@ from typing import Any
 
 PATIENCE = 1.4
 """How long a process may take to end in order [s]; with what follows it is gone within 2 s."""
+PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _STUCK: list[bool] = []
 
@@ -134,3 +135,25 @@ def handle(numbers: Sequence[int], handler: Callable[[int, FrameType | None], ob
     for number in numbers:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, handler)
+
+
+def ending_with(parent: int, number: int) -> Callable[[], None]:
+    """Make what has the kernel send a process a signal when its parent ends, however that ends; Linux alone can.
+
+    What is made may run between fork and exec: all that it needs is there before.
+
+    Args:
+        parent: The parent's process id: it may have ended before the kernel was asked, and then the process ends too.
+        number: The signal.
+    """
+    import ctypes  # not needed by most commands
+
+    prctl = getattr(ctypes.CDLL(None), "prctl", None)
+
+    def ask() -> None:
+        if prctl is not None:
+            prctl(PR_SET_PDEATHSIG, number)
+        if os.getppid() != parent:
+            os._exit(1)
+
+    return ask

@@ -72,6 +72,7 @@ def build_graph(
 
 
 def _start_vertex(draft: GraphDraft, start: Point | None) -> int:
+    """Find the vertex to start from: the nearest in sight of ``start`` [m], else the nearest; the first without one."""
     if start is None:
         return 0
     point = draft.space.frame.to_corners(np.array(start))[::-1]

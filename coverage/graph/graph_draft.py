@@ -38,6 +38,7 @@ class GraphDraft:
             self.follow(chain)
 
     def _vertex_at(self, cell: IntArray, kind: VertexKind) -> int:
+        """Find or add the vertex in the middle of a cell; a detour that is met again takes the other kind."""
         key = (int(cell[0]), int(cell[1]))
         if key not in self._at_cell:
             self._at_cell[key] = self.add_vertex(cell.astype(np.float64) + 0.5, kind)
@@ -71,7 +72,7 @@ class GraphDraft:
         return np.asarray(next(seen, found[0]))
 
     def add_vertex(self, point: FloatArray, kind: VertexKind) -> int:
-        """Number of a new vertex."""
+        """Add a vertex at ``point``, ``(row, col)`` in continuous cells; returns its number."""
         self.points.append(np.asarray(point, dtype=np.float64))
         self.kinds.append(kind)
         return len(self.points) - 1

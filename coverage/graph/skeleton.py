@@ -203,6 +203,7 @@ def _follow(start: int, first: int, links: list[list[int]], group: list[int], se
 
 
 def _ring(pixel: int, links: list[list[int]], seen: list[bool]) -> list[int]:
+    """Follow a ring without junctions around, from one of its pixels to the same."""
     ring = [pixel, links[pixel][0]]
     while ring[-1] != pixel:
         here, before = ring[-1], ring[-2]

@@ -110,6 +110,7 @@ def merge_thin(voronoi: VoronoiGraph, clearance: FloatArray, *, doorway: float, 
 
 
 def _drop_spurs(graph: _Multigraph, doorway: float, corner_ratio: float) -> bool:
+    """Remove dead ends that reach hardly beyond the free space of their junction; tell whether there were any."""
     spurs = []
     for leaf, own in graph.at.items():
         if len(own) != 1:
@@ -148,6 +149,7 @@ def _move_ends(graph: _Multigraph, doorway: float, corner_ratio: float) -> bool:
 
 
 def _drop_loops(graph: _Multigraph, doorway: float) -> bool:
+    """Remove loops from a vertex to itself that are shorter than four doorways; tell whether there were any."""
     loops = [
         number
         for number, branch in graph.branches.items()

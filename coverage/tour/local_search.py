@@ -29,7 +29,7 @@ class LocalSearch:
         self.take(list(tour))
 
     def take(self, tour: list[int]) -> None:
-        """Go on from another tour."""
+        """Replace the present tour by another one over the same vertices."""
         self.tour = tour
         self._number(0, self.n - 1)
 
@@ -38,6 +38,7 @@ class LocalSearch:
         return sum(self.d[a][b] for a, b in zip(self.tour, self.tour[1:] + self.tour[:1], strict=True))
 
     def _number(self, first: int, last: int) -> None:
+        """Note again where the vertices of a stretch of the tour stand."""
         for position in range(first, last + 1):
             self.position[self.tour[position]] = position
 

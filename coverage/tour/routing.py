@@ -65,6 +65,7 @@ def run_tabu_search(
 
 
 def _stop_when_converged(model: Any, patience: int, end: list[SearchStatus]) -> Callable[[], None]:
+    """Make the callback that ends a search, and says so in ``end``, after ``patience`` solutions no shorter."""
     best, waited = np.inf, 0
 
     def at_solution() -> None:
@@ -79,6 +80,7 @@ def _stop_when_converged(model: Any, patience: int, end: list[SearchStatus]) -> 
 
 
 def _solve(distances: FloatArray, prepare: Callable[[Any, Any], None]) -> list[int]:
+    """Solve the travelling salesman problem over distances [m], shape (n, n): the vertices in order."""
     from ortools.constraint_solver import pywrapcp, routing_enums_pb2
 
     units = np.rint(distances * UNITS_PER_METRE).astype(np.int64)

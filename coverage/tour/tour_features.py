@@ -3,11 +3,11 @@
 import numpy as np
 from shapely.geometry import LineString, MultiLineString, Point
 
-from closedrooms.core.files.geojson import Feature
+from closedrooms.core.files.geojson import GeoFeature
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 
 
-def make_tour_features(tour: CoverageTour, map_name: str) -> list[Feature]:
+def make_tour_features(tour: CoverageTour, map_name: str) -> list[GeoFeature]:
     """Make features of vertices, edges and the tour, each with ``map`` and ``type``.
 
     Args:
@@ -22,7 +22,7 @@ def make_tour_features(tour: CoverageTour, map_name: str) -> list[Feature]:
     graph = tour.graph
     doors = {vertex: door for door, vertex in graph.door_vertices.items()}
     visit = {int(vertex): place for place, vertex in enumerate(tour.order)}
-    features: list[Feature] = []
+    features: list[GeoFeature] = []
     for number, point in enumerate(graph.vertices.tolist()):
         properties = {"map": map_name, "type": "vertex", "vertex": number, "visit": visit.get(number)}
         if graph.kinds:
@@ -54,6 +54,7 @@ def make_tour_features(tour: CoverageTour, map_name: str) -> list[Feature]:
 
 
 def _geometry(tour: CoverageTour) -> LineString | MultiLineString | Point:
+    """Make the line of a tour, in parts where it has breaks; a point where it has one vertex."""
     breaks = np.flatnonzero(np.isnan(tour.path[:, 0]))
     pieces = [piece[~np.isnan(piece[:, 0])] for piece in np.split(tour.path, breaks)]
     # A part with a single vertex: a line of length 0 from it to itself.

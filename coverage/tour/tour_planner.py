@@ -103,11 +103,13 @@ def solve_tour(graph: TopologicalGraph, config: TourConfig | None = None, *, sta
 
 
 def _length(graph: TopologicalGraph, stops: list[int]) -> float:
+    """Measure a walk over straight lines between its stops [m]."""
     steps = np.diff(graph.vertices[stops], axis=0)
     return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
 
 
 def _part_walk(graph: TopologicalGraph, members: list[int], config: TourConfig, start: int) -> _Walk:
+    """Plan the walk through one connected part, block by block."""
     if len(members) == 1:
         return _Walk([start], 0.0, "optimal")
     found = find_blocks(graph, members)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import opened, read_json
-from closedrooms.core.files.outgoing import MANIFEST
+from closedrooms.core.files.output_folders import MANIFEST
 
 # Recordings of equal runs differ in their bytes (`rerun rrd compare` finds them equal).
 NOT_REPEATABLE = {"run.rrd"}

@@ -9,17 +9,18 @@ from typing import Any, TextIO
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files.incoming import read_json
-from closedrooms.core.files.outgoing import MANIFEST, write_bytes
+from closedrooms.core.files.outgoing import write_bytes
+from closedrooms.core.files.output_folders import MANIFEST
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
-from closedrooms.experiments.dataset.card import card
 from closedrooms.experiments.dataset.checksums import check
 from closedrooms.experiments.dataset.config import DatasetConfig
+from closedrooms.experiments.dataset.dataset_card import card
 from closedrooms.experiments.dataset.layout import (
     CARD,
     Count,
     alone,
-    claim,
+    claim_dataset,
     early_end,
     file_sums,
     fingerprint,
@@ -28,7 +29,7 @@ from closedrooms.experiments.dataset.layout import (
     write_metadata,
     write_sums,
 )
-from closedrooms.experiments.dataset.sample import Outcome, Task, make
+from closedrooms.experiments.dataset.sample import Task, TaskResult, make
 from closedrooms.experiments.dataset.sharded import finish, make_shards, shard_counts
 from closedrooms.experiments.dataset.variants import (
     SPLITS,
@@ -37,7 +38,7 @@ from closedrooms.experiments.dataset.variants import (
     count_variants,
     find_variants,
     find_worlds,
-    in_order,
+    sort_buildings,
 )
 from closedrooms.experiments.places import Url
 from closedrooms.experiments.workers import Crew, Lost
@@ -64,7 +65,7 @@ def dataset(config: DatasetConfig, *, progress: Progress | None = None) -> Repor
     _check_reach(config)
     progress.stage("worlds")
     worlds = find_worlds(config)
-    claim(config, worlds)
+    claim_dataset(config, worlds)
     with alone(config.out):
         if config.format == "shards":
             shards = make_shards(config, worlds, progress, _needs(config))
@@ -114,13 +115,16 @@ def _report(
 
 def _make_folders(config: DatasetConfig, worlds: Sequence[World], progress: Progress) -> dict[str, str]:
     """Make what is missing of a dataset of folders and collect why samples failed, by id."""
-    crew: Crew[Task, Outcome] = Crew(config.workers, config.scheduler, _needs(config), "closedrooms dataset")
+    crew: Crew[Task, TaskResult] = Crew(config.workers, config.scheduler, _needs(config), "closedrooms dataset")
     failures: dict[str, str] = {}
     if config.maps == "erased":
         surveys = (Task(config, world) for world in worlds)
         failures = {task.world.name: why for task, why in _make(surveys, len(worlds), crew, progress, "surveys")}
     variants = (
-        variant for split in SPLITS for world in in_order(worlds, split) for variant in find_variants(world, config)
+        variant
+        for split in SPLITS
+        for world in sort_buildings(worlds, split)
+        for variant in find_variants(world, config)
     )
     failed: dict[str, str] = {}
 
@@ -142,7 +146,7 @@ def _needs(config: DatasetConfig) -> tuple[str, ...]:
 
 
 def _make(
-    tasks: Iterable[Task], total: int, crew: Crew[Task, Outcome], progress: Progress, stage: str
+    tasks: Iterable[Task], total: int, crew: Crew[Task, TaskResult], progress: Progress, stage: str
 ) -> list[tuple[Task, str]]:
     """Make what is not there yet and collect the tasks that failed, with the reason.
 
@@ -205,7 +209,7 @@ def _finish(
             _read(folder, out, sums)[1] for folder in sorted(surveys, key=lambda path: f"{path}/") if folder.exists()
         )
         for split in sorted(SPLITS):
-            counts[split] = _write_table(config, in_order(worlds, split), failed, sums, stopped)
+            counts[split] = _write_table(config, sort_buildings(worlds, split), failed, sums, stopped)
         size += sum(count.size for count in counts.values())
         made: dict[Split, int] = {split: count.samples for split, count in counts.items()}
         write_bytes(out / CARD, card(config, worlds, made, failed, size).encode())

@@ -159,6 +159,7 @@ class Eraser:
         return drawn
 
     def _new_keyframe(self, number: int, ranges: FloatArray, doors: tuple[str, ...]) -> _Drawn:
+        """Make a keyframe of a scan whose beams end at closed doors, with the doors that it sees."""
         survey = self.survey
         scan = survey.keyframes.scans[number]
         if not np.array_equal(ranges, self._ranges[number], equal_nan=True):
@@ -241,6 +242,7 @@ class Eraser:
         return first_hits(self._places[beams.scan], self._directions(beams.scan, beams.beam), edges)
 
     def _directions(self, scan: IntArray, beam: IntArray) -> FloatArray:
+        """Compute the unit vectors of beams in the map frame, shape (n, 2)."""
         angles = self._angles[scan, beam]
         return np.column_stack((np.cos(angles), np.sin(angles)))
 

@@ -14,19 +14,26 @@ from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files.incoming import parse_json
-from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, new_file, write_json
+from closedrooms.core.files.outgoing import json_text, new_file, write_json
+from closedrooms.core.files.output_folders import MANIFEST, PROGRAM
 from closedrooms.core.files.schema import KEY, SCHEMA, check_schema
 from closedrooms.experiments.dataset.checksums import digest
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.sample import FORMAT, NOT_CONTENT
 from closedrooms.experiments.dataset.shard import DATA, PARTS
 from closedrooms.experiments.dataset.survey_store import SURVEYS
-from closedrooms.experiments.dataset.variants import SPLITS, Variant, World, find_variants, in_order
+from closedrooms.experiments.dataset.variants import (
+    SPLITS,
+    Variant,
+    World,
+    find_variants,
+    sort_buildings,
+    world_sources,
+)
 from closedrooms.experiments.places import Url
-from closedrooms.experiments.stores import Store, file_digest, open_store, read_file, write_file
+from closedrooms.experiments.stores import DATASET_MANIFEST, Store, file_digest, open_store, read_file, write_file
 from closedrooms.pipeline.reporting.manifest import resolved, versions
 
-DATASET_MANIFEST = "manifest.json"
 CARD = "README.md"
 SUMS = "SHA256SUMS"
 METADATA = "metadata.parquet"
@@ -59,7 +66,7 @@ class Count:
     size: int
 
 
-def claim(config: DatasetConfig, worlds: Sequence[World]) -> None:
+def claim_dataset(config: DatasetConfig, worlds: Sequence[World]) -> None:
     """Claim the place before the work, or check that it holds a part of this very dataset.
 
     Raises:
@@ -67,7 +74,7 @@ def claim(config: DatasetConfig, worlds: Sequence[World]) -> None:
         InvalidInputError: A dataset of another configuration, or of another version.
     """
     place, wanted = config.out, description(config, worlds)
-    begun = {"command": "dataset", **wanted, "complete": False, NAMED[config.format]: []}
+    begun = {"command": "dataset", **wanted, "complete": False, **read_worlds(config, worlds), NAMED[config.format]: []}
     if isinstance(place, Url):
         store = open_store(place)
         if DATASET_MANIFEST in store.names():
@@ -134,6 +141,7 @@ def alone(folder: Path | Url) -> Iterator[None]:
 
 
 def _clear_unfinished(folder: Path) -> None:
+    """Remove what killed processes left at any depth of a dataset."""
     for depth in ("*", "*/*", "*/*/*", "*/*/*/*"):
         for path in filter(_unfinished, folder.glob(depth)):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -170,7 +178,7 @@ def read_stored_json(store: Store, name: str) -> Any:
 
 def json_bytes(value: Any) -> bytes:
     """Encode a value as the JSON that a dataset holds."""
-    return (json.dumps(value, indent=2, allow_nan=False) + "\n").encode()
+    return json_text(value).encode()
 
 
 def description(config: DatasetConfig, worlds: Sequence[World]) -> dict[str, Any]:
@@ -192,10 +200,11 @@ def description(config: DatasetConfig, worlds: Sequence[World]) -> dict[str, Any
     }
 
 
-def said(worlds: Sequence[World]) -> dict[str, Any]:
-    """Collect what was said on reading the plans, as an entry of a manifest; nothing where nothing was said."""
+def read_worlds(config: DatasetConfig, worlds: Sequence[World]) -> dict[str, Any]:
+    """Collect where the plans were read from, and what was said then; they do not tell one dataset from another."""
     remarks = [remark.as_json() for world in worlds for remark in world.remarks]
-    return {"remarks": remarks} if remarks else {}
+    paths = {"paths": {"worlds": world_sources(config.worlds)}}
+    return paths | ({"remarks": remarks} if remarks else {})
 
 
 def early_end(sample: str, about: Mapping[str, Any]) -> dict[str, str]:
@@ -235,13 +244,19 @@ def write_manifest(config: DatasetConfig, worlds: Sequence[World], failed: Mappi
         OutputError: It cannot be written.
     """
     assert isinstance(config.out, Path), "folders are of this machine"
-    head = {"command": "dataset", **description(config, worlds), "complete": True, **said(worlds), "samples": []}
+    head = {
+        "command": "dataset",
+        **description(config, worlds),
+        "complete": True,
+        **read_worlds(config, worlds),
+        "samples": [],
+    }
     empty = b"[]\n}\n"
     with new_file(config.out / DATASET_MANIFEST) as file:
         file.write(json_bytes(head).removesuffix(empty) + b"[")
         between = b"\n"
         for variant in (
-            v for split in sorted(SPLITS) for w in in_order(worlds, split) for v in find_variants(w, config)
+            v for split in sorted(SPLITS) for w in sort_buildings(worlds, split) for v in find_variants(w, config)
         ):
             entry = {
                 "id": variant.id,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import read_bytes, read_json, reading
-from closedrooms.core.files.outgoing import MANIFEST
+from closedrooms.core.files.output_folders import MANIFEST
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -12,7 +12,7 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import OutputError, reason
 from closedrooms.core.files.geojson import write_doors, write_rooms
-from closedrooms.core.files.outgoing import output_folder
+from closedrooms.core.files.output_folders import output_folder
 from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.files.tum import write_trajectory
 from closedrooms.core.grid import GridFrame, OccupancyGrid
@@ -65,7 +65,7 @@ class Task:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class TaskResult:
     """Result of a task: nothing set is well.
 
     Attributes:
@@ -83,7 +83,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observed:
-    """Map, doors and poses that a sample's robot brought home, whichever way it was made.
+    """Map, doors and poses that a sample's robot brought home, whichever way it was made: not all were explored.
 
     Poses are those of all scans of an exploration, of an erased map those of the keyframes that make it.
     """
@@ -97,21 +97,21 @@ class Observed:
     about: dict[str, Any]
 
 
-def make(task: Task) -> Outcome:
+def make(task: Task) -> TaskResult:
     """Make one survey or sample as a folder; tell what goes wrong, but raise a missing package."""
     return guarded(lambda: make_folder(task, task.folder))
 
 
-def guarded(work: Callable[[], Outcome | None]) -> Outcome:
+def guarded(work: Callable[[], TaskResult | None]) -> TaskResult:
     """Do work and tell what goes wrong, but raise a missing package."""
     try:
-        return work() or Outcome()
+        return work() or TaskResult()
     except OutputError as error:
-        return Outcome(trouble=str(error))
+        return TaskResult(trouble=str(error))
     except ModuleNotFoundError:
         raise
     except Exception as error:
-        return Outcome(failure=reason(error))
+        return TaskResult(failure=reason(error))
 
 
 def make_folder(task: Task, folder: Path) -> None:
@@ -148,6 +148,7 @@ def _about(task: Task, seed: int) -> dict[str, Any]:
 
 
 def _make_sample(task: Task, variant: Variant, plan: FloorPlan, folder: Path) -> None:
+    """Write the folder of one sample: map, truth, doors, rooms, trajectories."""
     config, world = task.config, task.world
     closed = tuple(door.id for door in plan.doors if door.id in variant.closed)
     erased = config.maps == "erased"
@@ -208,6 +209,7 @@ def _metrics(
 
 
 def _erased(config: DatasetConfig, world: World, closed: Sequence[str]) -> Observed:
+    """Redraw the map of the open survey as it would be with these doors closed."""
     eraser = _eraser(config, world)
     survey, result = eraser.survey, eraser.erase(closed)
     kept = result.keyframes
@@ -244,6 +246,7 @@ def _true_map(source: str, frame: GridFrame, start: Pose2) -> OccupancyGrid:
 def _simulated(
     config: DatasetConfig, plan: FloorPlan, closed: Sequence[str], seed: int, recorder: "Recorder"
 ) -> Observed:
+    """Explore the building with these doors closed."""
     with Simulation(plan, closed, config.sim, seed) as sim:
         log, mapper = RunLog(sim, Silent(), keep_scans=config.keep_scans), Mapper(config.mapper)
         survey = survey_building(log, mapper, config.navigation, recorder=recorder)

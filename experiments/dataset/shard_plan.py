@@ -83,6 +83,7 @@ class ShardPlan:
                 yield self._filled()
 
     def _skip_written(self) -> None:
+        """Go on behind the shards that are there already."""
         while self._begins and self._begins[-1] < self._next:
             self._begins.pop()
         while self._begins and self._begins[-1] == self._next:
@@ -91,6 +92,7 @@ class ShardPlan:
             self._number = shard.number + 1
 
     def _is_full(self) -> bool:
+        """Check whether the samples since the last shard make the next one."""
         end = self._ends.get(self._first)
         if end is not None:
             return self._next == end
@@ -98,6 +100,7 @@ class ShardPlan:
         return TOGETHER * self._size >= self._config.shard_mb * MB or self._next == self._total or begins
 
     def _filled(self) -> Filling:
+        """Make the job that fills the next shard, and begin another."""
         first, end = self._first, self._next
         failures = []
         for index in range(first, end):

@@ -6,19 +6,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError
-from closedrooms.experiments.dataset.card import card
 from closedrooms.experiments.dataset.config import DatasetConfig
+from closedrooms.experiments.dataset.dataset_card import card
 from closedrooms.experiments.dataset.layout import (
     CARD,
-    DATASET_MANIFEST,
     SUMS,
     Count,
     description,
     json_bytes,
     read_stored_json,
-    said,
+    read_worlds,
 )
-from closedrooms.experiments.dataset.sample import Outcome, Task
+from closedrooms.experiments.dataset.sample import Task, TaskResult
 from closedrooms.experiments.dataset.shard import DATA, PARTS, Shard, read_shard
 from closedrooms.experiments.dataset.shard_plan import ShardPlan
 from closedrooms.experiments.dataset.shards import Filling, Part, work
@@ -30,14 +29,14 @@ from closedrooms.experiments.dataset.variants import (
     World,
     count_variants,
     find_variants,
-    in_order,
+    sort_buildings,
 )
 from closedrooms.experiments.places import Url
-from closedrooms.experiments.stores import Store, file_digest, open_store, write_file
+from closedrooms.experiments.stores import DATASET_MANIFEST, Store, file_digest, open_store, write_file
 from closedrooms.experiments.workers import Crew, Lost
 from closedrooms.pipeline.reporting.progress import Progress
 
-Job = Task | Part | Filling
+ShardJob = Task | Part | Filling
 PART = re.compile(rf"{PARTS}/([a-z]+)-(\d+)\.arrow")
 NOTE = re.compile(rf"{PARTS}/([a-z]+)-(\d+)\.json")
 
@@ -61,7 +60,7 @@ def make_shards(
         OutputError: Nothing can be written any more.
     """
     store = open_store(config.out)
-    crew: Crew[Job, Outcome] = Crew(config.workers, config.scheduler, tuple(needs), "closedrooms dataset")
+    crew: Crew[ShardJob, TaskResult] = Crew(config.workers, config.scheduler, tuple(needs), "closedrooms dataset")
     progress.stage("shards there")
     plans = _plans(config, worlds, store)
     failed = _surveys(config, worlds, store, crew, progress) if config.maps == "erased" else {}
@@ -94,7 +93,7 @@ def _plans(config: DatasetConfig, worlds: Sequence[World], store: Store) -> dict
         split: ShardPlan(
             config,
             split,
-            count_variants(in_order(worlds, split), config),
+            count_variants(sort_buildings(worlds, split), config),
             shards=[shard for shard in found.values() if shard.split == split and shard not in lost],
             lost=[shard for shard in lost if shard.split == split],
             parts=parts[split],
@@ -125,14 +124,14 @@ def _check_shard(config: DatasetConfig, store: Store, shard: Shard, size: int) -
 
 
 def _surveys(
-    config: DatasetConfig, worlds: Sequence[World], store: Store, crew: Crew[Job, Outcome], progress: Progress
+    config: DatasetConfig, worlds: Sequence[World], store: Store, crew: Crew[ShardJob, TaskResult], progress: Progress
 ) -> dict[str, str]:
     """Explore each building once and collect why it failed, by world."""
     progress.stage("surveys", len(worlds))
     there, failed = store.sizes(SURVEYS), {}
     done = 0
 
-    def missing() -> Iterator[Job]:
+    def missing() -> Iterator[ShardJob]:
         nonlocal done
         for world in worlds:
             if survey_name(world) in there:
@@ -150,7 +149,7 @@ def _surveys(
     return failed
 
 
-def _failure(outcome: Outcome | Lost) -> str:
+def _failure(outcome: TaskResult | Lost) -> str:
     """Explain why something was not made; empty where it was.
 
     Raises:
@@ -181,7 +180,7 @@ class _Samples:
     failed: Mapping[str, str]
     done: int = 0
 
-    def jobs(self) -> Iterator[Job]:
+    def jobs(self) -> Iterator[ShardJob]:
         """Yield what is to be done, samples in order, and between them the shards that have become full."""
         for split in SPLITS:
             for index, variant in enumerate(self._variants(split)):
@@ -195,14 +194,16 @@ class _Samples:
                     yield Part(Task(self.config, variant.world, variant), index)
 
     def _variants(self, split: Split) -> Iterator[Variant]:
-        return (variant for world in in_order(self.worlds, split) for variant in find_variants(world, self.config))
+        return (
+            variant for world in sort_buildings(self.worlds, split) for variant in find_variants(world, self.config)
+        )
 
     def fillings(self) -> Iterator[Filling]:
         """Yield the shards that have become full."""
         for plan in self.plans.values():
             yield from plan.ready()
 
-    def put_down(self, job: Job, outcome: Outcome | Lost) -> None:
+    def put_down(self, job: ShardJob, outcome: TaskResult | Lost) -> None:
         """Record what came of a job.
 
         Raises:
@@ -260,7 +261,7 @@ def finish(config: DatasetConfig, worlds: Sequence[World], shards: Sequence[Shar
         **description(config, worlds),
         "complete": True,
         "shards": [shard.as_json() for shard in shards],
-        **said(worlds),
+        **read_worlds(config, worlds),
     }
     write_file(store, DATASET_MANIFEST, json_bytes(manifest))
     sums = {shard.name: shard.sha256 for shard in shards if shard.rows}

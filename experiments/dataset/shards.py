@@ -20,7 +20,7 @@ from closedrooms.experiments.dataset.packing import (
     pack_survey,
     sample_schema,
 )
-from closedrooms.experiments.dataset.sample import Outcome, Task, guarded, make_folder
+from closedrooms.experiments.dataset.sample import Task, TaskResult, guarded, make_folder
 from closedrooms.experiments.dataset.shard import Shard, note_name, part_name, shard_name
 from closedrooms.experiments.dataset.survey_store import survey_name
 from closedrooms.experiments.dataset.variants import Split
@@ -64,16 +64,16 @@ class Filling:
     failures: tuple[tuple[int, str, str], ...] = ()
 
 
-def work(job: Part | Filling | Task) -> Outcome:
+def work(job: Part | Filling | Task) -> TaskResult:
     """Make a survey, a part or a shard; tell what goes wrong, but raise a missing package."""
     if isinstance(job, Task):
         return guarded(lambda: make_survey(job))
     if isinstance(job, Part):
         return guarded(lambda: make_part(job))
-    return guarded(lambda: fill(job))
+    return guarded(lambda: fill_shard(job))
 
 
-def make_survey(task: Task) -> Outcome:
+def make_survey(task: Task) -> TaskResult:
     """Explore a building and keep the survey."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -84,10 +84,10 @@ def make_survey(task: Task) -> Outcome:
         make_folder(task, folder)
         with store.new(survey_name(task.world)) as file:
             pq.write_table(pa.Table.from_batches([pack_survey(folder)]), file, compression="zstd")
-    return Outcome()
+    return TaskResult()
 
 
-def make_part(part: Part) -> Outcome:
+def make_part(part: Part) -> TaskResult:
     """Make a sample and keep it as a part."""
     task = part.task
     assert task.variant is not None, "a survey is no part"
@@ -96,10 +96,10 @@ def make_part(part: Part) -> Outcome:
         make_folder(task, folder)
         content = as_bytes(pack_sample(folder, task.variant.id, scans=task.config.keep_scans))
     write_file(open_store(task.config.out), part_name(task.world.split, part.index), content)
-    return Outcome(size=len(content))
+    return TaskResult(size=len(content))
 
 
-def fill(job: Filling) -> Outcome:
+def fill_shard(job: Filling) -> TaskResult:
     """Fill a shard from its parts: write the shard, then what is in it, then remove the parts."""
     import pyarrow.parquet as pq
 
@@ -129,10 +129,11 @@ def fill(job: Filling) -> Outcome:
     )  # fmt: skip
     write_note(store, shard)
     store.remove(parts)
-    return Outcome(shard=shard)
+    return TaskResult(shard=shard)
 
 
 def _joined(store: Store, names: Sequence[str]) -> Any:
+    """Read parts and put them together to one Arrow table."""
     import pyarrow as pa
 
     tables = zip(names, store.read_all(names), strict=True)

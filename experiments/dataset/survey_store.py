@@ -10,7 +10,7 @@ from typing import Any
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.archives import read_arrays
 from closedrooms.core.files.incoming import read_json
-from closedrooms.core.files.outgoing import MANIFEST, output_folder
+from closedrooms.core.files.output_folders import MANIFEST, output_folder
 from closedrooms.core.files.tum import read_trajectory, write_trajectory
 from closedrooms.experiments.dataset.checksums import check, checksums
 from closedrooms.experiments.dataset.config import DatasetConfig

@@ -5,7 +5,6 @@ import re
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Literal
 
 from closedrooms.core.errors import InvalidInputError
@@ -14,7 +13,7 @@ from closedrooms.core.remarks import Remark
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.formats.native import plan_text
-from closedrooms.worlds.library import bundled_names, distinct_names, load_world
+from closedrooms.worlds.library import bundled_names, distinct_names, load_world, world_source
 from closedrooms.worlds.plan import FloorPlan
 
 Split = Literal["train", "validation", "test"]
@@ -65,16 +64,24 @@ class Variant:
         return f"{self.world.split}/{self.world.name}/r{self.repetition:02d}-c{len(self.closed):02d}"
 
 
+def given_worlds(words: Sequence[str]) -> list[str]:
+    """List worlds as they were given, each once; ``all`` stands for those that come with us."""
+    return list(dict.fromkeys(name for word in words for name in (bundled_names() if word == ALL else [word])))
+
+
+def world_sources(words: Sequence[str]) -> list[str]:
+    """List worlds by bundled names and whole paths, so that a command of any folder finds them again."""
+    return [world_source(text) for text in given_worlds(words)]
+
+
 def find_worlds(config: DatasetConfig) -> list[World]:
     """Find the buildings, in the order of their names.
 
     Raises:
         InvalidInputError: An unreadable world, two of one name, or one without a room that a door closes.
     """
-    wanted = [name for given in config.worlds for name in (bundled_names() if given == ALL else [given])]
-    given = list(dict.fromkeys(wanted))
-    plans = [load_world(text) for text in given]
-    sources = [text if text in bundled_names() else str(Path(text).resolve()) for text in given]
+    plans = [load_world(text) for text in given_worlds(config.worlds)]
+    sources = world_sources(config.worlds)
     found: dict[str, tuple[str, FloorPlan]] = {}
     for told, source, plan in zip(distinct_names(plans, sources), sources, plans, strict=True):
         name = re.sub(r"[^A-Za-z0-9._-]+", "-", told).strip(".-") or "world"
@@ -134,7 +141,7 @@ def count_variants(worlds: Sequence[World], config: DatasetConfig) -> int:
     return config.repetitions * sum(min(config.max_closed, len(world.closable)) for world in worlds)
 
 
-def in_order(worlds: Sequence[World], split: Split) -> list[World]:
+def sort_buildings(worlds: Sequence[World], split: Split) -> list[World]:
     """Sort the buildings of a split by their samples' ids."""
     return sorted((world for world in worlds if world.split == split), key=lambda world: f"{world.name}/")
 

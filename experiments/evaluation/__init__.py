@@ -1,7 +1,4 @@
-"""Methods against the truth on samples of a dataset; ``evaluate`` is the command.
+"""Methods against the truth on samples of a dataset; ``evaluate`` is the command, ``config`` has its options.
 
-``listing``, ``shard_rows`` and ``samples`` find and read them, ``sample_evaluation`` takes one through all methods;
-``scores``, ``sureness``, ``tours`` and ``cost`` measure. ``summary``, ``statistics`` and ``numbers`` say it together;
-``report`` with ``tables``, ``curves``, ``cases`` and ``page`` shows it, in a ``claimed_folder``. ``config`` has the
-options.
+``samples/`` finds and reads them, ``scoring/`` takes each through all methods, ``reporting/`` says it together.
 """

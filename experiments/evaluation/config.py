@@ -16,7 +16,7 @@ from closedrooms.predictor.methods import find_method
 COMPARED = ("paper", "best", "rose", "line-of-sight", "geometric")
 
 
-def in_order(names: Iterable[str]) -> list[str]:
+def sort_methods(names: Iterable[str]) -> list[str]:
     """Sort names of methods as in the tables: ours first, then the rest by name."""
     return sorted(set(names), key=lambda name: (COMPARED.index(name) if name in COMPARED else len(COMPARED), name))
 

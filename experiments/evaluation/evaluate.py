@@ -7,13 +7,16 @@ from functools import partial
 from statistics import median
 from typing import Any
 
-from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, only_writer, write_json
+from closedrooms.core.files.outgoing import write_json
+from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
-from closedrooms.experiments.evaluation.claimed_folder import claim
+from closedrooms.experiments.claimed_folder import claim_folder
 from closedrooms.experiments.evaluation.config import EvaluateConfig
-from closedrooms.experiments.evaluation.listing import SamplePath, find_samples
-from closedrooms.experiments.evaluation.sample_evaluation import Outcome, Scores, evaluate_sample
+from closedrooms.experiments.evaluation.samples.listing import find_samples
+from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
+from closedrooms.experiments.evaluation.scoring.sample_evaluation import SampleResult, evaluate_sample
+from closedrooms.experiments.evaluation.scoring.scores import Scores
 from closedrooms.experiments.workers import Crew, Lost
 from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
@@ -40,7 +43,7 @@ def evaluate(config: EvaluateConfig, *, progress: Progress | None = None) -> Rep
         sample if sample.shard else replace(sample, folder=sample.folder.resolve())
         for sample in find_samples(config.datasets)
     ]
-    claim(config.out, "evaluate")
+    claim_folder(config.out, "evaluate")
     with only_writer(config.out):
         return _evaluate(samples, config, progress)
 
@@ -56,7 +59,7 @@ def _evaluate(samples: Sequence[SamplePath], config: EvaluateConfig, progress: P
         progress.advance(number, f"{number} of {len(samples)}")
     scores.sort(key=lambda score: (score["method"], score["sample"]))
     failures = dict(sorted(failures.items()))
-    from closedrooms.experiments.evaluation.report import write_report
+    from closedrooms.experiments.evaluation.reporting.report import write_report
 
     progress.stage("report")
     summary = write_report(config.out, scores, samples, config, failures)
@@ -96,6 +99,7 @@ def _rows(summary: Sequence[Mapping[str, Any]], seconds: Mapping[str, float]) ->
 
 
 def _seconds(scores: Sequence[Scores]) -> dict[str, float]:
+    """Compute the median time of a prediction, by method [s]."""
     times: defaultdict[str, list[float]] = defaultdict(list)
     for score in scores:
         if "seconds" in score:
@@ -103,7 +107,7 @@ def _seconds(scores: Sequence[Scores]) -> dict[str, float]:
     return {method: round(median(values), 3) for method, values in sorted(times.items())}
 
 
-def _work(samples: Sequence[SamplePath], config: EvaluateConfig) -> Iterator[Outcome]:
+def _work(samples: Sequence[SamplePath], config: EvaluateConfig) -> Iterator[SampleResult]:
     """Yield what comes of the samples, as they are finished."""
     job = partial(
         evaluate_sample,
@@ -115,6 +119,6 @@ def _work(samples: Sequence[SamplePath], config: EvaluateConfig) -> Iterator[Out
     )
     workers = min(config.workers, len(samples))
     needs = ("skimage", *(("networkx", "ortools") if config.tours or config.completions else ()))
-    crew: Crew[SamplePath, Outcome] = Crew(workers, config.scheduler, needs, "closedrooms evaluate")
+    crew: Crew[SamplePath, SampleResult] = Crew(workers, config.scheduler, needs, "closedrooms evaluate")
     for sample, outcome in crew.do(job, samples):
-        yield Outcome([], {sample.name: outcome.reason}) if isinstance(outcome, Lost) else outcome
+        yield SampleResult([], {sample.name: outcome.reason}) if isinstance(outcome, Lost) else outcome

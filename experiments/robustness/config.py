@@ -31,7 +31,7 @@ SHARES = ("dropouts", "missed", "furniture", "glass", "lost")
 
 @dataclass(frozen=True, kw_only=True)
 class RobustnessConfig:
-    """What is disturbed, and how much. The first level of every factor is the one that the others are held against."""
+    """Disturbances and their levels. The first level of every factor is the one that the others are held against."""
 
     worlds: tyro.conf.Positional[tuple[str, ...]]
     """Names of bundled worlds or files that the importers read; ``all`` names the 20 bundled worlds."""

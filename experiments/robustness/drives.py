@@ -23,9 +23,9 @@ from closedrooms.pipeline.reporting.progress import Silent
 from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.pipeline.survey import survey_building
 from closedrooms.sim.config import NOISE_LEVELS, FaultConfig, NoiseConfig, SimConfig
-from closedrooms.sim.differential_drive import Motion
 from closedrooms.sim.faults import Faults
 from closedrooms.sim.odometry import Odometry
+from closedrooms.sim.robot.driven_robot import Motion
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start_pose import start_pose
@@ -36,7 +36,7 @@ START_CLEAR = 0.6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedDrive:
-    """What ideal sensors saw on one exploration with all doors open.
+    """Observations of ideal sensors on one exploration with all doors open.
 
     Attributes:
         plan: The building.

@@ -11,7 +11,7 @@ from shapely.geometry import Polygon
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import read_doors, read_rooms
 from closedrooms.core.files.rosmap import read_map
-from closedrooms.experiments.evaluation.curves import same_extent, save_figure
+from closedrooms.experiments.evaluation.reporting.figures import same_extent, save_figure
 from closedrooms.experiments.robustness.config import Factor
 from closedrooms.experiments.robustness.levels import UNITS, Case
 from closedrooms.experiments.robustness.onset import LevelResult, Onset
@@ -130,6 +130,7 @@ def draw_maps(path: Path, folder: Path, wanted: Sequence[Case]) -> bool:
 
 
 def _map(axes: Any, folder: Path) -> None:
+    """Show a kept map with true and predicted rooms."""
     grid = read_map(folder / "map.yaml")
     shown = np.full(grid.frame.shape, UNKNOWN, dtype=np.uint8)
     shown[grid.free], shown[grid.occupied] = FREE, OCCUPIED

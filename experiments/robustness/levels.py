@@ -28,7 +28,7 @@ FIRST = "first"
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """How much everything is disturbed; units as in the configuration."""
+    """Strength of every disturbance; units as in the configuration."""
 
     lidar: float
     dropouts: float

@@ -16,14 +16,14 @@ import itertools
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.random import stream
+from closedrooms.experiments.statistics import mean_figure, round_figure
+from closedrooms.experiments.tables import Row
 
-Row = dict[str, Any]
 STAGES = ("mapping", "doors", "structure", "prediction")
 # IoU with more and more stages repaired, in the order in which the stages work.
 CHAIN = ("iou", "iou_true_poses", "iou_true_doors", "iou_true_walls")
@@ -52,7 +52,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class LevelResult:
-    """What one level of a factor does.
+    """Effect of one level of a factor.
 
     Attributes:
         factor: What was disturbed.
@@ -75,7 +75,7 @@ class LevelResult:
 
 @dataclass(frozen=True, slots=True)
 class Onset:
-    """Where a factor starts to hurt.
+    """Level at which a factor starts to hurt.
 
     Attributes:
         factor: What was disturbed.
@@ -107,7 +107,7 @@ def level_results(rows: Sequence[Row], resamples: int) -> list[LevelResult]:
     results = []
     for (factor, number), own in by_level.items():
         first = by_level.get((factor, 0), {})
-        means = {name: _mean([row.get(name) for row in own.values()]) for name in (*MEASURES, *CHAIN[1:])}
+        means = {name: mean_figure([row.get(name) for row in own.values()]) for name in (*MEASURES, *CHAIN[1:])}
         level = next(iter(own.values()))["level"]
         if number == 0 or not first:
             results.append(LevelResult(factor, number, level, len(own), means))
@@ -138,11 +138,13 @@ def onsets(results: Sequence[LevelResult]) -> list[Onset]:
 
 
 def _suffers(result: LevelResult) -> bool:
+    """Check whether the IoU is worse than undisturbed, surely and by enough to matter."""
     change = result.differences.get("iou")
     return change is not None and change.high < 0.0 and change.mean <= -LEAST_LOSS
 
 
 def _costs(result: LevelResult) -> bool:
+    """Check whether the error of the coverage cost is larger than undisturbed, surely and by enough to matter."""
     change = result.differences.get("error_predicted")
     return change is not None and change.low > 0.0 and change.mean >= LEAST_ERROR
 
@@ -177,6 +179,7 @@ def _lost(row: Row, before: str, after: str | None) -> float | None:
 
 
 def _difference(own: Keyed, first: Keyed, name: str, resamples: int, label: str) -> Difference | None:
+    """Compute the change of a figure against the undisturbed level, on what both have."""
     values = {
         key: row[name] - first[key][name]
         for key, row in own.items()
@@ -194,19 +197,11 @@ def _interval(values: dict[tuple[str, int], float], resamples: int, label: str) 
     rng = stream(0, "bootstrap", label)
     means = np.array([_draw(groups, rng) for _ in range(resamples)])
     low, high = np.percentile(means, [2.5, 97.5])
-    return Difference(_rounded(np.mean(list(values.values()))), _rounded(low), _rounded(high))
+    return Difference(round_figure(np.mean(list(values.values()))), round_figure(low), round_figure(high))
 
 
 def _draw(groups: Sequence[FloatArray], rng: np.random.Generator) -> float:
+    """Draw buildings with replacement, then values within each, and average them."""
     drawn = [groups[index] for index in rng.integers(0, len(groups), len(groups))]
     values = [group[rng.integers(0, group.size, group.size)] for group in drawn]
     return float(np.concatenate(values).mean())
-
-
-def _mean(values: Sequence[Any]) -> float | None:
-    present = [value for value in values if value is not None]
-    return _rounded(np.mean(present)) if present else None
-
-
-def _rounded(value: Any) -> float:
-    return round(float(value), 6) + 0.0

@@ -2,16 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
-from closedrooms.experiments.evaluation.page import Section, Table, write_page
-from closedrooms.experiments.evaluation.tables import write_table
+from closedrooms.experiments.html_page import Section, Table, write_page
 from closedrooms.experiments.robustness.config import RobustnessConfig
 from closedrooms.experiments.robustness.figures import draw_curves, draw_maps
 from closedrooms.experiments.robustness.levels import UNITS, cases
 from closedrooms.experiments.robustness.onset import STAGES, LevelResult, Onset, level_results, onsets
+from closedrooms.experiments.tables import Row, write_table
 
-Row = dict[str, Any]
 METHOD = (
     "Every level is held against the first of its factor on the same buildings and closed doors. The prediction "
     "suffers from the first level on whose mean difference of the IoU lies below zero with 97.5 % (bootstrap, "
@@ -65,6 +63,7 @@ def write_report(config: RobustnessConfig, rows: Sequence[Row], failures: Mappin
 
 
 def _level_row(result: LevelResult) -> Row:
+    """List all figures of one level, with the intervals of its changes and losses."""
     row: Row = {"factor": result.factor, "number": result.number, "level": result.level, "samples": result.samples}
     row |= {f"{name}_mean": value for name, value in result.means.items()}
     for name, difference in result.differences.items():
@@ -75,6 +74,7 @@ def _level_row(result: LevelResult) -> Row:
 
 
 def _short(result: LevelResult) -> Row:
+    """List the figures of one level that the page shows."""
     names = ("ate_m", "walls_m", "doors_m", "free_iou", "iou", "iou_seen", "error_predicted")
     row: Row = {"factor": result.factor, "level": result.level} | {name: result.means.get(name) for name in names}
     change = result.differences.get("iou")

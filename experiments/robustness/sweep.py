@@ -8,28 +8,27 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError, reason
 from closedrooms.core.files.incoming import read_json
-from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, only_writer, write_json
+from closedrooms.core.files.outgoing import write_json
+from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer
 from closedrooms.core.names import file_name
 from closedrooms.core.remarks import Remark
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
-from closedrooms.experiments.dataset.variants import remarks_on
-from closedrooms.experiments.evaluation.claimed_folder import claim
-from closedrooms.experiments.evaluation.tours import code_digest
+from closedrooms.experiments.claimed_folder import claim_folder
+from closedrooms.experiments.dataset.variants import given_worlds, remarks_on, world_sources
+from closedrooms.experiments.evaluation.scoring.tours import code_digest
 from closedrooms.experiments.robustness.config import FACTORS, RobustnessConfig
 from closedrooms.experiments.robustness.levels import Case, Setting, cases
 from closedrooms.experiments.robustness.onset import Onset
+from closedrooms.experiments.tables import Row
 from closedrooms.experiments.workers import Crew, Lost
-from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
+from closedrooms.pipeline.reporting.manifest import resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
-from closedrooms.worlds.library import bundled_names, distinct_names, load_world
+from closedrooms.worlds.library import distinct_names, load_world, world_source
 
-Row = dict[str, Any]
-ALL = "all"
 CELLS, RESULT = "cells", "rows.json"
 # How often it is looked how far the workers are [s].
 LOOK = 1.0
@@ -53,7 +52,7 @@ def robustness(config: RobustnessConfig, *, progress: Progress | None = None) ->
     progress = progress or Silent()
     require("pyarrow", "matplotlib", by="closedrooms robustness")
     worlds, remarks = _worlds(config.worlds)
-    claim(config.out, "robustness")
+    claim_folder(config.out, "robustness")
     with only_writer(config.out):
         return _sweep(worlds, config, progress, remarks)
 
@@ -76,7 +75,7 @@ def _sweep(worlds: dict[str, str], config: RobustnessConfig, progress: Progress,
         "program": PROGRAM,
         "command": "robustness",
         "configuration": resolved(config, leave_out=("worlds", "out", "workers", "scheduler")),
-        "paths": {"worlds": [input_path(world) for world in config.worlds]},
+        "paths": {"worlds": world_sources(config.worlds)},
         "versions": versions(),
         "onsets": [asdict(onset) for onset in found],
         "failures": failures | early_ends(rows),
@@ -120,8 +119,7 @@ def early_ends(rows: Sequence[Row]) -> dict[str, str]:
 
 def _worlds(given: Sequence[str]) -> tuple[dict[str, str], list[Remark]]:
     """Name the worlds by what was given, and tell what was said on reading them."""
-    wanted = [name for text in given for name in (bundled_names() if text == ALL else [text])]
-    given = list(dict.fromkeys(wanted))
+    given = given_worlds(given)
     plans = [load_world(text) for text in given]
     names = [file_name(name) for name in distinct_names(plans, given)]
     remarks = [remark for plan, name in zip(plans, names, strict=True) for remark in remarks_on(plan, name)]
@@ -154,7 +152,7 @@ def _work(worlds: dict[str, str], config: RobustnessConfig, progress: Progress, 
     def done() -> int:
         return sum((_folder(config, world, name) / RESULT).is_file() for world in worlds.values() for name in names)
 
-    given = {str(Path(text).resolve()) if Path(text).exists() else text: world for text, world in worlds.items()}
+    given = {world_source(text): world for text, world in worlds.items()}
     tours = ("networkx", "ortools") if config.tours else ()
     needs = ("pybullet", "mapbox_earcut", "skimage", *tours)
     workers = min(config.workers, len(worlds))
@@ -251,6 +249,7 @@ _LEVELS = FACTORS[:-1]
 
 @lru_cache(maxsize=1)
 def _code() -> str:
+    """Compute the digest of the code that disturbs and measures."""
     root = Path(__file__).parents[2]
     folders = (
         "core",

@@ -18,38 +18,39 @@ from closedrooms.core.random import stream
 from closedrooms.core.room import Room
 from closedrooms.experiments.dataset.erase import Eraser
 from closedrooms.experiments.dataset.open_survey import OpenSurvey
-from closedrooms.experiments.evaluation.scores import iou, room_masks
-from closedrooms.experiments.evaluation.tours import cropped, kept_tour, plan_tour
+from closedrooms.experiments.evaluation.scoring.scores import iou, room_masks
+from closedrooms.experiments.evaluation.scoring.tours import cropped, kept_tour, plan_cropped_tour
 from closedrooms.experiments.robustness.clean_walls import sampled, with_clean_walls
 from closedrooms.experiments.robustness.config import RobustnessConfig
 from closedrooms.experiments.robustness.door_noise import disturbed_doors, phantom_doors, true_doors
 from closedrooms.experiments.robustness.drives import RecordedDrive, furnished, map_drive, odometry_noise, record_drive
 from closedrooms.experiments.robustness.levels import Setting, first_setting
+from closedrooms.experiments.statistics import mean_figure, round_figure
+from closedrooms.experiments.tables import Row
 from closedrooms.mapping.trajectory import ate
 from closedrooms.pipeline.reporting.scores import room_iou, rooms_seen
 from closedrooms.pipeline.survey import Truth, true_building
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.sim.config import FaultConfig
-from closedrooms.sim.robot_model import TRACK_SHARE
+from closedrooms.sim.robot.robot_model import TRACK_SHARE
 from closedrooms.worlds.closing import closable_rooms, draw_closed
 from closedrooms.worlds.geometry import door_leaf
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.truth import reachable
 
-Row = dict[str, Any]
 # A cell farther than this from every true wall is simply wrong: how far says nothing [m].
 FARTHEST = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Closing:
-    """One set of closed doors in the undisturbed map.
+    """One set of doors of a building, closed: truth, and the map as an undisturbed robot makes it.
 
     Attributes:
-        closed: Door ids.
-        seen: Those that the undisturbed robot saw.
-        clean: The undisturbed map.
+        closed: Ids of the closed doors.
+        seen: Ids of those of them that the undisturbed robot saw.
+        clean: Map of the undisturbed robot.
         truth: M_GT and the hidden rooms, on a frame of 0.05 m.
         open_cells: True free cells that a robot can reach, on that frame.
         wall_distance: Distance of its cells to the next true wall, closed leaf or furniture [m].
@@ -64,7 +65,7 @@ class Closing:
 
 
 class BuildingTrials:
-    """Everything about one building that its trials share."""
+    """Trials of one building, with what they share: plan, sets of closed doors, drives, surveys and erasers."""
 
     def __init__(self, world: str, config: RobustnessConfig) -> None:
         self._config = config
@@ -95,6 +96,7 @@ class BuildingTrials:
         ]
 
     def _row(self, setting: Setting, repetition: int, keep: Path | None) -> Row:
+        """Measure one set of closed doors at one setting: map, doors, rooms, tours, and what each stage costs."""
         config = self._config
         drive, survey = self._drive(setting), self._survey(setting)
         closing = self._closing(repetition, setting)
@@ -118,13 +120,13 @@ class BuildingTrials:
             "exploration": drive.status,
             "closed_doors": len(closing.closed),
             "doors_seen": len(known),
-            "ate_m": _rounded(position),
-            "ate_rad": _rounded(heading),
-            "walls_m": _rounded(self._walls(mapped.grid, closing)),
-            "free_iou": _rounded(self._free(mapped.grid, closing)),
-            "doors_m": _rounded(np.mean(offsets)) if offsets else None,
-            "iou": _mean([figures.get(door, 0.0) for door in closing.closed]),
-            "iou_seen": _mean([figures[door] for door in seen if door in figures]),
+            "ate_m": round_figure(position),
+            "ate_rad": round_figure(heading),
+            "walls_m": round_figure(self._walls(mapped.grid, closing)),
+            "free_iou": round_figure(self._free(mapped.grid, closing)),
+            "doors_m": round_figure(np.mean(offsets)) if offsets else None,
+            "iou": mean_figure([figures.get(door, 0.0) for door in closing.closed]),
+            "iou_seen": mean_figure([figures[door] for door in seen if door in figures]),
         }
         row |= self._repaired(setting, closing, repetition)
         if config.tours:
@@ -154,22 +156,23 @@ class BuildingTrials:
         row: Row = {}
         for name, (repaired, at) in steps.items():
             figures = room_iou(self._predict(repaired, at).rooms, closing.truth.rooms)
-            row[name] = _mean([figures.get(door, 0.0) for door in closing.closed])
+            row[name] = mean_figure([figures.get(door, 0.0) for door in closing.closed])
         return row
 
     def _tours(self, grid: OccupancyGrid, doors: Sequence[ClosedDoor], prediction: Prediction, closing: Closing) -> Row:
+        """Measure the errors of the coverage cost [%]; ``None`` where a tour cannot be planned."""
         from closedrooms.coverage.estimates import compare_lengths
 
         try:
             truth = kept_tour(self._config.out, closing.truth.grid)["length_m"]
-            lengths = [plan_tour(grid, doors).length, plan_tour(prediction.grid).length]
+            lengths = [plan_cropped_tour(grid, doors).length, plan_cropped_tour(prediction.grid).length]
         except InvalidInputError:
             return {"error_closed": None, "error_baseline": None, "error_predicted": None}
         world_T_map = self._drive(first_setting(self._config)).world_T_map
         seen = rooms_seen(self._plan, grid, world_T_map.inverse())
         errors = compare_lengths(lengths[0], lengths[1], truth, n_rooms=seen, n_doors=len(doors))
         return {
-            name: None if error is None else _rounded(error)
+            name: None if error is None else round_figure(error)
             for name, error in (
                 ("error_closed", errors.error_closed),
                 ("error_baseline", errors.error_baseline),
@@ -187,6 +190,7 @@ class BuildingTrials:
         )  # fmt: skip
 
     def _drive(self, setting: Setting) -> RecordedDrive:
+        """Drive through the building once for all settings that leave it as it is."""
         place = setting.place
         if place not in self._drives:
             config = self._config
@@ -208,6 +212,7 @@ class BuildingTrials:
         return self._surveys[key]
 
     def _eraser(self, setting: Setting, *, true_poses: bool) -> Eraser:
+        """Make what erases one survey once, for all settings of doors."""
         key = (replace(setting, missed=0.0, shift=0.0, turn=0.0, phantoms=0.0), true_poses)
         if key not in self._erasers:
             survey = self._survey(setting)
@@ -224,6 +229,7 @@ class BuildingTrials:
                 self._erasers.pop((key, true_poses), None)
 
     def _closing(self, repetition: int, setting: Setting) -> Closing:
+        """Find once what is true with a set of doors closed."""
         key = (repetition, setting.place)
         if key not in self._closings:
             closed = self._sets[repetition]
@@ -268,14 +274,7 @@ def _in_map(area: Any, drive: RecordedDrive) -> Any:
 
 
 def _distance(solid: BoolArray) -> FloatArray:
+    """Compute the distance of every cell from the next solid one [cells]."""
     import cv2
 
     return np.asarray(cv2.distanceTransform((~solid).astype(np.uint8), cv2.DIST_L2, 5), dtype=np.float64)
-
-
-def _mean(values: Sequence[float]) -> float | None:
-    return _rounded(np.mean(values)) if len(values) else None
-
-
-def _rounded(value: Any) -> float:
-    return round(float(value), 6) + 0.0

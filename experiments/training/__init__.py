@@ -2,6 +2,6 @@
 
 ``buildings`` says which building is used for what. ``train`` is the command and ``config`` its options. ``examples``
 makes patches and true rooms of samples, ``batches`` mirrors and disturbs them, ``trainer`` fits the ``network``;
-``export`` writes it as ONNX, with its ``card`` and the ``curves`` of the training. ``synthetic_maps`` draws maps with
+``export`` writes it as ONNX, with its ``model_card`` and the ``learning_curves``. ``synthetic_maps`` draws maps with
 closed doors straight from floor plans.
 """

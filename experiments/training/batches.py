@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.random import stream
-from closedrooms.experiments.training.examples import WHOLE, Bytes, Examples, unpack
+from closedrooms.experiments.training.examples import WHOLE, Bytes, Examples, unpack_patches
 from closedrooms.predictor.learned.patches import CELL
 from closedrooms.predictor.learned.sides import AHEAD_CELLS, ASIDE_CELLS
 
@@ -71,7 +71,7 @@ def make_batch(shown: Bytes, masks: Bytes, sides: FloatArray) -> Batch:
     lengths = (ASIDE_CELLS, ASIDE_CELLS, AHEAD_CELLS)
     blurred = [blur(at, length) for at, length in zip(sides.T, lengths, strict=True)]
     share: Floats = np.asarray(masks / WHOLE, dtype=np.float32)
-    return Batch(unpack(shown), share, (blurred[0], blurred[1], blurred[2]))
+    return Batch(unpack_patches(shown), share, (blurred[0], blurred[1], blurred[2]))
 
 
 def blur(at: FloatArray, length: int) -> Floats:

@@ -13,8 +13,8 @@ from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.errors import ClosedroomsError, reason
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import Shape
-from closedrooms.experiments.evaluation.listing import SamplePath
-from closedrooms.experiments.evaluation.samples import Sample, read_sample
+from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
+from closedrooms.experiments.evaluation.samples.sample_reader import Sample, read_sample
 from closedrooms.experiments.training.buildings import group_of, may_train
 from closedrooms.predictor.best.scene import prepare
 from closedrooms.predictor.config import BestConfig
@@ -105,7 +105,7 @@ def gather_examples(paths: Sequence[SamplePath], advance: Callable[[int], None] 
             room = truth.get(pose.facing.door.id)
             fine = None if room is None else draw_room(patch, room.polygon)
             if fine is not None and fine.any():
-                shown.append(pack(patch))
+                shown.append(pack_patch(patch))
                 masks.append(fine.reshape(SIZE, FINE, SIZE, FINE).sum(axis=(1, 3)).astype(np.uint8))
                 sides.append(measure_sides(fine))
                 groups.append(group_of(sample.world))
@@ -127,13 +127,13 @@ def _true_rooms(sample: Sample) -> dict[str, Room]:
     return {door: room for room in sample.rooms for door in room.doors}
 
 
-def pack(patch: Patch) -> Bytes:
+def pack_patch(patch: Patch) -> Bytes:
     """Keep a patch in three bytes a cell, shape (3, SIZE, SIZE)."""
     doors = (patch.channels[3] > 0) * DOOR + (patch.channels[4] > 0) * OTHER_DOORS
     return np.stack((*np.rint(patch.channels[:2] * WHOLE), doors)).astype(np.uint8)
 
 
-def unpack(shown: Bytes) -> npt.NDArray[np.float32]:
+def unpack_patches(shown: Bytes) -> npt.NDArray[np.float32]:
     """Make patches of what was kept, shape (n, 5, SIZE, SIZE)."""
     free, occupied = (shown[:, at].astype(np.float32) / WHOLE for at in (0, 1))
     doors = [((shown[:, 2] & bit) > 0).astype(np.float32) for bit in (DOOR, OTHER_DOORS)]

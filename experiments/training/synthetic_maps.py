@@ -56,7 +56,7 @@ class DrawnMap:
     rooms: tuple[Room, ...]
 
 
-def draw_map(plan: FloorPlan, closed: Sequence[str], rng: np.random.Generator, *, angle: float = 0.0) -> DrawnMap:
+def synthesise_map(plan: FloorPlan, closed: Sequence[str], rng: np.random.Generator, *, angle: float = 0.0) -> DrawnMap:
     """Draw what a robot maps of a plan with some doors closed.
 
     Args:

@@ -10,13 +10,14 @@ import numpy as np
 
 from closedrooms.core.arrays import IntArray
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.outgoing import MANIFEST, PROGRAM, only_writer, write_bytes, write_json
+from closedrooms.core.files.outgoing import write_bytes, write_json
+from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer
 from closedrooms.core.random import stream
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
-from closedrooms.experiments.evaluation.claimed_folder import claim
-from closedrooms.experiments.evaluation.listing import find_samples
-from closedrooms.experiments.evaluation.tours import code_digest
+from closedrooms.experiments.claimed_folder import claim_folder
+from closedrooms.experiments.evaluation.samples.listing import find_samples
+from closedrooms.experiments.evaluation.scoring.tours import code_digest
 from closedrooms.experiments.training.config import TrainConfig
 from closedrooms.experiments.training.examples import Examples, Gathered, gather_examples
 from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
@@ -45,7 +46,7 @@ def train(config: TrainConfig, *, progress: Progress | None = None) -> Report:
     progress = progress or Silent()
     require(*NEEDS, by="closedrooms train")
     paths = find_samples(config.datasets)
-    claim(config.out, "train")
+    claim_folder(config.out, "train")
     with only_writer(config.out):
         progress.stage("read", len(paths))
         gathered = gather_examples(paths, lambda number: progress.advance(number, f"{number} of {len(paths)}"))
@@ -54,14 +55,14 @@ def train(config: TrainConfig, *, progress: Progress | None = None) -> Report:
 
 def _train(gathered: Gathered, config: TrainConfig, progress: Progress) -> Report:
     """Train, then write model, card, curves and manifest."""
-    from closedrooms.experiments.training.card import FILE as CARD
-    from closedrooms.experiments.training.card import write_card
-    from closedrooms.experiments.training.curves import PICTURE, TABLE, write_curves
     from closedrooms.experiments.training.export import write_model
+    from closedrooms.experiments.training.learning_curves import PICTURE, TABLE, write_curves
+    from closedrooms.experiments.training.model_card import FILE as CARD
+    from closedrooms.experiments.training.model_card import write_card
     from closedrooms.experiments.training.trainer import Training
 
     examples = gathered.examples
-    fit, held = split_buildings(examples, config)
+    fit, held = hold_out_buildings(examples, config)
     training = Training(config, examples, fit, held)
     checkpoint, key = config.out / CHECKPOINT, _fingerprint(examples, config)
     if training.resume(checkpoint, key):
@@ -109,7 +110,7 @@ def _train(gathered: Gathered, config: TrainConfig, progress: Progress) -> Repor
     return Report(folder=config.out, title=title, rows=rows, failures=gathered.failures, figures=figures)
 
 
-def split_buildings(examples: Examples, config: TrainConfig) -> tuple[IntArray, IntArray]:
+def hold_out_buildings(examples: Examples, config: TrainConfig) -> tuple[IntArray, IntArray]:
     """Split examples by building: which are learned from, and which are held out.
 
     Returns:

@@ -178,6 +178,7 @@ class Training:
         return self.config.rate * 0.5 * (1.0 + math.cos(math.pi * (share - WARM_UP) / (1.0 - WARM_UP)))
 
     def _answer(self, batch: Batch) -> tuple[Tensor, Tensor, Tensor]:
+        """Let the network rate a batch: mask, columns and rows, as logits."""
         patches = torch.from_numpy(batch.patches).contiguous(memory_format=torch.channels_last)
         with torch.autocast("cpu", torch.bfloat16, enabled=has_bfloat16()):
             mask, columns, rows = self.network(patches)

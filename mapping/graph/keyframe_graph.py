@@ -60,6 +60,7 @@ class KeyframeGraph:
         self.graph.add(Edge(previous.index, keyframe.index, a_T_b, information, length))
 
     def _odometry_information(self, previous: Keyframe, keyframe: Keyframe, *, measured: bool) -> FloatArray:
+        """Compute the information (3, 3) of the step between two keyframes, by what the odometry is worth there."""
         recovery = self._config.recovery
         if keyframe.submap != previous.submap:
             sigmas = recovery.break_distance, recovery.break_angle
@@ -141,6 +142,7 @@ class KeyframeGraph:
         return poses
 
     def _merge_submaps(self, loop: Loop) -> None:
+        """Give the keyframes of the latest submap the number of the older one that a loop joins it to."""
         older, latest = self.keyframes[loop.source].submap, self.keyframes[loop.target].submap
         if older == latest:
             return
@@ -157,9 +159,11 @@ class KeyframeGraph:
         return True
 
     def _poses(self) -> FloatArray:
+        """List the poses of all keyframes, shape (n, 3), map frame [m, rad]."""
         return np.array([k.pose.as_tuple() for k in self.keyframes])
 
     def _move_to(self, poses: FloatArray) -> None:
+        """Move the keyframes to optimised poses, shape (n, 3), map frame [m, rad]."""
         for keyframe, (x, y, theta) in zip(self.keyframes, poses, strict=True):
             keyframe.pose = Pose2(x, y, theta)
         self._positions.values[:] = poses[:, :2]

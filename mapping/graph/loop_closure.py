@@ -25,7 +25,7 @@ RIVAL_ANGLE = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loop:
-    """A recognised place.
+    """A recognised place, as found; the pose graph takes it as an :class:`~.pose_graph.Edge`.
 
     Attributes:
         source: Index of the older keyframe.

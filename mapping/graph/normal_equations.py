@@ -11,7 +11,7 @@ LARGEST_TURN = math.pi / 4
 
 
 class Pattern:
-    """Where the blocks of the edges go in the sparse matrix over all poses but the first, which does not move.
+    """Places of the edges' blocks in the sparse matrix over all poses but the first, which does not move.
 
     The matrix is kept by columns (CSC), in blocks of 3 x 3: each edge adds to four of them.
     """

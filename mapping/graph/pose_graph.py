@@ -40,6 +40,7 @@ class Edge:
 
 
 def _first(value: float) -> GrowingArray:
+    """Begin an array that grows with one value."""
     array = GrowingArray()
     array.append(value)
     return array
@@ -181,11 +182,13 @@ def optimise(poses: FloatArray, edges: list[Edge], *, kernel: float, iterations:
 
 
 def _squared(errors: FloatArray, information: FloatArray) -> FloatArray:
+    """Compute the squared Mahalanobis length of each error, shape (m,)."""
     result: FloatArray = np.einsum("mi,mij,mj->m", errors, information, errors)
     return result
 
 
 def _errors(x: FloatArray, source: IntArray, target: IntArray, measured: FloatArray) -> FloatArray:
+    """Compute how far each edge is from its measurement, shape (m, 3) [m, rad], in the frame of its measured pose."""
     a, b = x[source], x[target]
     c, s = np.cos(a[:, 2]), np.sin(a[:, 2])
     d = b[:, :2] - a[:, :2]

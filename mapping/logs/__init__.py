@@ -1,10 +1,9 @@
 """Recorded runs of robots; ``reader`` tells the formats apart.
 
-- ROS bags: ``rosbag`` reads them (``bag_messages``, ``bag_scans``, ``transform_tree``, ``bag_options``), ``bag_writer``
-  writes them; ``clicked_points`` are doors that a person clicked.
+- ROS bags: ``bags/`` reads and writes them; doors that a person clicked too.
 - CARMEN logs: ``carmen``, ``carmen_lines``, ``carmen_odometry``.
 - NumPy archives: ``npz``.
-- All of them: ``clocks``, ``odometry``, ``recorded_run``.
+- All of them: ``clocks``, ``recorded_odometry``, ``recorded_run``.
 """
 
 from typing import TYPE_CHECKING

@@ -58,6 +58,7 @@ def read_carmen(path: Path, *, gzipped: bool) -> RecordedRun:
 
 
 def _lines(path: Path, gzipped: bool, log: CarmenLog) -> Iterator[str]:
+    """Read the lines of a log; an archive that ends early ends them and is noted."""
     try:
         for line in log_lines(path, gzipped=gzipped, what="a CARMEN log", longest=MAX_LINE):
             yield line.decode("ascii", errors="replace")
@@ -88,6 +89,7 @@ def _with_sector(scans: list[ScanLine], settings: dict[str, float]) -> tuple[lis
 
 
 def _reading_remarks(log: CarmenLog) -> list[Remark]:
+    """Say which lines were dropped, repaired or missing."""
     remarks = [
         Remark(action="dropped", what=f"{kind} lines", why="malformed", count=count, loss=True)
         for kind, count in log.malformed.items()
@@ -114,6 +116,7 @@ def _run(motion: CarmenOdometry, settings: dict[str, float], remarks: list[Remar
 
 
 def _sweep(scan: ScanLine, stamp: float, limit: float, mount: Pose2) -> LaserScan:
+    """Make a scan of a line; ranges from ``limit`` [m] on mean that nothing was measured."""
     range_max = min(limit, scan.range_max or limit)
     ranges = _measured(scan.ranges, range_max)
     return LaserScan(

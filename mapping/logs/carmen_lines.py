@@ -25,7 +25,7 @@ WITH_POSES = ("FLASER", "ROBOTLASER1", "ROBOTLASER2")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScanLine:
-    """One scan.
+    """One scan as a line has it; angles and range may be missing, unlike in a ``LaserScan``.
 
     Attributes:
         ranges: As written, shape (n,) [m].
@@ -58,7 +58,7 @@ class OdometryLine:
 
 @dataclass(slots=True)
 class CarmenLog:
-    """What the lines of a log say.
+    """Content of a log's lines.
 
     Attributes:
         scans: By the word that their lines begin with.
@@ -202,6 +202,7 @@ def flaser_sector(beams: int, settings: dict[str, float]) -> tuple[Sector, bool]
 
 
 def _agrees(step: float, view: float, beams: int) -> bool:
+    """Check whether steps between beams add up to a field of view [rad], with or without its last end."""
     return any(abs(step * gaps - view) <= STEP_OFF * view for gaps in (beams - 1, beams))
 
 
@@ -223,6 +224,11 @@ def _even_step(view: float, beams: int, *, hint: float = 0.0) -> float:
 
 
 def _pose(words: list[str]) -> Pose2:
+    """Read three words as x, y [m] and heading [rad].
+
+    Raises:
+        ValueError: They are no finite numbers.
+    """
     x, y, theta = map(float, words)
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(theta)):
         raise ValueError("a pose that is not finite")
@@ -236,6 +242,11 @@ def _numbers(words: list[str], count: int) -> FloatArray:
 
 
 def _count(word: str) -> int:
+    """Read how many ranges a line announces.
+
+    Raises:
+        ValueError: None, or more than a scan may have.
+    """
     count = int(word)
     if not 1 <= count <= MAX_BEAMS:
         raise ValueError("a scan of no or too many beams")
@@ -243,6 +254,7 @@ def _count(word: str) -> int:
 
 
 def _stamp(clock: str, logger_clock: str) -> float:
+    """Read the time of a line [s]: its own clock, or the logger's where that is 0."""
     value = float(clock) or float(logger_clock)
     if not math.isfinite(value):
         raise ValueError("a time that is no number")

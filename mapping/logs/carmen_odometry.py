@@ -10,7 +10,7 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.mapping.logs.carmen_lines import OdometryLine, ScanLine
-from closedrooms.mapping.logs.odometry import lost_remarks, odometry_at
+from closedrooms.mapping.logs.recorded_odometry import lost_remarks, odometry_at
 
 SAME_ROBOT = 1.5
 """Offset [m] up to which the two poses of a scan are laser and robot; beyond it one of them is corrected."""
@@ -32,7 +32,7 @@ LEAST_DISTANCE = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CarmenOdometry:
-    """Scans of a CARMEN log with their odometry.
+    """Scans of a CARMEN log with their odometry: still lines, of which :mod:`~.carmen` makes a ``RecordedRun``.
 
     Attributes:
         scans: Those that have one.
@@ -176,6 +176,7 @@ def _raw_odometry(moves: list[OdometryLine], echoes: set[int]) -> list[Pose2]:
 
 
 def _array(poses: Sequence[Pose2]) -> FloatArray:
+    """List poses as an array, shape (n, 3) [m, rad]."""
     return np.array([pose.as_tuple() for pose in poses], dtype=np.float64).reshape(-1, 3)
 
 

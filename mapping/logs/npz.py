@@ -74,6 +74,7 @@ def read_scans(path: Path) -> RecordedRun:
 
 
 def _ours(arrays: dict[str, Any], path: Path) -> RecordedRun:
+    """Read the arrays of ``scans.npz`` as this program writes them."""
     missing = {"stamps", "ranges", "angle_min", "angle_increment", "range_max"} - arrays.keys()
     if missing:
         raise InvalidInputError(f"arrays {', '.join(sorted(missing))} missing", expected=EXPECTED, where=path)
@@ -91,6 +92,7 @@ def _ours(arrays: dict[str, Any], path: Path) -> RecordedRun:
 
 
 def _mrpt(arrays: dict[str, Any], path: Path) -> RecordedRun:
+    """Read arrays converted from MRPT, whose odometry is a list of steps and whose stamps are ticks."""
     ranges = np.array(arrays["ranges"], dtype=np.float64)
     poses = [Pose2()]
     for x, y, theta in np.asarray(arrays["odom"], dtype=np.float64):
@@ -115,6 +117,7 @@ def _run(
     *,
     sweep: float = 0.0,
 ) -> RecordedRun:
+    """Check shapes and values and make a run; ``geometry`` is angle_min, angle_increment [rad] and range_max [m]."""
     n = len(stamps)
     if stamps.ndim != 1 or ranges.ndim != 2 or ranges.shape[0] != n or odometry.shape != (n, 3):
         raise InvalidInputError(

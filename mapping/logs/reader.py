@@ -9,8 +9,8 @@ import numpy as np
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import is_file, is_folder, read_head, reading
 from closedrooms.core.remarks import Remark
-from closedrooms.mapping.logs.bag_options import BagOptions
-from closedrooms.mapping.logs.odometry import bridge_jumps, jump_remarks
+from closedrooms.mapping.logs.bags.bag_options import BagOptions
+from closedrooms.mapping.logs.recorded_odometry import bridge_jumps, jump_remarks
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 
 GZIP, ZIP, SQLITE, MCAP = b"\x1f\x8b", b"PK\x03\x04", b"SQLite format 3", b"\x89MCAP0\r\n"
@@ -56,12 +56,13 @@ def read_run(
 
 
 def _read(path: Path, options: BagOptions) -> RecordedRun:
+    """Read a log by the reader that its first bytes ask for."""
     head = _head(path)
     version = OLD_BAG.match(head)
     if version and version[1] != ROSBAG:
         raise InvalidInputError(f"a ROS bag {version[1].decode()}", expected="ROS bag 2.0", where=path)
     if version or head.startswith((MCAP, SQLITE)):
-        from closedrooms.mapping.logs.rosbag import read_bag
+        from closedrooms.mapping.logs.bags.rosbag import read_bag
 
         return read_bag(path, options)
     _refuse_options(options, path)

@@ -22,7 +22,7 @@ class SearchWindow:
 
 @dataclass(frozen=True, slots=True)
 class BestPose:
-    """Best pose of a window and its mean likelihood [0..1]."""
+    """Best pose of a window, on the raster of its cells, and its mean likelihood [0..1]."""
 
     pose: Pose2
     score: float

@@ -21,7 +21,7 @@ LONGEST_STEP = 0.2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Refined:
-    """Outcome of a refinement.
+    """Outcome of one refinement, whether it is any good or not.
 
     Attributes:
         pose: ``map_T_robot``.

@@ -20,7 +20,7 @@ ADVANTAGE = 0.03
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Match:
-    """A scan on the map.
+    """A scan on the map: a refined pose that was accepted.
 
     Attributes:
         pose: ``map_T_robot``.

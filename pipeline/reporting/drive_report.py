@@ -6,7 +6,7 @@ from typing import Any
 
 from shapely.geometry import LineString, Point
 
-from closedrooms.core.files.geojson import Feature
+from closedrooms.core.files.geojson import GeoFeature
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
@@ -65,10 +65,10 @@ def drive_metrics(
     }
 
 
-def drive_features(drive: DriveResult) -> list[Feature]:
+def drive_features(drive: DriveResult) -> list[GeoFeature]:
     """List the path that was driven, for ``tour.geojson``, and the vertices that could not be reached."""
     log = drive.log
-    features: list[Feature] = [
+    features: list[GeoFeature] = [
         (
             LineString(log.path) if len(log.path) > 1 else Point(log.path[0]),
             {"map": "driven", "type": "tour", "length": round(log.distance, 4), "status": log.status},

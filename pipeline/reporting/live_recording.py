@@ -9,11 +9,13 @@ from closedrooms.core.room import Room
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.control_loop import Step
 from closedrooms.navigation.explorer import Explorer
-from closedrooms.navigation.opened_doors import ReopenedMap
-from closedrooms.navigation.revised_prediction import Revision
-from closedrooms.navigation.tour_follower import TourFollower
+from closedrooms.navigation.tour.opened_doors import ReopenedMap
+from closedrooms.navigation.tour.revised_prediction import Revision
+from closedrooms.navigation.tour.tour_follower import TourFollower
 from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.pipeline.reporting.scores import room_iou
+from closedrooms.pipeline.reporting.story import Story
+from closedrooms.predictor.prediction import Prediction
 from closedrooms.predictor.revision import Predict
 
 if TYPE_CHECKING:
@@ -25,7 +27,7 @@ GROWN = 1.5
 
 
 class GrowingPrediction:
-    """Predicts anew whenever a closed door is first seen, so that a recording shows the prediction grow.
+    """Prediction made anew whenever a closed door is first seen, so that a recording shows how it changes.
 
     With a door known, it also does when what is known has grown by half: else it would stand still for minutes.
     """
@@ -42,22 +44,25 @@ class GrowingPrediction:
         self._seen: set[str] = set()
         self._known = 0
 
-    def __call__(self, grid: OccupancyGrid, doors: Sequence[ClosedDoor], stamp: float) -> None:
-        """Predict if there is a door that was not there before, or much that was not known."""
+    def __call__(
+        self, grid: OccupancyGrid, doors: Sequence[ClosedDoor], stamp: float
+    ) -> tuple[Prediction, dict[str, float]] | None:
+        """Predict if there is a door that was not there before, or much that was not known.
+
+        Returns:
+            The prediction, and how well it meets the true rooms by door; ``None`` where there is nothing new.
+        """
         new = [door.id for door in doors if door.id not in self._seen]
         known = int(grid.known.sum())
         if not doors or not (new or known > GROWN * self._known):
-            return
+            return None
         self._seen.update(new)
         self._known = known
         prediction = self._predict(grid, doors)
         iou = room_iou(prediction.rooms, self._truth)
         iou = {door: iou[door] for door in iou if door in self._seen}
         self._recorder.growth(grid, doors, prediction, stamp, iou=iou)
-        for door in new:
-            room = next((room for room in prediction.rooms if door in room.doors), None)
-            what = prediction.failures.get(door, "nothing yet") if room is None else f"{room.polygon.area:.1f} m²"
-            self._recorder.note(f"closed door {door} first seen; predicted behind it: {what}", stamp)
+        return prediction, iou
 
 
 class ExplorationRecording:
@@ -73,6 +78,11 @@ class ExplorationRecording:
     ) -> None:
         self._recorder, self._log, self._mapper, self._explorer = recorder, log, mapper, explorer
         self._growth = growth
+        self._story = Story(
+            recorder,
+            floor=sum(room.polygon.area for room in log.sim.plan.rooms),
+            closed=sum(not opening for opening in log.sim.door_states().values()),
+        )
         self._told = 0
 
     def __call__(self, step: Step) -> None:
@@ -83,13 +93,20 @@ class ExplorationRecording:
             grid, doors = self._mapper.grid(), self._mapper.doors()
             recorder.map(grid, stamp)
             recorder.doors(doors, stamp)
-            if self._growth is not None:
-                self._growth(grid, doors, stamp)
+            self._tell(grid, doors, stamp)
         if self._explorer.searches != self._told:
             self._told = self._explorer.searches
             goal = self._explorer.goal
             place, path = (None, None) if goal is None else (goal.place, goal.path.points)
             recorder.frontiers(self._explorer.frontiers, place, path, stamp)
+
+    def _tell(self, grid: OccupancyGrid, doors: Sequence[ClosedDoor], stamp: float) -> None:
+        """Write into the log what is new since the last map."""
+        self._story.known(grid, stamp)
+        predicted = None if self._growth is None else self._growth(grid, doors, stamp)
+        self._story.doors(doors, stamp, *(predicted or ()))
+        self._story.loops(len(self._mapper.loops), stamp)
+        self._story.events(self._mapper.events, stamp)
 
 
 class DriveRecording:

@@ -41,6 +41,7 @@ def input_path(given: str | Path) -> str:
 
 
 def _plain(value: Any) -> Any:
+    """Turn a value into what JSON holds: paths as text, tuples as lists."""
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -16,7 +16,7 @@ LONGEST_CELL = 10_000
 
 
 class Progress(Protocol):
-    """Where a long task says what it does and how far it is."""
+    """Receiver of what a long task says of its progress."""
 
     def stage(self, name: str, total: float | None = None) -> None:
         """Begin a stage; ``total`` is its size in any unit, ``None`` where nobody knows."""
@@ -42,7 +42,7 @@ class Silent:
 
 
 class Pace:
-    """How fast a stage goes: what is done of how much, and how long the rest will take."""
+    """Speed of a stage: what is done of how much, and how long the rest will take."""
 
     def __init__(self, name: str, total: float | None, now: float) -> None:
         self.name, self.total = name, total
@@ -150,6 +150,11 @@ class Terminal:
         self._print(shown(line, longest=LONGEST_CELL), markup=False, highlight=False, soft_wrap=True)
 
     def _print(self, what: Any, **how: Any) -> None:
+        """Print by rich, 120 columns wide where there is no terminal.
+
+        Raises:
+            BrokenPipeError: Nobody reads any more.
+        """
         from rich.console import Console
 
         out = Console(file=sys.stdout, soft_wrap=False, width=None if sys.stdout.isatty() else 120)
@@ -160,7 +165,7 @@ class Terminal:
 
 
 def _bars() -> Any:
-    """Bars on a terminal, by rich, which is not imported where there is none."""
+    """Make bars for a terminal by rich, which is not imported where there is none."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 

@@ -48,6 +48,7 @@ def run_report(
 
 
 def _map_rows(manifest: Mapping[str, Any]) -> Rows:
+    """List the rows on doors, map and trajectory."""
     metrics, closed, seen = manifest["metrics"], manifest["closed"], manifest["doors"]["seen"]
     missed = [door for door in closed if door not in seen]
     return [

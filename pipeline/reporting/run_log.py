@@ -12,7 +12,7 @@ from closedrooms.sim.simulation import Simulation
 
 
 class RunLog:
-    """Stands between the simulation and the control loop, and writes down every observation and where it was made.
+    """Recorder between simulation and control loop, of every observation and where it was made.
 
     The loop gets the observation; the true pose stays here.
 

@@ -4,12 +4,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import shapely
-from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
+from closedrooms.core.shapes import polygon_iou
 from closedrooms.worlds.geometry import room_interior
 from closedrooms.worlds.plan import FloorPlan
 
@@ -42,14 +42,6 @@ def room_iou(predicted: Sequence[Room], truth: Sequence[Room]) -> dict[str, floa
             shape = by_door.get(door)
             figures[door] = 0.0 if shape is None else polygon_iou(shape, room.polygon)
     return dict(sorted(figures.items()))
-
-
-def polygon_iou(a: BaseGeometry, b: BaseGeometry) -> float:
-    """Compute intersection over union of two areas, 0 where both are empty."""
-    # A room whose outline touches itself (slivers at slanted walls) has no clean boundary to intersect.
-    a, b = (shape if shape.is_valid else shapely.make_valid(shape) for shape in (a, b))
-    union = a.union(b).area
-    return float(a.intersection(b).area / union) if union else 0.0
 
 
 def rounded(value: float | None) -> float | None:

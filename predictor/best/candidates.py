@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
-from closedrooms.predictor.best.door_frame import DoorFrame, Table, Window
+from closedrooms.predictor.best.door_frame import DoorFrame, SummedAreaTable, Window
 from closedrooms.predictor.best.door_pose import DoorsSeen, Entry
 from closedrooms.predictor.best.evidence import REACH, SLACK, Evidence
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 
 # A rectangle may reach over known space up to this share: the room is what remains. Of 0.1, 0.15, 0.2 and 0.3 this one
 # lost nothing on a third of the authors' maps and gained most on the bundled worlds: larger ones reach round corners.
@@ -118,7 +118,7 @@ def _find_positions(
         near = (v0 + JAMB, v0 + BESIDE_DOOR)
     positions = np.arange(low, high + 1)
 
-    def total(table: Table, window: tuple[int, int]) -> FloatArray:
+    def total(table: SummedAreaTable, window: tuple[int, int]) -> FloatArray:
         return table.stretch(positions, np.full_like(positions, window[0]), np.full_like(positions, window[1]))
 
     strength = total(evidence.same[side], along) + total(evidence.tight[side], along)

@@ -8,7 +8,7 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.structure.wall_faces import find_face_edges, lay_out
 
 # A face of a wall is free space with an occupied cell at most this far behind it [cells]: scan matching smears walls.
@@ -49,7 +49,7 @@ class Window:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Table:
+class SummedAreaTable:
     """Summed area table of a window of a raster, looked up by the raster's own rows and columns.
 
     Attributes:
@@ -64,7 +64,10 @@ class Table:
     col: int = 0
 
     def count(self, v0: IntArray, u0: IntArray, v1: IntArray, u1: IntArray) -> IntArray:
-        """Count the cells set in ``[v0, v1) x [u0, u1)``, clipped to the table; none where that is reversed."""
+        """Count the set cells of the boxes ``[v0, v1) x [u0, u1)``, shape (n,) each, clipped to the table.
+
+        A box whose ends are swapped (``v1 < v0`` or ``u1 < u0``) holds none.
+        """
         rows, cols = self.sums.shape
         v0, u0, v1, u1 = v0 - self.row, u0 - self.col, v1 - self.row, u1 - self.col
         # Twice as quick as np.clip on short arrays.
@@ -85,28 +88,23 @@ class Table:
         return self.count(low, at, high, at + 1).astype(np.float64)
 
 
-def sum_up(mask: BoolArray, row: int = 0, col: int = 0) -> Table:
+def sum_up(mask: BoolArray, row: int = 0, col: int = 0) -> SummedAreaTable:
     """Sum up a mask whose first cell is ``(row, col)`` of the raster."""
-    return Table(np.asarray(cv2.integral(mask.astype(np.uint8))), row, col)
+    return SummedAreaTable(np.asarray(cv2.integral(mask.astype(np.uint8))), row, col)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DoorFrame:
-    """Raster of the map turned so that the doors of one side of one wall direction look along +v.
+class TurnedMap:
+    """The map resampled along one wall direction.
 
-    Positions are edges between cells: edge ``e`` lies between cells ``e - 1`` and ``e``. What is derived from the
-    cells is computed window by window: maps are large and what has a say about a door is not.
+    Positions are edges between cells: edge ``e`` lies between cells ``e - 1`` and ``e``.
 
     Attributes:
-        angle: Direction of +u in the map frame [rad]; +v is 90 degrees to its left.
-        origin: Frame coordinates of the lower-left corner of cell (0, 0) [m], shape (2,).
+        angle: Direction of its columns in the map frame [rad]; its rows run to the left of that.
+        origin: Corner of cell (0, 0) in the turned frame [m], shape (2,).
         resolution: Cell size [m].
-        free: Known free cells, indexed [v, u].
+        free: Free cells.
         known: Known cells, free or occupied.
-        thickness: Usual thickness of walls [cells].
-        row_ends: First known cell and the one after the last of every row, shape (2, rows); (0, 0) where none is.
-        col_ends: The same of every column, shape (2, cols).
-        extent: Window of rows and columns with more than a few known cells: the others are noise.
     """
 
     angle: float
@@ -114,6 +112,35 @@ class DoorFrame:
     resolution: float
     free: BoolArray
     known: BoolArray
+
+    @property
+    def rotation(self) -> FloatArray:
+        """Rotation of points of the map frame, as rows from the right, into the turned one, shape (2, 2)."""
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        return np.array([[c, -s], [s, c]])
+
+    def to_frame(self, points: FloatArray) -> FloatArray:
+        """Convert map points [m], shape (..., 2), to continuous edges ``(column, row)`` [cells]."""
+        return np.asarray((np.asarray(points, dtype=np.float64) @ self.rotation - self.origin) / self.resolution)
+
+    def to_map(self, edges: FloatArray) -> FloatArray:
+        """Convert continuous edges ``(column, row)`` [cells], shape (..., 2), to map points [m]."""
+        return np.asarray((np.asarray(edges, dtype=np.float64) * self.resolution + self.origin) @ self.rotation.T)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DoorFrame(TurnedMap):
+    """The map turned so that the doors of one side of one wall direction look along +v, its rows; u are its columns.
+
+    What is derived from the cells is computed window by window: maps are large and what has a say about a door is not.
+
+    Attributes:
+        thickness: Usual thickness of walls [cells].
+        row_ends: First known cell and the one after the last of every row, shape (2, rows); (0, 0) where none is.
+        col_ends: The same of every column, shape (2, cols).
+        extent: Window of rows and columns with more than a few known cells: the others are noise.
+    """
+
     thickness: int
     row_ends: IntArray
     col_ends: IntArray
@@ -130,51 +157,6 @@ class DoorFrame:
         taken = cv2.dilate(np.ascontiguousarray(self.free[wide.of]).view(np.uint8), kernel)
         rows, cols = window.v0 - wide.v0, window.u0 - wide.u0
         return taken[rows : rows + window.v1 - window.v0, cols : cols + window.u1 - window.u0] > 0
-
-    def to_frame(self, points: FloatArray) -> FloatArray:
-        """Convert map points [m], shape (..., 2), to continuous edges ``(u, v)`` [cells]."""
-        c, s = math.cos(self.angle), math.sin(self.angle)
-        turned = np.asarray(points, dtype=np.float64) @ np.array([[c, -s], [s, c]])
-        return np.asarray((turned - self.origin) / self.resolution)
-
-    def to_map(self, edges: FloatArray) -> FloatArray:
-        """Convert continuous edges ``(u, v)`` [cells], shape (..., 2), to map points [m]."""
-        c, s = math.cos(self.angle), math.sin(self.angle)
-        turned = np.asarray(edges, dtype=np.float64) * self.resolution + self.origin
-        return np.asarray(turned @ np.array([[c, s], [-s, c]]))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TurnedMap:
-    """The map resampled along one wall direction.
-
-    Attributes:
-        angle: Direction in the map frame [rad], in (-pi/4, pi/4].
-        origin: Corner of cell (0, 0) in the turned frame [m].
-        resolution: Cell size [m].
-        free: Free cells.
-        known: Known cells.
-    """
-
-    angle: float
-    origin: FloatArray
-    resolution: float
-    free: BoolArray
-    known: BoolArray
-
-    @property
-    def rotation(self) -> FloatArray:
-        """Rotation of points of the map frame, as rows from the right, into the turned one, shape (2, 2)."""
-        c, s = math.cos(self.angle), math.sin(self.angle)
-        return np.array([[c, -s], [s, c]])
-
-    def to_cells(self, points: FloatArray) -> FloatArray:
-        """Convert map points [m], shape (..., 2), to continuous cells ``(column, row)``."""
-        return np.asarray((points @ self.rotation - self.origin) / self.resolution)
-
-    def to_map(self, cells: FloatArray) -> FloatArray:
-        """Convert continuous cells ``(column, row)``, shape (..., 2), to map points [m]."""
-        return np.asarray((cells * self.resolution + self.origin) @ self.rotation.T)
 
 
 def turn_map(grid: OccupancyGrid, angle: float, *, margin: float) -> TurnedMap:
@@ -238,6 +220,7 @@ def _find_ends(known: BoolArray) -> IntArray:
 
 
 def _turn(mask: BoolArray, quarter: int) -> BoolArray:
+    """Turn a raster to the right by so many right angles: what lay to the left of +y then lies along +y."""
     return (mask, mask.T[::-1], mask[::-1, ::-1], mask.T[:, ::-1])[quarter]
 
 

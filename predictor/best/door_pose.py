@@ -9,7 +9,7 @@ import numpy as np
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.predictor.best.door_frame import DoorFrame, TurnedMap, Window
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.structure.doorways import FacingDoor
 
 # Doors whose walls are closer than this belong to one wall [cells].
@@ -132,7 +132,7 @@ def face_door(door: ClosedDoor, turned: TurnedMap, *, reach: float) -> DoorPose 
         turned: The map along the direction of the door's wall.
         reach: A wall or free space must be nearer than this [m].
     """
-    at = turned.to_cells(np.array(door.midpoint))
+    at = turned.to_frame(np.array(door.midpoint))
     cells = round(reach / turned.resolution)
     col, row = (math.floor(v) for v in at)
     rows, cols = turned.known.shape

@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
-from closedrooms.predictor.best.door_frame import STRIP, DoorFrame, Table, Window, sum_up
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.door_frame import STRIP, DoorFrame, SummedAreaTable, Window, sum_up
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.structure.wall_faces import lay_out
 
 # Slack of a wall's thickness when known space is looked for behind it [cells].
@@ -44,14 +44,14 @@ class Evidence:
     depth is in the whole frame.
     """
 
-    closed: dict[str, Table]
-    sliver: dict[str, Table]
-    gap: dict[str, Table]
-    tight: dict[str, Table]
-    same: dict[str, Table]
-    outer: dict[str, Table]
-    enclosed: Table
-    taken: Table
+    closed: dict[str, SummedAreaTable]
+    sliver: dict[str, SummedAreaTable]
+    gap: dict[str, SummedAreaTable]
+    tight: dict[str, SummedAreaTable]
+    same: dict[str, SummedAreaTable]
+    outer: dict[str, SummedAreaTable]
+    enclosed: SummedAreaTable
+    taken: SummedAreaTable
     seen: dict[str, FloatArray]
 
 
@@ -82,9 +82,9 @@ def gather(frame: DoorFrame, window: Window, doors: tuple[float, float], seen: d
     first, last = max(int(doors[0]), window.u0), min(int(doors[1]) + 2, window.u1)
     places = {"right": replace(window, u0=first), "left": replace(window, u1=last), "top": window}
     thickness = frame.thickness
-    closed: dict[str, Table] = {}
-    sliver: dict[str, Table] = {}
-    gap: dict[str, Table] = {}
+    closed: dict[str, SummedAreaTable] = {}
+    sliver: dict[str, SummedAreaTable] = {}
+    gap: dict[str, SummedAreaTable] = {}
     tight, same, outer = {}, {}, {}
     for side, opposite in (("right", "left"), ("left", "right"), ("top", "bottom")):
         # What lies behind a side is asked of the rectangles' own sides; walls in line go on beyond them.
@@ -193,10 +193,11 @@ def _bytes(mask: BoolArray) -> UInt8Array:
 
 
 def _blur(edges: BoolArray, reach: int) -> BoolArray:
+    """Widen edges along the rows, by ``reach`` positions to either side."""
     return np.asarray(cv2.dilate(_bytes(edges), np.ones((1, 2 * reach + 1), np.uint8)) > 0)
 
 
-def _tabulate(edges: BoolArray, side: str, line: Window, wide: Window) -> Table:
+def _tabulate(edges: BoolArray, side: str, line: Window, wide: Window) -> SummedAreaTable:
     """Tabulate over ``line`` of the edges of the wider window ``wide``, in the frame's own orientation."""
     if side == "top":
         return sum_up(edges[:, line.v0 - wide.v0 : line.v1 - wide.v0 + 1], line.u0, line.v0)

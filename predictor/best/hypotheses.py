@@ -11,7 +11,7 @@ from closedrooms.predictor.best.door_frame import DoorFrame, TurnedMap, Window, 
 from closedrooms.predictor.best.door_pose import DoorsSeen, Entry, enter, see_doors
 from closedrooms.predictor.best.evidence import gather, rate_sizes, widen_in_line
 from closedrooms.predictor.best.features import score_rectangles
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.best.scene import Scene
 from closedrooms.predictor.config import BestConfig
 

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
-from closedrooms.predictor.best.belief import believe
 from closedrooms.predictor.best.hypotheses import Proposals, propose_rectangles
+from closedrooms.predictor.best.rectangle_belief import believe
 from closedrooms.predictor.best.room_shape import trace_rooms
 from closedrooms.predictor.best.scene import Scene, prepare
 from closedrooms.predictor.best.selection import select_jointly

@@ -1,7 +1,5 @@
 """What two rooms say about each other: they do not overlap, share a wall, and end in one line (method ``best``)."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -9,8 +7,9 @@ import shapely
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.best.door_pose import SAME_WALL
+from closedrooms.predictor.best.feature import Feature
 from closedrooms.predictor.best.hypotheses import Hypotheses
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 
 # Two sides that overlap by this still touch; slack of the thickness of the wall between two rooms [cells].
 TOUCHING, SLACK = in_cells(0.1), in_cells(0.3)
@@ -48,14 +47,20 @@ class Pairs:
 
     @cached_property
     def overlap(self) -> FloatArray:
-        """Area in common, each grown by half a wall, over the smaller area."""
+        """Area in common over the smaller area, both rooms grown by half a wall in all; may exceed 1.
+
+        Half a wall is at most ``MOST_HALF``. A share above ``OVERLAPS`` (0.03) counts ``MORE`` (0.2) more.
+        """
         grown = np.maximum(self.common + min(self.thickness, 2 * MOST_HALF) / 2, 0.0)
         areas = [size.prod(axis=-1) for size in self.sizes]
         return _emphasise(grown.prod(axis=-1) / np.minimum(areas[0], areas[1]))
 
     @cached_property
     def gaps(self) -> list[tuple[FloatArray, FloatArray]]:
-        """Distance of the two [cells] and the share of both sides that face each other, along either axis."""
+        """Signed gap between the two [cells], negative where they overlap, and the sum of two shares, by axis.
+
+        The shares are those of either room's side that faces the other room: 0 to 2.
+        """
         found = []
         for axis in (0, 1):
             along = np.maximum(self.common[..., 1 - axis], 0.0)
@@ -64,74 +69,66 @@ class Pairs:
         return found
 
     def facing(self, nearest: float, furthest: float) -> FloatArray:
-        """Measure the share of both rooms' sides that face each other at a distance between two [cells]."""
+        """Add up, over both axes, the shares of both rooms' sides that face each other, each axis 0 to 2.
+
+        Args:
+            nearest: Signed gap that an axis must exceed to count [cells]; negative: overlap.
+            furthest: Largest gap that counts [cells].
+        """
         apart = [np.where((gap > nearest) & (gap <= furthest), share, 0.0) for gap, share in self.gaps]
         return np.asarray(apart[0] + apart[1])
 
 
 def _emphasise(overlap: FloatArray) -> FloatArray:
-    """Raise overlaps that are more than a touch."""
+    """Add ``MORE`` to the shares above ``OVERLAPS``: more than a touch."""
     return np.asarray(overlap + MORE * (overlap > OVERLAPS))
 
 
 def overlap(p: Pairs) -> FloatArray:
-    """Measure the area in common over the smaller area."""
+    """Measure the area in common over the smaller area, see :attr:`Pairs.overlap`; may exceed 1."""
     return p.overlap
 
 
 def same_depth(p: Pairs) -> FloatArray:
-    """Rate how well the backs of two rooms of one wall agree."""
+    """Rate how well the backs of two rooms of one wall agree, 0 to 1; 0 for doors in two walls."""
     if p.back is None:
         return np.zeros(p.overlap.shape)
     return np.asarray(np.exp(-np.abs(p.a[..., p.back] - p.b[..., p.back]) / OFF_DEPTH) * p.agree)
 
 
 def shared_wall(p: Pairs) -> FloatArray:
-    """Measure the share of the sides with a wall between the two."""
+    """Add up the shares of both rooms' sides with at most a wall between the two, 0 to 2 an axis."""
     return p.facing(-TOUCHING - 1, p.thickness + SLACK)
 
 
 def strip_between(p: Pairs) -> FloatArray:
-    """Measure the share of the sides with a strip between the two that is too narrow for a room."""
+    """Add up the shares of both rooms' sides with a strip between them too narrow for a room, 0 to 2 an axis."""
     return p.facing(p.thickness + SLACK, p.thickness + STRIP)
 
 
 def gap_between(p: Pairs) -> FloatArray:
-    """Measure the share of the sides with space between the two that would need a door of its own."""
+    """Add up the shares of both rooms' sides with a gap between them that needs a door, 0 to 2 an axis."""
     return p.facing(p.thickness + STRIP, p.thickness + GAP)
 
 
 def same_width(p: Pairs) -> FloatArray:
-    """Rate how well the widths of two rooms of one wall agree."""
+    """Rate how well the widths of two rooms of one wall agree, 0 to 1; 0 for doors in two walls."""
     if p.back is None:
         return np.zeros(p.overlap.shape)
     axis = 1 - p.back % 2
     return np.asarray(np.exp(-np.abs(p.sizes[0][..., axis] - p.sizes[1][..., axis]) / OFF_WIDTH) * p.agree)
 
 
-@dataclass(frozen=True, slots=True)
-class PairFeature:
-    """Kind of evidence that two rooms give together.
-
-    Attributes:
-        name: For people.
-        measure: Of every pair of rectangles, shape (n, m).
-        weight: What it counts; where from, ``best.features`` says.
-    """
-
-    name: str
-    measure: Callable[[Pairs], FloatArray]
-    weight: float
-
-
 OVERLAP_WEIGHT = -20.0
-PAIR_FEATURES = (
-    PairFeature("overlap", overlap, weight=OVERLAP_WEIGHT),
-    PairFeature("same depth", same_depth, weight=2.65),
-    PairFeature("shared wall", shared_wall, weight=0.69),
-    PairFeature("strip between", strip_between, weight=-0.89),
-    PairFeature("gap between", gap_between, weight=-0.44),
-    PairFeature("same width", same_width, weight=3.75),
+# Weights: found together with those of ``features``, whose head tells how (log-linear model, then coordinate search).
+# ``benchmarks/fitting/fit_evidence.py`` finds such weights on ``fit``; its weights are not these.
+PAIR_FEATURES: tuple[Feature[Pairs, FloatArray], ...] = (
+    Feature("overlap", overlap, weight=OVERLAP_WEIGHT),
+    Feature("same depth", same_depth, weight=2.65),
+    Feature("shared wall", shared_wall, weight=0.69),
+    Feature("strip between", strip_between, weight=-0.89),
+    Feature("gap between", gap_between, weight=-0.44),
+    Feature("same width", same_width, weight=3.75),
 )
 WEIGHTS = np.array([feature.weight for feature in PAIR_FEATURES])
 
@@ -172,20 +169,26 @@ def weigh_pairs(a: Hypotheses, b: Hypotheses, thickness: int) -> dict[str, Float
 
 
 def _pair_up(a: Hypotheses, b: Hypotheses, thickness: int) -> Pairs:
+    """Pair all rectangles of two doors whose walls have one direction."""
     back = (3, 0, 1, 2)[a.quarter] if _are_in_one_wall(a, b) else None
     return Pairs(a.boxes, b.boxes, back, thickness, agree=float(np.exp(-abs(a.u - b.u) / DEPTH_REACH)))
 
 
 def _are_in_one_wall(a: Hypotheses, b: Hypotheses) -> bool:
+    """Check whether two doors look the same way from one line."""
     return a.quarter == b.quarter and abs(a.v - b.v) < SAME_WALL
 
 
 def _measure(pairs: Pairs) -> FloatArray:
+    """Measure all features of pairs, one along the last axis, shape (n, m, features)."""
     return np.stack([feature.measure(pairs) for feature in PAIR_FEATURES], axis=-1)
 
 
 def _overlap_slanted(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Measure the shared area over the smaller area, for rectangles of two wall directions."""
+    """Measure the shared area over the smaller area, plus ``MORE`` above ``OVERLAPS``, for two wall directions.
+
+    Unlike :attr:`Pairs.overlap`, the rectangles are not grown by half a wall.
+    """
     p, q = np.asarray(shapely.polygons(a)), np.asarray(shapely.polygons(b))
     shared = shapely.area(shapely.intersection(p[:, None], q[None, :]))
     smaller = np.minimum(np.asarray(shapely.area(p))[:, None], np.asarray(shapely.area(q))[None, :])

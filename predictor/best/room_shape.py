@@ -12,7 +12,7 @@ from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room, RoomKind
 from closedrooms.predictor.best.door_frame import TurnedMap
-from closedrooms.predictor.best.lattice import RESOLUTION, in_cells
+from closedrooms.predictor.best.resolution import RESOLUTION, in_cells
 from closedrooms.predictor.best.scene import Scene
 from closedrooms.predictor.best.selection import Choice
 from closedrooms.predictor.disjoint_rooms import NO_ROOM, part_rooms
@@ -128,7 +128,7 @@ def subtract_known(
     Returns:
         One polygon, ``None`` where nothing is left.
     """
-    cells = turned.to_cells(corners)
+    cells = turned.to_frame(corners)
     x0, y0 = np.round(cells.min(axis=0)).astype(int)
     x1, y1 = np.round(cells.max(axis=0)).astype(int)
     pad = thickness + 1
@@ -140,7 +140,7 @@ def subtract_known(
     for doorway in doorways:
         # Free space in an opening ends at a leaf, not at a wall.
         recess = shapely.get_coordinates(doorway.stretch(doorway.face, doorway.leaf + turned.resolution))
-        ends = turned.to_cells(recess) - (x0 - pad, y0 - pad)
+        ends = turned.to_frame(recess) - (x0 - pad, y0 - pad)
         (left, low), (right, high) = np.floor(ends.min(axis=0)).astype(int), np.ceil(ends.max(axis=0)).astype(int)
         window[max(low, 0) : max(high, 0), max(left, 0) : max(right, 0)] = 0
     taken = cv2.dilate(window, np.ones((2 * thickness + 1,) * 2, np.uint8)) > 0
@@ -153,7 +153,7 @@ def subtract_known(
     number, labels = cv2.connectedComponents(smooth, connectivity=4)
     if number < 2:
         return None
-    door = turned.to_cells(facing.middle) - (x0, y0)
+    door = turned.to_frame(facing.middle) - (x0, y0)
     best = max(range(1, number), key=lambda k: _rate_piece(labels == k, door))
     piece = (labels == best).astype(np.uint8)
     # Twice the size, so that outlines run along cell edges after the half-cell shift.

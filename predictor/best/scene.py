@@ -8,7 +8,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.best.door_frame import TurnedMap, turn_map
 from closedrooms.predictor.best.door_pose import DoorPose, face_door
-from closedrooms.predictor.best.lattice import RESOLUTION
+from closedrooms.predictor.best.resolution import RESOLUTION
 from closedrooms.predictor.config import BestConfig
 from closedrooms.predictor.paper.initial_layouts import unusable
 from closedrooms.predictor.structure.clutter import free_islands

@@ -8,8 +8,8 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.best.hypotheses import Doors, Hypotheses, Proposals, join_hypotheses
-from closedrooms.predictor.best.lattice import in_cells
 from closedrooms.predictor.best.pair_features import are_apart, score_pairs
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.best.scene import Scene
 from closedrooms.predictor.best.shared_rooms import LEAST, group_doors, rate_shared
 
@@ -58,8 +58,8 @@ def select_jointly(scene: Scene, proposals: Proposals) -> list[Choice]:
     rooms |= {(i,): own for i, own in enumerate(proposals.alone) if i not in grouped}
     # By place, so that the order of the doors changes nothing.
     order = sorted(rooms, key=lambda doors: min(scene.poses[i].facing.door.midpoint for i in doors))
-    search = _Search([rooms[doors] for doors in order], thickness)
-    places, values, cut = _choose(search, safe=True)
+    search = JointSearch([rooms[doors] for doors in order], thickness)
+    places, values, cut = choose(search, safe=True)
     weights = search.weigh()
     choices = [
         Choice(doors, own.corners[at], value, cut, own, at, weight, find_rivals(doors, proposals, rated))
@@ -81,28 +81,20 @@ def find_rivals(
     return tuple((own, share * own.weigh()) for own, share in lots)
 
 
-def choose(
-    hypotheses: Sequence[Hypotheses], thickness: int, *, safe: bool = False
-) -> tuple[list[int], list[float], bool]:
+def choose(search: "JointSearch", *, safe: bool) -> tuple[list[int], list[float], bool]:
     """Choose the rectangle of each door that is best together with the others'.
 
     Coordinate ascent over doors and over pairs of doors from two starts; the better end wins. Each step raises the
     total, so that it ends; ties keep the earlier rectangle, whose order is by geometry.
 
     Args:
-        hypotheses: Of every door.
-        thickness: Usual thickness of walls [cells].
+        search: The rectangles of every door.
         safe: Each door then takes the rectangle that agrees best with all of its rectangles, weighed by their scores
             beside the others' rooms: where the evidence is even, a middling room loses less than either extreme.
 
     Returns:
         Index of the rectangle by door, its score by itself and with the others, whether the search was cut.
     """
-    return _choose(_Search(hypotheses, thickness), safe=safe)
-
-
-def _choose(search: "_Search", *, safe: bool) -> tuple[list[int], list[float], bool]:
-    """Choose as :func:`choose` does, with the tables at hand."""
     alone, first_cut = search.ascend([0] * len(search.hypotheses))
     surest, second_cut = search.ascend(search.surest_first())
     better = search.total(surest) > search.total(alone) + 1e-9
@@ -113,7 +105,7 @@ def _choose(search: "_Search", *, safe: bool) -> tuple[list[int], list[float], b
     return done, scores, second_cut if better else first_cut
 
 
-class _Search:
+class JointSearch:
     """Tables of one map and the moves over them; -1 stands for a door that has not chosen yet."""
 
     def __init__(self, hypotheses: Sequence[Hypotheses], thickness: int) -> None:
@@ -189,6 +181,7 @@ class _Search:
         return chosen, True
 
     def _round(self, chosen: list[int]) -> bool:
+        """Move every door, then every pair of doors, to where the total is largest; tell whether anything moved."""
         changed = False
         for i in range(len(chosen)):
             score = self.seen_by(i, chosen)

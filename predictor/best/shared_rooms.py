@@ -1,21 +1,22 @@
 """Closed doors that lead to one room: how likely, and which rectangles such a room may fill (method ``best``)."""
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray
-from closedrooms.predictor.best import features
+from closedrooms.predictor.best.feature import Feature
+from closedrooms.predictor.best.features import FEATURES
 from closedrooms.predictor.best.hypotheses import Doors, Hypotheses, Proposals, join_hypotheses
-from closedrooms.predictor.best.lattice import RESOLUTION
 from closedrooms.predictor.best.pair_features import score_pairs
+from closedrooms.predictor.best.resolution import RESOLUTION
 
 # Doors share a room from this probability on: on buildings of ``fit`` held out 28 sets were right and 1 wrong (36 and 6
 # from 0.7 on, 49 and 17 from 0.5 on). A shared room that is less likely than the other is not thought of.
 SHARED, LEAST = 0.8, 0.05
-COLUMNS = {feature.name: column for column, feature in enumerate(features.FEATURES)}
+COLUMNS = {feature.name: column for column, feature in enumerate(FEATURES)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +56,10 @@ def gain(t: Together) -> float:
 
 
 def crowd(t: Together) -> float:
-    """Measure how much the rooms of each are expected to overlap: where there is no room for two, there is one."""
+    """Compute the mean expected overlap of two doors' own rooms: where there is no room for two, there is one.
+
+    Overlaps are as :func:`~.pair_features.score_pairs` gives them (0 up, may exceed 1), weighed by probability.
+    """
     lots = list(zip(t.alone, t.weights, strict=True))
     found = [p @ score_pairs(a, b, t.thickness)[1] @ q for (a, p), (b, q) in itertools.combinations(lots, 2)]
     return float(np.mean(found))
@@ -90,11 +94,11 @@ def wall_filled(t: Together) -> float:
 
 
 def log_short_side(t: Together) -> float:
-    """Measure how narrow the room is, by the logarithm of its short side [m]."""
+    """Compute the logarithm of the short side of the room in metres."""
     return float(np.log(t.sides.min()))
 
 
-def open_share(t: Together) -> float:
+def shared_open_share(t: Together) -> float:
     """Measure the share of the room with nothing known beyond it."""
     return t.measured("open")
 
@@ -109,39 +113,25 @@ def corner_closed(t: Together) -> float:
     return t.measured("sides closed", "back closed") * meeting_walls(t)
 
 
-@dataclass(frozen=True, slots=True)
-class SharedFeature:
-    """Kind of evidence that doors lead to one room.
-
-    Attributes:
-        name: For people.
-        measure: Of some doors.
-        weight: What it counts: logistic regression on ``fit`` (``benchmarks/fit_shared_rooms.py``).
-    """
-
-    name: str
-    measure: Callable[[Together], float]
-    weight: float
-
-
-FEATURES = (
-    SharedFeature("always", lambda _: 1.0, weight=1.72),
-    SharedFeature("gain", gain, weight=0.089),
-    SharedFeature("corner gain", corner_gain, weight=0.256),
-    SharedFeature("crowd", crowd, weight=1.21),
-    SharedFeature("one wall", one_wall, weight=-5.95),
-    SharedFeature("facing walls", facing_walls, weight=-2.25),
-    SharedFeature("doors", count_doors, weight=-1.77),
-    SharedFeature("wall filled", wall_filled, weight=4.84),
-    SharedFeature("log short side", log_short_side, weight=1.1),
-    SharedFeature("open", open_share, weight=-2.18),
-    SharedFeature("corner closed", corner_closed, weight=-1.7),
+# Weights: found by ``benchmarks/fitting/fit_shared_rooms.py``, logistic regression on ``fit``.
+SHARED_FEATURES: tuple[Feature[Together, float], ...] = (
+    Feature("always", lambda _: 1.0, weight=1.72),
+    Feature("gain", gain, weight=0.089),
+    Feature("corner gain", corner_gain, weight=0.256),
+    Feature("crowd", crowd, weight=1.21),
+    Feature("one wall", one_wall, weight=-5.95),
+    Feature("facing walls", facing_walls, weight=-2.25),
+    Feature("doors", count_doors, weight=-1.77),
+    Feature("wall filled", wall_filled, weight=4.84),
+    Feature("log short side", log_short_side, weight=1.1),
+    Feature("open", shared_open_share, weight=-2.18),
+    Feature("corner closed", corner_closed, weight=-1.7),
 )
-WEIGHTS = np.array([feature.weight for feature in FEATURES])
+WEIGHTS = np.array([feature.weight for feature in SHARED_FEATURES])
 
 
 def measure_shared(proposals: Proposals, thickness: int) -> dict[Doors, FloatArray]:
-    """Measure every set of doors that may lead to one room, in the order of :data:`FEATURES`.
+    """Measure every set of doors that may lead to one room, in the order of :data:`SHARED_FEATURES`.
 
     Args:
         proposals: Rectangles of every door by itself and of the sets.
@@ -153,7 +143,7 @@ def measure_shared(proposals: Proposals, thickness: int) -> dict[Doors, FloatArr
         together = Together(
             [proposals.alone[i] for i in doors], [weights[i] for i in doors], join_hypotheses(parts), thickness
         )
-        measured[doors] = np.array([feature.measure(together) for feature in FEATURES])
+        measured[doors] = np.array([feature.measure(together) for feature in SHARED_FEATURES])
     return measured
 
 

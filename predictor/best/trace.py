@@ -10,8 +10,8 @@ from closedrooms.core.room import Room
 from closedrooms.predictor.best.door_frame import Window, find_faces_in
 from closedrooms.predictor.best.features import FEATURES
 from closedrooms.predictor.best.hypotheses import Hypotheses, Proposals
-from closedrooms.predictor.best.lattice import in_cells
 from closedrooms.predictor.best.pair_features import weigh_pairs
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.best.scene import Scene
 from closedrooms.predictor.best.selection import Choice
 from closedrooms.predictor.prediction import Level, WeighedRoom, WeighedTrace

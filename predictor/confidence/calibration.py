@@ -1,4 +1,4 @@
-"""The numbers that turn beliefs into probabilities, by method: found on ``fit`` by ``benchmarks/fit_confidence.py``."""
+"""Numbers that turn beliefs into probabilities, by method: fitted by ``benchmarks/fitting/fit_confidence.py``."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -68,6 +68,7 @@ def read_calibrations() -> dict[str, Calibration]:
 
 
 def _parse(numbers: dict[str, Any]) -> Calibration:
+    """Make a calibration from its JSON object."""
     curves = {name: Curve(*np.array(numbers[name], dtype=np.float64).T) for name in ("confidence", "cells", "nearest")}
     return Calibration(
         np.array(numbers["mean"]),

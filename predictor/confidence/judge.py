@@ -11,7 +11,7 @@ from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.predictor.confidence.belief import Belief
 from closedrooms.predictor.confidence.calibration import Calibration, calibration_of
 from closedrooms.predictor.confidence.room_features import measure_rooms
-from closedrooms.predictor.confidence.variants import believe_variants
+from closedrooms.predictor.confidence.shape_variants import believe_variants
 from closedrooms.predictor.prediction import Prediction
 
 # What is less probable is not drawn.
@@ -31,7 +31,7 @@ def judge(
         method: That made it: whose calibration counts.
         grid: The map.
         doors: Closed doors of the map.
-        prediction: With a belief a room where the method has one; else the room's kind tells (``variants``).
+        prediction: With a belief a room where the method has one; else the room's kind tells (``shape_variants``).
         calibration: In place of the shipped one.
 
     Returns:

@@ -71,6 +71,7 @@ def measure_rooms(grid: OccupancyGrid, rooms: tuple[Room, ...], beliefs: Sequenc
 
 
 def _known_box(grid: OccupancyGrid) -> shapely.Polygon:
+    """Find the bounding box of all known cells [m]."""
     window = grid.known_bounds()
     return shapely.Polygon() if window is None else shapely.box(*grid.frame.cropped(*window).bounds)
 

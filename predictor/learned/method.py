@@ -12,7 +12,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.best.method import predict_best
 from closedrooms.predictor.config import LearnedConfig
-from closedrooms.predictor.learned.belief import believe_cells
+from closedrooms.predictor.learned.mask_belief import believe_cells
 from closedrooms.predictor.learned.model import load_model
 from closedrooms.predictor.learned.ratings import Rater
 from closedrooms.predictor.prediction import Prediction, WeighedTrace

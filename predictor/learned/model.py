@@ -117,4 +117,5 @@ def load_model(path: Path | None) -> Model:
 
 @lru_cache(maxsize=4)
 def _load(path: Path, changed: int) -> Model:  # noqa: ARG001 (a file that was written anew is read anew)
+    """Load a model once for each time that its file was changed."""
     return Model(path)

@@ -9,7 +9,7 @@ import numpy as np
 from closedrooms.core.arrays import BoolArray, CellArray, FloatArray, IntArray
 from closedrooms.predictor.best.door_frame import TurnedMap
 from closedrooms.predictor.best.door_pose import DoorPose
-from closedrooms.predictor.best.lattice import in_cells
+from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.best.scene import Scene
 
 # Cells of a patch along each side, and their size [m]: 32 x 32 m, so that a room of 24 m fits.
@@ -56,13 +56,9 @@ def cut_patches(scene: Scene) -> list[Patch]:
 
 
 def _cut_patch(turned: TurnedMap, pose: DoorPose, poses: tuple[DoorPose, ...]) -> Patch:
-    inward = np.array([(0, 1), (-1, 0), (0, -1), (1, 0)][pose.quarter])
-    along = np.array([inward[1], -inward[0]])
-    # To whole cells of the turned map, so that nothing is sampled between them.
-    corner = (
-        np.round(turned.to_cells(pose.facing.middle)).astype(int) - in_cells(ASIDE) * along - in_cells(BEHIND) * inward
-    )
-    seen = _take(turned, corner, along + inward, pose.quarter)
+    """Cut the patch of one door out of the map that is turned along its wall."""
+    corner, along, inward = _place(turned, pose)
+    seen = sample_cells(turned, pose)
     channels = np.zeros((len(CHANNELS), SIZE, SIZE))
     channels[0], channels[1] = _share(seen == FREE), _share(seen == OCCUPIED)
     channels[2] = 1.0 - channels[0] - channels[1]
@@ -74,10 +70,24 @@ def _cut_patch(turned: TurnedMap, pose: DoorPose, poses: tuple[DoorPose, ...]) -
     return patch
 
 
-def _take(turned: TurnedMap, corner: IntArray, diagonal: IntArray, quarter: int) -> CellArray:
-    """Sample the cells of the turned map under a patch, rows into the room, shape (SIZE * FINE, SIZE * FINE)."""
+def _place(turned: TurnedMap, pose: DoorPose) -> tuple[IntArray, IntArray, IntArray]:
+    """Find where a patch lies in the turned map [cells]: its corner, and unit vectors along its wall and inward."""
+    inward = np.array([(0, 1), (-1, 0), (0, -1), (1, 0)][pose.quarter])
+    along = np.array([inward[1], -inward[0]])
+    # To whole cells of the turned map, so that nothing is sampled between them.
+    middle = np.round(turned.to_frame(pose.facing.middle)).astype(int)
+    return middle - in_cells(ASIDE) * along - in_cells(BEHIND) * inward, along, inward
+
+
+def sample_cells(turned: TurnedMap, pose: DoorPose) -> CellArray:
+    """Sample the cells of the turned map under a door's patch: :data:`FREE`, :data:`OCCUPIED` or 0.
+
+    Returns:
+        Rows into the room, shape (SIZE * FINE, SIZE * FINE).
+    """
+    corner, along, inward = _place(turned, pose)
     side = SIZE * FINE
-    col, row = np.minimum(corner, corner + side * diagonal).tolist()
+    col, row = np.minimum(corner, corner + side * (along + inward)).tolist()
     rows, cols = turned.free.shape
     cells = np.zeros((side, side), dtype=np.int8)
     r0, r1, c0, c1 = max(row, 0), min(row + side, rows), max(col, 0), min(col + side, cols)
@@ -86,7 +96,7 @@ def _take(turned: TurnedMap, corner: IntArray, diagonal: IntArray, quarter: int)
         cells[r0 - row : r1 - row, c0 - col : c1 - col] = (
             turned.free[of] * (FREE - OCCUPIED) + turned.known[of] * OCCUPIED
         )
-    return (cells, cells.T[::-1], cells[::-1, ::-1], cells.T[:, ::-1])[quarter]
+    return (cells, cells.T[::-1], cells[::-1, ::-1], cells.T[:, ::-1])[pose.quarter]
 
 
 def _share(mask: BoolArray) -> FloatArray:

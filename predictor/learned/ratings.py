@@ -47,6 +47,7 @@ class Rater:
         return replace(proposals, alone=alone, shared=shared)
 
     def _rate(self, doors: Sequence[str], own: Hypotheses) -> Hypotheses:
+        """Add what the network says to the scores of rectangles, and keep the best of them in order."""
         said = self.hear(doors, own.corners)
         scores = np.round(own.scores + said @ WEIGHTS, 9)
         order = np.lexsort((*own.boxes.T, -scores))[: self.keep]

@@ -49,7 +49,7 @@ class Arrangement:
     neighbours: tuple[dict[int, int], ...]
 
 
-def arrange(lines: Sequence[Line], boundary: Sequence[Line]) -> Arrangement:
+def build_arrangement(lines: Sequence[Line], boundary: Sequence[Line]) -> Arrangement:
     """Divide the box into faces: node all lines and polygonize them.
 
     Args:
@@ -91,13 +91,15 @@ def box_of(boundary: Sequence[Line]) -> Polygon:
 
 
 def _crossing(a: Line, b: Line) -> FloatArray:
+    """Find the point where two lines cross [m]; they are not parallel."""
     return np.asarray(np.linalg.solve(np.stack((a.normal, b.normal)), np.array([a.offset, b.offset])))
 
 
 def draw_line(line: Line, full: Sequence[Line], centre: FloatArray, reach: float) -> LineString:
-    """Draw a line where it passes ``centre``, ``reach`` both ways: beyond the box, so that no end lies on its edge.
+    """Clip a line to a segment: ``reach`` [m] both ways from its point next to ``centre``, beyond the box.
 
-    A line with a span ends at the last of the ``full`` lines that it crosses before that, and at the first after it.
+    A line with a span is clipped to the last of the ``full`` lines that it crosses before the span, and to the first
+    after it.
     """
     foot = centre - line.distance(centre) * line.normal
     low, high = -reach, reach

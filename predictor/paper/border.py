@@ -54,6 +54,7 @@ def border_rooms(growth: Growth, config: PaperConfig) -> dict[int, BorderRoom]:
 
 
 def _square(growth: Growth, room: int) -> BorderRoom:
+    """Make the square for a face at the border: on the edge of its door, or as deep as the face where that is cut."""
     arrangement = growth.arrangement
     entrance = growth.entrances[room]
     face, edge = entrance.face, entrance.edge

@@ -67,13 +67,19 @@ class Growth:
         return beside - {-1, room}
 
     def position(self, room: int) -> tuple[float, ...]:
-        """Rank rooms that tie: by how far the door is from the middle of all doors, then by where it is [m]."""
+        """Make the key that sorts one room among rooms that tie: door to middle of all doors, then x, y [m]."""
         doors = np.array([entrance.door.midpoint for entrance in self.entrances])
         away = float(np.hypot(*(doors[room] - doors.mean(axis=0))))
         return (round(away, 6), *self.entrances[room].door.midpoint)
 
     def face_set(self, room: int, faces: IntArray, returnable: BoolArray) -> FaceSet:
-        """List the faces that a layout of a room may be made of."""
+        """Gather ``faces``, indices of shape (n,), of which a room's layouts are made, for scoring subsets.
+
+        Args:
+            room: Number of the room.
+            faces: Faces that its layouts may contain.
+            returnable: Which of them are unassigned unknown faces when a layout leaves them out, shape (n,).
+        """
         return face_set(self.arrangement, faces, returnable, self.free, self.entrances[room].facing.along)
 
 

@@ -15,7 +15,7 @@ from closedrooms.predictor.structure.doorways import FacingDoor
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Entrance:
-    """Where a door leads.
+    """Edge and face to which a door leads.
 
     Attributes:
         facing: The door, and the direction from its edge into the initial face.
@@ -62,12 +62,12 @@ def find_entrance(
     Args:
         arrangement: The faces.
         unknown: Which of them were not observed, shape (n,).
-        door: Its mid-point.
+        door: A closed door in the frame of the faces; only its mid-point counts.
         reach: A door further from every edge lies on no wall [m].
         slack: How much further than the closest edge a proper one may lie [m]; a thick interior wall.
 
     Returns:
-        The entrance, or the reason why there is none.
+        The entrance, or the reason why there is none, as text.
     """
     distances = np.where(
         arrangement.edge_faces[:, 1] >= 0, distances_to_edges(arrangement, np.array(door.midpoint)), np.inf
@@ -113,9 +113,9 @@ def _behind(arrangement: Arrangement, unknown: BoolArray, edge: int, point: Floa
 def splits_between(arrangement: Arrangement, entrances: Sequence[Entrance]) -> list[Line]:
     """Draw lines that part doors with the same initial face.
 
-    Doors on one edge: the perpendicular through the middle of two neighbouring doors. Doors on two edges of one
-    face, of which the text says nothing: the perpendicular of the line from door to door, through its middle, turned
-    to the nearest of the two directions of the first door's edge.
+    Doors on one edge: the perpendicular bisector of two neighbouring doors. Doors on two edges of one face, of which
+    the text says nothing: the perpendicular bisector of the doors as projected on that one of the two directions of
+    the shortest edge, along or across, in which they spread more.
 
     Args:
         arrangement: The faces.

@@ -9,7 +9,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.predictor.config import FacesConfig
-from closedrooms.predictor.paper.arrangement import Arrangement, arrange
+from closedrooms.predictor.paper.arrangement import Arrangement, build_arrangement
 from closedrooms.predictor.paper.initial_faces import Entrance, find_entrance, splits_between
 from closedrooms.predictor.paper.unknown_faces import unknown_faces
 from closedrooms.predictor.paper.wall_lines import WallLines, find_structure
@@ -23,7 +23,7 @@ FARTHEST = 1e9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Start:
-    """What every method starts from.
+    """Faces and initial faces that ``paper``, ``rose`` and the two baselines begin with (``best`` does not).
 
     Attributes:
         grid: The known window of the map, at the working resolution.
@@ -89,7 +89,7 @@ def _split_until_apart(
     """Split edges until no two doors share an initial face; each round adds a line, so that it ends."""
     lines = list(structure.lines)
     while True:
-        arrangement = arrange(lines, structure.boundary)
+        arrangement = build_arrangement(lines, structure.boundary)
         unknown = unknown_faces(arrangement, grid, min_unknown=config.min_unknown, max_free=config.max_free)
         found = {d.id: find_entrance(arrangement, unknown, d, reach=config.door_reach) for d in doors}
         entrances = [entrance for entrance in found.values() if isinstance(entrance, Entrance)]

@@ -12,7 +12,7 @@ from closedrooms.predictor.paper.arrangement import Arrangement
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Terms:
-    """What the evaluation functions look at, for k layouts at once; every field of shape (k,).
+    """Quantities of k layouts that the evaluation functions are made of (paper, section 3.4); fields of shape (k,).
 
     Attributes:
         area: Area [m2].
@@ -22,7 +22,7 @@ class Terms:
         free_length: Length of those edges [m].
         contour: Length of the external contour [m].
         two_free: Number of faces with exactly two free edges.
-        more_free: Number of faces with more.
+        more_free: Number of faces with three or more free edges.
         proportion: Long side over short side of the bounding box along the door's edge.
     """
 

@@ -33,7 +33,7 @@ SMOOTH = 0.01
 # Contrast (recess over roughness) below which nothing is looked at any closer.
 LEAST_CONTRAST = 1.3
 # Score: logistic regression of log(contrast) and share of the leaf's face that was seen, fitted on every other bundled
-# world (office-01, -03, ... school-08) at medium noise by benchmarks/door_proposals.py.
+# world (office-01, -03, ... school-08) at medium noise by benchmarks/quality/door_proposals.py.
 INTERCEPT, PER_CONTRAST, PER_SEEN = -10.87, 3.04, 8.37
 # Share of its score that a window in a row keeps: the clearest niche, at 0.99, ends below everything that is proposed.
 WINDOW = 0.2

@@ -63,6 +63,7 @@ class WallDirections:
         return float(self.angles[int(scores.argmax())])
 
     def _snapped(self, angle: float) -> float:
+        """Move an angle to the nearest direction [rad], where one is near enough."""
         apart = np.abs(wrapped(self.angles - angle))
         return float(self.angles[int(apart.argmin())]) if apart.min() < APART else float(angle)
 

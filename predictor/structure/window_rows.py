@@ -113,6 +113,7 @@ def _lights_a_room(spacings: FloatArray) -> bool:
 
 
 def _even(spacings: FloatArray) -> bool:
+    """Check whether spacings are all one step or two, as those of windows are."""
     step = float(spacings.min())
     times = np.round(spacings / step)
     return bool((times <= 2).all() and (np.abs(spacings - times * step) <= UNEVEN * step).all())

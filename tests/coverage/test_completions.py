@@ -7,7 +7,7 @@ from shapely.geometry import box
 
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.room import Alternative, Room
-from closedrooms.coverage.completions import draw_rooms, list_possibilities
+from closedrooms.coverage.completions import list_possibilities, sample_rooms
 
 LEFT = Room(box(0, 0, 4, 4), ("d0",), alternatives=(Alternative(box(0, 0, 7, 4), 0.3),))
 RIGHT = Room(box(4.2, 0, 8, 4), ("d1",), alternatives=(Alternative(box(2, 0, 8, 4), 0.4),))
@@ -42,7 +42,7 @@ def test_alternatives_that_are_more_than_sure_leave_nothing_negative():
 def test_draws_are_as_frequent_as_the_joint_probability_of_rooms_that_do_not_overlap():
     possible = [list_possibilities(room, _percent(90)) for room in (LEFT, RIGHT)]
     draws = 6000
-    seen = Counter(map(tuple, draw_rooms(possible, draws, np.random.default_rng(3))))
+    seen = Counter(map(tuple, sample_rooms(possible, draws, np.random.default_rng(3))))
     joint = {}
     for a, b in product(range(3), range(3)):
         first, second = possible[0].shapes[a], possible[1].shapes[b]
@@ -57,11 +57,11 @@ def test_draws_are_as_frequent_as_the_joint_probability_of_rooms_that_do_not_ove
 def test_rooms_that_overlap_in_every_shape_are_drawn_too():
     same = [Room(box(0, 0, 4, 4), ("d0",)), Room(box(0, 0, 4, 4.1), ("d1",))]
     possible = [list_possibilities(room, None) for room in same]
-    assert list(draw_rooms(possible, 2, np.random.default_rng(0))) == [[0, 0], [0, 0]]
+    assert list(sample_rooms(possible, 2, np.random.default_rng(0))) == [[0, 0], [0, 0]]
 
 
 def test_the_same_seed_gives_the_same_draws_and_no_room_none():
     possible = [list_possibilities(room, _percent(90)) for room in (LEFT, RIGHT)]
-    one, other, third = (list(draw_rooms(possible, 30, np.random.default_rng(seed))) for seed in (1, 1, 2))
+    one, other, third = (list(sample_rooms(possible, 30, np.random.default_rng(seed))) for seed in (1, 1, 2))
     assert one == other != third
-    assert list(draw_rooms([], 2, np.random.default_rng(0))) == [[], []]
+    assert list(sample_rooms([], 2, np.random.default_rng(0))) == [[], []]

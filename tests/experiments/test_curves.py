@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from closedrooms.experiments.evaluation.curves import draw_iou
+from closedrooms.experiments.evaluation.reporting.figures import draw_iou
 
 
 @pytest.mark.parametrize("method", ["learned", "somebody's"])

@@ -1,18 +1,17 @@
 """Datasets: layout, determinism, and going on after everything that can stop one."""
 
-import hashlib
 import itertools
 import json
 import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+from dataset_files import COMMAND, QUICK, content, wait_for
 
 from closedrooms.cli.commands import main
 from closedrooms.core.errors import InvalidInputError
@@ -29,9 +28,7 @@ from closedrooms.experiments.dataset.variants import (
 )
 from closedrooms.worlds.library import bundled_names
 
-COMMAND = [sys.executable, "-c", "import sys; from closedrooms.cli.commands import main; sys.exit(main())"]
 WriteWorld = Callable[[Path, str, float], Path]
-QUICK = ["--sim.lidar.beams", "180", "--repetitions", "2", "--max-closed", "2", "--seed", "5"]
 
 
 @pytest.fixture(scope="module")
@@ -42,12 +39,6 @@ def made(worlds: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def content(folder: Path) -> dict[str, str]:
-    """SHA-256 by relative path of all that a dataset holds."""
-    paths = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != ".lock")
-    return {path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
-
-
 def samples(folder: Path) -> set[str]:
     return {path.parent.relative_to(folder).as_posix() for path in folder.glob("*/*/*/run.json")}
 
@@ -55,13 +46,6 @@ def samples(folder: Path) -> set[str]:
 def begin(command: list[str], log: Path) -> "subprocess.Popen[bytes]":
     with log.open("ab") as file:
         return subprocess.Popen(command, stdout=file, stderr=subprocess.STDOUT, start_new_session=True)
-
-
-def wait_for(condition: object, seconds: float = 120.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():  # type: ignore[operator]
-        assert time.monotonic() < end, "nothing happened"
-        time.sleep(0.02)
 
 
 @pytest.mark.simulation
@@ -446,3 +430,12 @@ def test_explorations_that_end_early_and_doors_left_out_end_with_status_3(
     (remark,) = told["remarks"]
     assert (remark["names"], remark["loss"]) == (["astray"], True)
     assert json.loads((tmp_path / "set" / "manifest.json").read_text())["remarks"] == told["remarks"]
+
+
+@pytest.mark.simulation
+def test_the_manifest_repeats_the_dataset_from_any_folder(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["dataset", "--config", str(made / "manifest.json"), "--out", "again", "--workers", "1"]) == 0
+    assert content(tmp_path / "again") == content(made)

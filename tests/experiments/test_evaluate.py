@@ -20,7 +20,7 @@ from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyG
 from closedrooms.core.room import Room
 from closedrooms.experiments.evaluation.config import EvaluateConfig
 from closedrooms.experiments.evaluation.evaluate import evaluate
-from closedrooms.experiments.evaluation.listing import find_samples
+from closedrooms.experiments.evaluation.samples.listing import find_samples
 
 
 def write_sample(folder: Path, *, width: int = 100, about: dict[str, object] | None = None) -> None:

@@ -15,8 +15,8 @@ from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.experiments.dataset.checksums import checksums, digest
-from closedrooms.experiments.evaluation.listing import find_samples
-from closedrooms.experiments.evaluation.samples import read_sample
+from closedrooms.experiments.evaluation.samples.listing import find_samples
+from closedrooms.experiments.evaluation.samples.sample_reader import read_sample
 
 IDS = ("train/house/r00-c01", "test/yard/r01-c01")
 

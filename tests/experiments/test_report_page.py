@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from closedrooms.experiments.evaluation.curves import same_extent, same_scale
-from closedrooms.experiments.evaluation.page import NO_DIGIT, NO_POINT, Section, Table, write_page
-from closedrooms.experiments.evaluation.statistics import LEAST_WORLDS, paired
+from closedrooms.experiments.evaluation.reporting.figures import same_extent, same_scale
+from closedrooms.experiments.html_page import NO_DIGIT, NO_POINT, Section, Table, write_page
+from closedrooms.experiments.statistics import LEAST_WORLDS, compare_pairs
 
 ROWS = [
     ["method", "IoU", "samples", "note"],
@@ -89,7 +89,7 @@ def test_few_buildings_give_no_p(count: int, told: bool) -> None:
     names = [f"w{number}" for number in range(count)]
     first = dict.fromkeys(names, 0.5)
     second = {name: 0.6 + 0.01 * number for number, name in enumerate(names)}
-    test = paired(first, second, {name: name for name in names}, 100, "x")
+    test = compare_pairs(first, second, {name: name for name in names}, 100, "x")
     assert test is not None
     assert (test.p_worlds is not None, test.p_samples is not None) == (told, told)
 

@@ -6,13 +6,13 @@ from shapely.geometry import box
 
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.experiments.evaluation.scores import (
+from closedrooms.experiments.evaluation.scoring.scores import (
     added_rooms,
     hidden_area,
-    hidden_rooms,
     iou,
     matched_iou,
     room_masks,
+    split_hidden_area,
 )
 
 FRAME = GridFrame(0.05, 0.0, 0.0, 120, 240)
@@ -32,22 +32,22 @@ def two_rooms() -> tuple[OccupancyGrid, OccupancyGrid]:
 
 def test_hidden_rooms_are_told_apart_at_a_door() -> None:
     observed, truth = two_rooms()
-    rooms = hidden_rooms(hidden_area(observed, truth), FRAME.resolution)
+    rooms = split_hidden_area(hidden_area(observed, truth), FRAME.resolution)
     areas = sorted(room.sum() * 0.05**2 for room in rooms)
     assert areas == pytest.approx([12.0, 15.0], abs=0.2)
 
 
 def test_nothing_hidden_has_no_rooms() -> None:
     _, truth = two_rooms()
-    assert hidden_rooms(hidden_area(truth, truth), FRAME.resolution) == []
+    assert split_hidden_area(hidden_area(truth, truth), FRAME.resolution) == []
 
 
 def test_small_pieces_are_no_rooms() -> None:
     area = np.zeros(FRAME.shape, dtype=bool)
     area[5:24, 5:24] = True
-    assert hidden_rooms(area, 0.05) == []
+    assert split_hidden_area(area, 0.05) == []
     area[5:26, 5:26] = True
-    assert len(hidden_rooms(area, 0.05)) == 1
+    assert len(split_hidden_area(area, 0.05)) == 1
 
 
 def test_a_room_is_rasterised_by_the_centres_of_its_cells() -> None:

@@ -7,12 +7,12 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+from dataset_files import COMMAND, QUICK, content, wait_for
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,12 +22,10 @@ from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.packing import as_bytes, from_bytes, pack_sample, unpack
 from closedrooms.experiments.dataset.shard import Shard, read_shard, shard_name
 from closedrooms.experiments.dataset.shard_plan import TOGETHER, ShardPlan
-from closedrooms.experiments.evaluation.listing import find_samples
+from closedrooms.experiments.evaluation.samples.listing import find_samples
 from closedrooms.experiments.places import Url, read_place
 from closedrooms.experiments.stores import open_store, read_file
 
-COMMAND = [sys.executable, "-c", "import sys; from closedrooms.cli.commands import main; sys.exit(main())"]
-QUICK = ["--sim.lidar.beams", "180", "--repetitions", "2", "--max-closed", "2", "--seed", "5"]
 # Two samples a shard or so.
 SHARDS = ["--format", "shards", "--shard-mb", "0.004", *QUICK]
 
@@ -45,19 +43,6 @@ def made(worlds: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("shards") / "data"
     assert main(["dataset", *worlds, "--out", str(out), "--workers", "1", *SHARDS]) == 0
     return out
-
-
-def content(folder: Path) -> dict[str, str]:
-    """SHA-256 by relative path of all that a dataset holds."""
-    paths = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != ".lock")
-    return {path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
-
-
-def wait_for(condition: object, seconds: float = 120.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():  # type: ignore[operator]
-        assert time.monotonic() < end, "nothing happened"
-        time.sleep(0.02)
 
 
 @pytest.mark.simulation
@@ -400,3 +385,12 @@ def test_an_object_store_is_gone_on_with_after_kill_9_and_holds_the_same_bytes(
     )  # fmt: skip
     assert missing.returncode == 1
     assert missing.stderr.splitlines()[-1].startswith("closedrooms: ")
+
+
+@pytest.mark.simulation
+def test_the_manifest_repeats_the_dataset_from_any_folder(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["dataset", "--config", str(made / "manifest.json"), "--out", "again", "--workers", "1"]) == 0
+    assert content(tmp_path / "again") == content(made)

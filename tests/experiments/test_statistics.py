@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from closedrooms.experiments.evaluation.statistics import bootstrap, described, paired
+from closedrooms.experiments.statistics import bootstrap, compare_pairs, described
 
 
 def test_the_bootstrap_interval_holds_the_mean_and_narrows_with_more_samples() -> None:
@@ -31,20 +31,20 @@ def test_a_constant_difference_is_found_and_none_where_there_is_none() -> None:
     first = {f"s{number:02d}": float(value) for number, value in enumerate(rng.random(40))}
     worlds = {sample: f"w{int(sample[1:]) % 10}" for sample in first}
     better = {sample: value + 0.05 + 0.01 * rng.random() for sample, value in first.items()}
-    test = paired(first, better, worlds, 500, "test")
+    test = compare_pairs(first, better, worlds, 500, "test")
     assert test is not None
     assert test.p_samples < 1e-6
     assert test.p_worlds < 0.01
     assert test.low > 0.04
-    same = paired(first, first, worlds, 500, "test")
+    same = compare_pairs(first, first, worlds, 500, "test")
     assert same is not None
     assert (same.p_samples, same.p_worlds, same.difference) == (1.0, 1.0, 0.0)
 
 
 def test_only_samples_that_both_have_are_compared() -> None:
     worlds = {"a": "w", "b": "w", "c": "v"}
-    test = paired({"a": 0.5, "b": 0.2}, {"b": 0.4, "c": 0.9}, worlds, 100, "test")
+    test = compare_pairs({"a": 0.5, "b": 0.2}, {"b": 0.4, "c": 0.9}, worlds, 100, "test")
     assert test is not None
     assert (test.samples, test.worlds) == (1, 1)
     assert test.difference == pytest.approx(0.2)
-    assert paired({"a": 0.5}, {"c": 0.5}, worlds, 100, "test") is None
+    assert compare_pairs({"a": 0.5}, {"c": 0.5}, worlds, 100, "test") is None

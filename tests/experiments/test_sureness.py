@@ -5,7 +5,7 @@ from shapely.geometry import box
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Alternative, Room
-from closedrooms.experiments.evaluation.sureness import (
+from closedrooms.experiments.evaluation.scoring.sureness import (
     auroc,
     calibration_error,
     cells_asked,

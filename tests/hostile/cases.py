@@ -27,7 +27,7 @@ ADDRESS_SPACE = 6_000_000
 
 @dataclass(frozen=True)
 class Answer:
-    """How a command answered.
+    """Outcome of a command.
 
     Attributes:
         status: Exit status; negative for a signal, ``None`` where the time was up.

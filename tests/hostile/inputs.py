@@ -47,8 +47,8 @@ def _json(value: Any) -> bytes:
 
 
 def _yaml(value: Any) -> bytes:
-    # Without aliases: values that appear twice are written twice.
-    dumper = type("Dumper", (yaml.SafeDumper,), {"ignore_aliases": lambda *_: True})
+    # Without aliases: values that appear twice are written twice. The dumper in C is three times as quick.
+    dumper = type("Dumper", (getattr(yaml, "CSafeDumper", yaml.SafeDumper),), {"ignore_aliases": lambda *_: True})
     return yaml.dump(value, Dumper=dumper, sort_keys=False).encode()
 
 
@@ -154,11 +154,17 @@ VALUES: tuple[Any, ...] = (
 )  # fmt: skip
 
 
-def spoilt_values(value: Any) -> Iterator[tuple[str, Any]]:
-    """Copies of a tree with one place spoilt, each with the name of the place."""
-    for path in _places(value):
+def spoilt_values(value: Any, *, every: int = 1) -> Iterator[tuple[str, Any]]:
+    """Copies of a tree with one place spoilt, each with the name of the place.
+
+    Args:
+        value: The tree.
+        every: Each place meets every so manyth value, the next place those after them.
+    """
+    for row, path in enumerate(_places(value)):
         for number, other in enumerate(VALUES):
-            yield f"{'.'.join(map(str, path)) or 'all'} <- {number}", _replaced(value, path, other)
+            if (row + number) % every == 0:
+                yield f"{'.'.join(map(str, path)) or 'all'} <- {number}", _replaced(value, path, other)
 
 
 def _places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
@@ -205,7 +211,7 @@ CONTENTS: dict[str, bytes] = {
     "braces": b'{"a":' * 100_000,
     "dashes": b"rooms:\n" + b"- " * 100_000,
     "levels": b"levels: " + b"{a: " * 100_000,
-    "tags": b"<a>" * 200_000,
+    "tags": b"<a>" * 50_000,
     "entities": b'<!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><Building>&b;</Building>',
     "zip-bomb": _zip_bomb(),
     "gzip-bomb": gzip.compress(b"FLASER 1 2 0 0 0 0 0 0 0 h 0\n" * 1_000_000),

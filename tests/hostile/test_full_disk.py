@@ -18,6 +18,7 @@ from closedrooms.cli.commands import main
 
 SIZE = 3_000_000
 ONE = ["--repetitions", "1", "--max-closed", "1", "--workers", "1"]
+SWEEP = ["--repetitions", "1", "--closed", "1", "--factors", "shift"]
 FEW = ["--workers", "1", "--no-tours", "--resamples", "20"]
 # What each command writes, and how much room it is left: nothing, less than the first file, less than all [kB].
 COMMANDS = {
@@ -35,12 +36,15 @@ COMMANDS = {
 GO_ON = {
     "dataset": (["dataset", "plan.json", *ONE, "--out", "DISK/out"], (0, 200)),
     "evaluate": (["evaluate", "data", "--methods", "paper", *FEW, "--out", "DISK/out"], (0, 120)),
+    "robustness": (["robustness", "plan.json", *SWEEP, "--workers", "1", "--out", "DISK/out"], (0, 40)),
 }
 # A recorder whose file cannot be written to its end keeps its thread for ever: these are processes of their own.
 RECORDING = {"run", "record", "map"}
+# These simulate for long.
+SIMULATING = {"run", "robustness"}
 PATIENCE = 120
 CASES = [
-    pytest.param(command, room, id=f"{command}-{room}", marks=[pytest.mark.slow] if command == "run" else [])
+    pytest.param(command, room, id=f"{command}-{room}", marks=[pytest.mark.slow] if command in SIMULATING else [])
     for command, (_, rooms) in (COMMANDS | GO_ON).items()
     for room in rooms
 ]

@@ -164,6 +164,7 @@ def test_workers_and_the_program_import_nothing_from_the_current_directory(input
             f"open({str(tmp_path / 'run')!r}, 'a').write({name!r})\nraise SystemExit(9)\n"
         )
     words = [str(inputs / word) if (inputs / word).exists() else word for word in COMMANDS["evaluate"]]
+    words += ["--methods", "paper", "--no-tours", "--resamples", "20"]
     code = "import sys; sys.path.pop(0); from closedrooms.cli import main; sys.exit(main())"
     done = subprocess.run(
         [sys.executable, "-c", code, *words], cwd=tmp_path, capture_output=True, text=True, check=False

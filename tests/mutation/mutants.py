@@ -4,15 +4,20 @@
 
 cosmic-ray makes the mutants, in a copy of the checkout; its own runner is not used, since it knows neither our layout
 (folders at the root that are imported as ``closedrooms.*``) nor which tests to begin with. Of every module a sample is
-drawn with a fixed seed, ``--sample 0`` takes all; ``--each`` draws so many of a folder, spread over its modules. First
-the test files that name the module are run, then the rest of its folder. What is told: killed and survived by module,
-and the diff of each survivor. ``survivors.csv`` beside this judges those that were looked at: survivors that change
-nothing a caller could see are equivalent and count for neither side.
+drawn with a fixed seed, ``--sample 0`` takes all; ``--each`` draws so many of a folder, spread over its modules. The
+tests of a folder are run once to see which functions each reaches; a mutant then meets those that reach what it
+changes, the quickest first. The same command goes on where it stopped. What is told: killed and survived by module, and
+the diff of each survivor. ``survivors.csv`` beside this judges those that were looked at: survivors that change nothing
+a caller could see are equivalent and count for neither side.
 """
 
 import argparse
 import ast
+import compileall
+import contextlib
 import difflib
+import hashlib
+import importlib
 import json
 import os
 import random
@@ -23,10 +28,13 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+import time
+import traceback
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby, islice, zip_longest
 from pathlib import Path
+from py_compile import PycInvalidationMode
 
 from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
@@ -34,6 +42,8 @@ from cosmic_ray.plugins import get_operator, operator_names
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("core", "worlds", "sim", "mapping", "navigation", "predictor", "coverage")
+# What it says of the classes of every folder is of the source, so no test is seen to reach it.
+OF_SOURCES = "tests/test_values.py"
 # Of the arithmetic those that stay in range: a sum that becomes a power is found by any test.
 ARITHMETIC = {
     "Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "FloorDiv_Mul", "FloorDiv_Div", "Mod_Sub", "Pow_Mul", "BitAnd_BitOr",
@@ -41,8 +51,14 @@ ARITHMETIC = {
 }  # fmt: skip
 # Operators that need arguments, and what no test is for: identity in place of equality, the kind of an exception.
 LEFT_OUT = re.compile(r"_Is|Is_|IsNot|_Invert|_UAdd|UAdd_|USub_Not|Variable|ExceptionReplacer|RemoveDecorator")
-# Tests that take more processor time than this hang: all of one folder take two minutes [s].
-HANGS = 400
+# Imported once, before the tests of each mutant are forked off.
+LIBRARIES = (
+    "numpy", "scipy.ndimage", "scipy.optimize", "scipy.sparse.linalg", "scipy.spatial", "shapely.ops", "cv2",
+    "PIL.Image", "yaml", "networkx", "hypothesis.extra.numpy", "_pytest.python", "sklearn.cluster",
+    "skimage.morphology", "rich.console", "defusedxml.ElementTree",
+)  # fmt: skip
+# A test that takes so many times longer than it did, and some seconds, hangs; tests that take more memory never end.
+HANGS, MORE, MEMORY = 4, 5.0, 6_000_000_000
 # After this time on a busy machine it cannot be told [s].
 PATIENCE = 1800
 
@@ -68,7 +84,7 @@ class Mutant:
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a mutant, ``killed``, ``survived`` or ``timeout`` (counts for neither side), and by which test."""
+    """Fate of a mutant, ``killed``, ``survived`` or ``timeout`` (counts for neither side), and the test that told."""
 
     module: str
     operator: str
@@ -144,17 +160,81 @@ def _differs(source: str, changed: str) -> bool:
         return False
 
 
-def test_files(root: Path, module: str) -> list[list[Path]]:
-    """The tests of a module in two lots: the files that name it, then the others of its folder."""
-    path = Path(module)
-    folder = root / "tests" / path.parts[0]
-    dotted = "closedrooms." + ".".join(path.with_suffix("").parts)
-    everything = sorted(folder.rglob("test_*.py"))
-    first = [file for file in everything if dotted in file.read_text() or file.stem == f"test_{path.stem}"]
-    return [first, [file for file in everything if file not in first]]
+@dataclass(frozen=True)
+class Reach:
+    """Code that a test of a folder reaches.
+
+    Attributes:
+        test: Its id.
+        seconds: Processor time that it took.
+        functions: Where the functions that it ran are defined, as ``module:line``.
+        processes: Whether it started any: what they run is not seen.
+    """
+
+    test: str
+    seconds: float
+    functions: frozenset[str]
+    processes: bool
 
 
-def fate(root: Path, mutant: Mutant, pytest: str) -> tuple[str, str]:
+def reaches(root: Path, folder: str, kept: Path) -> list[Reach]:
+    """What each test of a folder reaches, by running them once; taken from ``kept`` where nothing has changed since.
+
+    Raises:
+        RuntimeError: No test passes.
+    """
+    sources = sorted([*(root / folder).rglob("*.py"), *(root / "tests" / folder).rglob("*.py")])
+    key = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
+    known = json.loads(kept.read_text()) if kept.exists() else {}
+    if known.get(folder, {}).get("key") != key:
+        seen = root / "reached.json"
+        seen.unlink(missing_ok=True)
+        _, said = run_tests(root, ["-p", "reached", f"tests/{folder}"], seen=seen)
+        if not seen.exists():
+            raise RuntimeError(f"the tests of {folder} do not run:\n{said}")
+        known[folder] = {"key": key, "tests": [test for test in json.loads(seen.read_text()) if test["passed"]]}
+        kept.write_text(json.dumps(known))
+    return [
+        Reach(test["test"], test["seconds"], frozenset(test["functions"]), test["processes"])
+        for test in known[folder]["tests"]
+    ]
+
+
+def lots(source: str, mutant: Mutant, tests: Sequence[Reach]) -> list[list[str]]:
+    """The tests of a mutant in two lots, the quickest first.
+
+    First those that reach the function that it changes; what it changes outside of functions is reached by all that
+    reach the module. Then the others of their files, with which they may share a set-up, and those that start
+    processes. Nothing else of the folder runs the line, but for what a cache remembers: a mutant that lives is to be
+    looked at.
+    """
+    inside = [
+        node
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.FunctionDef | ast.Lambda) and _first(node) <= mutant.line <= (node.end_lineno or 0)
+    ]
+    place = f"{mutant.module}:{max(map(_first, inside), default=0)}"
+    reaching = {test.test for test in tests if place in test.functions}
+    if not inside or not reaching:
+        reaching = {test.test for test in tests if any(f.startswith(f"{mutant.module}:") for f in test.functions)}
+    files = {test.partition("::")[0] for test in reaching}
+    quickest = sorted(tests, key=lambda test: test.seconds)
+    first = [*([] if inside else [OF_SOURCES]), *(test.test for test in quickest if test.test in reaching)]
+    others = [
+        test.test
+        for test in quickest
+        if test.test not in reaching and (test.processes or test.test.partition("::")[0] in files)
+    ]
+    return [lot for lot in (first, others) if lot]
+
+
+def _first(node: ast.FunctionDef | ast.Lambda) -> int:
+    # As the interpreter counts: a decorated function begins at its first decorator.
+    decorators = node.decorator_list if isinstance(node, ast.FunctionDef) else []
+    return min([node.lineno, *(decorator.lineno for decorator in decorators)])
+
+
+def fate(root: Path, mutant: Mutant, tests: Sequence[Reach]) -> tuple[str, str]:
     """Put a mutant in its place, run the tests and put the module back.
 
     Returns:
@@ -162,37 +242,95 @@ def fate(root: Path, mutant: Mutant, pytest: str) -> tuple[str, str]:
     """
     path = root / mutant.module
     original = path.read_text()
-    environment = os.environ | {
-        "PYTHONPATH": str(root / ".typing"),
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "OMP_NUM_THREADS": "1",
-        "OPENBLAS_NUM_THREADS": "1",
-    }
     try:
         path.write_text(mutant.changed)
-        for lot in test_files(root, mutant.module):
-            if not lot:
-                continue
-            words = [pytest, "-x", "-q", "-p", "no:cacheprovider", *map(str, lot)]
-            try:
-                done = subprocess.run(
-                    words, cwd=root, env=environment, capture_output=True, timeout=PATIENCE, check=False,
-                    preexec_fn=_end_hangs,
-                )  # fmt: skip
-            except subprocess.TimeoutExpired:
+        for lot in lots(original, mutant, tests):
+            listed = root / "lot.txt"
+            listed.write_text("\n".join(lot))
+            status, said = run_tests(root, ["-x", f"@{listed}"], usual={test.test: test.seconds for test in tests})
+            if status is None:
                 return "timeout", ""
-            if done.returncode not in {0, 5}:
-                noticed = re.search(rb"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
-                return "killed", noticed[1].decode() if noticed else f"status {done.returncode}"
+            if status not in {0, 5}:
+                noticed = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - |$)", said, re.MULTILINE)
+                return "killed", noticed[1] if noticed else f"status {status}"
         return "survived", ""
     finally:
         path.write_text(original)
 
 
-def _end_hangs() -> None:
+def run_tests(
+    root: Path, words: Sequence[str], *, seen: Path | None = None, usual: Mapping[str, float] | None = None
+) -> tuple[int | None, str]:
+    """Run pytest in a child of this process, which has the libraries already.
+
+    Args:
+        root: The copy of the checkout.
+        words: Arguments of pytest.
+        seen: Where the plugin ``reached`` writes.
+        usual: Processor time that each test takes as a rule; the child ends at the first that hangs.
+
+    Returns:
+        Its status, ``None`` where there was no answer in time, and what it said.
+    """
+    with tempfile.TemporaryFile("w+") as said:
+        child = os.fork()
+        if child == 0:
+            try:
+                _become_tests(root, said.fileno(), seen)
+                import pytest
+
+                # hypothesis, which pytest would rewrite, is imported already.
+                words = ["-W", "ignore::pytest.PytestAssertRewriteWarning", *words]
+                words = ["-q", "-p", "no:cacheprovider", "-p", "no:xdist", *words]
+                status = int(pytest.main(words, plugins=[] if usual is None else [_Watch(usual)]))
+            except BaseException:
+                traceback.print_exc()
+                status = 99
+            sys.stdout.flush()
+            os._exit(status)
+        end = time.monotonic() + PATIENCE
+        while (ended := os.waitpid(child, os.WNOHANG))[0] == 0 and time.monotonic() < end:
+            time.sleep(0.1)
+        if ended[0] == 0:
+            os.killpg(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+        said.seek(0)
+        return (os.waitstatus_to_exitcode(ended[1]) if ended[0] else None), said.read()
+
+
+class _Watch:
+    """Plugin of pytest: a test that hangs ends the process by SIGPROF."""
+
+    def __init__(self, usual: Mapping[str, float]) -> None:
+        self._usual = usual
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        signal.setitimer(signal.ITIMER_PROF, HANGS * self._usual.get(nodeid, 30.0) + MORE)
+
+    def pytest_runtest_logfinish(self, nodeid: str) -> None:  # noqa: ARG002 (pytest gives it)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+
+
+def _become_tests(root: Path, said: int, seen: Path | None) -> None:
+    os.setsid()
+    os.dup2(said, 1)
+    os.dup2(said, 2)
+    os.chdir(root)
+    sys.path.insert(0, str(root / ".typing"))
+    os.environ |= {
+        "PYTHONPATH": str(root / ".typing"), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
+        "REACHED": str(seen or ""),
+    }  # fmt: skip
     # A job in the background of a script ignores Ctrl-C, and so would the tests of it.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    resource.setrlimit(resource.RLIMIT_CPU, (HANGS, HANGS))
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+
+
+def _warm() -> None:
+    """Import what the tests import, but for our own."""
+    for name in LIBRARIES:
+        with contextlib.suppress(ImportError):
+            importlib.import_module(name)
 
 
 def _copy(root: Path) -> None:
@@ -212,6 +350,8 @@ def _copy(root: Path) -> None:
     (root / ".typing").mkdir(exist_ok=True)
     if not (root / ".typing" / "closedrooms").exists():
         (root / ".typing" / "closedrooms").symlink_to("..")
+    # By the content of the source, not by its time: a mutant of the same second and size is compiled again.
+    compileall.compile_dir(root, quiet=1, invalidation_mode=PycInvalidationMode.CHECKED_HASH)
 
 
 def _modules(wanted: list[str]) -> list[str]:
@@ -227,19 +367,22 @@ def main() -> int:
     parser.add_argument("--sample", type=int, default=5, help="places a module; 0 for all")
     parser.add_argument("--each", type=int, default=0, help="places a folder, in place of --sample")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--pytest", default=str(Path(sys.executable).with_name("pytest")))
     parser.add_argument("--out", type=Path, default=Path("mutants.json"))
     options = parser.parse_args()
-    # The same command goes on where it stopped.
     results = [Result(**value) for value in json.loads(options.out.read_text())] if options.out.exists() else []
     done = {(result.module, result.operator, result.occurrence) for result in results}
+    kept, reach = options.out.with_suffix(".reached.json"), dict[str, list[Reach]]()
+    _warm()
     with tempfile.TemporaryDirectory(prefix="mutants-") as scratch:
-        root = Path(scratch)
+        root = Path(scratch).resolve()
         _copy(root)
         for mutant in _drawn(root, options):
             if (mutant.module, mutant.operator, mutant.occurrence) in done:
                 continue
-            outcome, noticed = fate(root, mutant, options.pytest)
+            folder = Path(mutant.module).parts[0]
+            if folder not in reach:
+                reach[folder] = reaches(root, folder, kept)
+            outcome, noticed = fate(root, mutant, reach[folder])
             before = (root / mutant.module).read_text()
             lines = difflib.unified_diff(before.splitlines(), mutant.changed.splitlines(), n=0, lineterm="")
             diff = "\n".join(line for line in lines if not line.startswith(("---", "+++", "@@")))

@@ -22,7 +22,7 @@ RESOLUTION, BEAMS, RANGE, RADIUS = 0.05, 180, 6.0, 0.2
 
 
 class CellWorld:
-    """Walls are cells; the robot is a disc that stops at them."""
+    """World whose walls are cells; the robot is a disc that stops at them."""
 
     period = 0.1
 
@@ -56,7 +56,7 @@ class CellWorld:
 
 
 class CellMapper:
-    """Draws every fourth scan at the true pose."""
+    """Mapper that draws every fourth scan at the true pose."""
 
     def __init__(self, shape: tuple[int, int]) -> None:
         self._cells = np.full(shape, -1, dtype=np.int8)
@@ -92,7 +92,7 @@ class CellMapper:
 
 
 class Notes:
-    """Keeps what an exploration tells."""
+    """Record of what an exploration tells."""
 
     def __init__(self) -> None:
         self.goals: list[tuple[float, float]] = []

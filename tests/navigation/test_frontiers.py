@@ -4,7 +4,7 @@ import pytest
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.costmap import NavigationMap
+from closedrooms.navigation.driving.costmap import NavigationMap
 from closedrooms.navigation.frontiers import Frontiers, find_frontiers, seen_from, still_unknown
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())

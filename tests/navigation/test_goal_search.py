@@ -42,3 +42,29 @@ def test_a_gap_that_the_robot_never_came_through_keeps_its_margin() -> None:
 
 def test_a_gap_narrower_than_the_robot_stays_shut() -> None:
     assert search_from(LEFT).find(RIGHT, two_rooms(5)) is None
+
+
+def hall(patch: float) -> OccupancyGrid:
+    """A hall of 14 x 3 m, walled in, with a square of unknown floor of so many metres a side at its far end."""
+    cells = np.full((80, 300), OCCUPIED, dtype=np.int8)
+    cells[10:70, 10:290] = FREE
+    cells[40 : 40 + round(patch / 0.05), 250 : 250 + round(patch / 0.05)] = UNKNOWN
+    return OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 80, 300), cells)
+
+
+@pytest.mark.parametrize(("patch", "worth", "gone"), [(0.6, 40.0, True), (0.6, 15.0, False), (0.9, 15.0, True)])
+def test_the_robot_goes_for_a_patch_as_far_as_its_area_is_worth(patch: float, worth: float, gone: bool) -> None:
+    # About 9.5 to 12 m away: 0.36 m2 are worth 14.4 or 5.4 m, 0.81 m2 are worth 12.2 m.
+    search = GoalSearch(NavigationConfig(worth=worth).for_robot(RobotConfig()))
+    goal = search.find(Pose2(2.0, 2.0), hall(patch))
+    assert (goal is not None) == gone
+    if goal is not None:
+        assert goal.place[0] > 11.0
+        assert goal.path.length <= worth * patch**2
+
+
+def test_a_large_patch_is_worth_any_distance() -> None:
+    search = GoalSearch(NavigationConfig(worth=0.01).for_robot(RobotConfig()))
+    goal = search.find(Pose2(2.0, 2.0), hall(1.5))
+    assert goal is not None
+    assert goal.place[0] > 11.0

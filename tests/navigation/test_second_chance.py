@@ -6,6 +6,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
+from closedrooms.navigation.decider import Situation
 from closedrooms.navigation.explorer import CHANCES, Explorer
 
 
@@ -25,7 +26,7 @@ def explorer() -> Explorer:
 
 def command(explorer: Explorer, stamp: float) -> tuple[float, float]:
     scan = LaserScan(np.full(360, np.inf), -np.pi, 2 * np.pi / 360, 20.0, 0.05, stamp=stamp)
-    return explorer.command(Pose2(1.0, 1.5, 0.0), scan, corridor)
+    return explorer.command(Situation(Pose2(1.0, 1.5, 0.0), scan, corridor))
 
 
 # What held the robot up, right across the corridor.

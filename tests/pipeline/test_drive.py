@@ -11,7 +11,7 @@ from closedrooms.coverage.tour.tour_planner import plan_coverage
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.tour_follower import TourPlan
+from closedrooms.navigation.tour.tour_follower import TourPlan
 from closedrooms.pipeline.drive import DriveSettings, Porter, drive_tour
 from closedrooms.pipeline.reporting.drive_report import drive_metrics
 from closedrooms.pipeline.reporting.progress import Silent
@@ -54,7 +54,7 @@ def test_the_tour_of_a_small_office_is_driven_and_every_room_is_seen() -> None:
 
 
 class _Told:
-    """Stands for simulation, map, follower and recorder at once; remembers what was asked of it."""
+    """Stand-in for simulation, map, follower and recorder at once; remembers what was asked of it."""
 
     def __init__(self, first: list[str]) -> None:
         self.first, self.opened, self.map, self.notes = first, [], [], []

@@ -49,7 +49,7 @@ def test_the_limit_of_time_ends_a_survey_with_the_map_so_far(flat: FloorPlan) ->
 
 
 class Bumps(RunLog):
-    """Counts the steps in which the robot touched something."""
+    """Count of the steps in which the robot touched something."""
 
     count = 0
 

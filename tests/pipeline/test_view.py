@@ -6,6 +6,7 @@ import sys
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -101,3 +102,35 @@ def test_with_web_a_browser_gets_the_viewer_until_ctrl_c(tmp_path: Path) -> None
     assert server.returncode == 130
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(page, timeout=10)
+
+
+def test_a_killed_command_leaves_no_viewer_behind(tmp_path: Path) -> None:
+    pytest.importorskip("rerun")
+    # What is started is the viewer, no script that would start it out of our reach.
+    assert Path(view.find_viewer()).read_bytes()[:2] != b"#!"
+    code = "from closedrooms.pipeline.view import _wait_for; _wait_for(['sleep', '987'])"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, env=environment)
+    children = Path(f"/proc/{command.pid}/task/{command.pid}/children")
+
+    def started() -> list[int]:
+        pids = map(int, children.read_text().split())
+        return [pid for pid in pids if b"987" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+
+    assert wait_for(lambda: bool(started()))
+    (viewer,) = started()
+    command.kill()
+    command.wait()
+    assert wait_for(lambda: not Path(f"/proc/{viewer}/cmdline").exists() or is_dead(viewer))
+
+
+def is_dead(pid: int) -> bool:
+    """Whether a process has ended and only waits to be asked for its status."""
+    return "State:\tZ" in Path(f"/proc/{pid}/status").read_text()
+
+
+def wait_for(happened: Callable[[], bool], seconds: float = 30.0) -> bool:
+    end = time.monotonic() + seconds
+    while not happened() and time.monotonic() < end:
+        time.sleep(0.05)
+    return happened()

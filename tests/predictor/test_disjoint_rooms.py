@@ -39,7 +39,7 @@ def drawn_rooms(draw):
 
 
 @given(drawn_rooms())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_parted_rooms_share_nothing_lie_in_what_they_were_and_begin_at_their_doors(drawn) -> None:
     rooms, doors = drawn
     parted, failures = part_rooms(rooms, doors)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
@@ -13,7 +13,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.predictor.best.door_frame import Window, door_frame, turn_map
 from closedrooms.predictor.paper import unknown_faces as unknown
-from closedrooms.predictor.paper.arrangement import arrange
+from closedrooms.predictor.paper.arrangement import build_arrangement
 from closedrooms.predictor.paper.lines import Line, _chain, _join_closest
 from closedrooms.predictor.structure.edges import STRIP, find_edges
 from closedrooms.predictor.structure.wall_directions import WallDirections
@@ -55,6 +55,7 @@ def test_only_edges_near_a_door_tell_its_direction(y, angle):
     assert directions.at(ClosedDoor("d", (2.5, y))) == angle
 
 
+@settings(max_examples=40)
 @given(st.lists(st.tuples(SPREAD, st.floats(0.1, 1.5), SPREAD), min_size=1, max_size=30))
 def test_segments_chain_as_in_a_table_of_all_pairs(segments):
     ends = np.array([[(low, across), (low + length, across)] for low, length, across in segments])
@@ -82,7 +83,7 @@ def test_faces_counted_strip_by_strip_have_the_same_shares(slanted, monkeypatch)
     boundary = tuple(Line(0.0, y, "border") for y in (y0 - 1.0, y1 + 1.0))
     boundary += tuple(Line(math.pi / 2, -x, "border") for x in (x1 + 1.0, x0 - 1.0))
     lines = [Line(math.radians(a), o) for a in (0.0, 20.0, 110.0) for o in np.arange(-20.0, 20.0, 1.7)]
-    arrangement = arrange(lines, boundary)
+    arrangement = build_arrangement(lines, boundary)
     assert len(arrangement.faces) > 200
     whole = unknown.observed_shares(arrangement, slanted)
     assert whole[0].max() > 0.9

@@ -15,7 +15,8 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
 from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.contacts import SKIN, Obstacles, edges_of, move_disc
-from closedrooms.sim.differential_drive import Drive, Motion
+from closedrooms.sim.robot.differential_drive import Drive
+from closedrooms.sim.robot.driven_robot import Motion
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.library import bundled_names, load_world
 from closedrooms.worlds.plan import FloorPlan

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from closedrooms.core.pose import Pose2
 from closedrooms.sim.config import NOISE_LEVELS, NoiseConfig
-from closedrooms.sim.differential_drive import Motion
 from closedrooms.sim.odometry import Odometry
+from closedrooms.sim.robot.driven_robot import Motion
 
 RUNS = 700
 QUIET = NoiseConfig(distance=0.0, turn_per_metre=0.0, turn=0.0)

@@ -12,7 +12,8 @@ import pytest
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.sim.config import SimConfig
-from closedrooms.sim.physics_world import PhysicsWorld, check_display
+from closedrooms.sim.physics_world import PhysicsWorld
+from closedrooms.sim.pybullet_process import check_display
 
 DRIVE = """
 import hashlib, sys

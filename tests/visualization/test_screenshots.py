@@ -64,12 +64,14 @@ def test_no_view_of_a_run_is_empty_at_any_moment(tmp_path: Path, method: str) ->
         out=tmp_path / "pictures",
         sim_times=(0.0, seconds / 2, seconds),
         stages=tuple(int(stage) for stage in STAGES),
-        settle=0.6,
+        # What is found out once is static: it shows the same at every moment.
+        unchanging=("Weighing", "Coverage", "Log", "Result"),
+        window=(1100, 700),
     )
     shots = screenshots.take(config)
     tabs = {shot.tab.split(" - ")[0] for shot in shots}
     own = {"Evidence", "Weighing"} if method == "best" else {"Structure", "Expansion"}
-    assert tabs == {"Building", "Mapping", "Rooms", "How sure", "Coverage", "Result"} | own
+    assert tabs == {"Building", "Mapping", "Rooms", "How sure", "Coverage", "Log", "Result"} | own
     assert {(shot.tab, shot.moment): shot.empty for shot in shots if shot.empty} == {}
 
 
@@ -83,7 +85,7 @@ def test_a_tab_for_what_the_recording_does_not_hold_is_found_empty(tmp_path: Pat
         recorder.map(grid, 0.0)
         # What the recorder never does.
         recorder._holds = replace(recorder._holds, truth=True, room_iou=True)
-    shots = screenshots.take(screenshots.ScreenshotConfig(recording=path, out=tmp_path, settle=0.6))
+    shots = screenshots.take(screenshots.ScreenshotConfig(recording=path, out=tmp_path, patience=3.0))
     empty = {view for shot in shots for view in shot.empty if shot.tab == "Rooms"}
     assert any(view.startswith("Truth") for view in empty), empty
     assert any(view.startswith("IoU") for view in empty), empty

@@ -250,10 +250,48 @@ def test_a_proposal_is_accepted_another_dismissed_and_a_door_renamed_turned_and_
         page.get_by_role("button", name="door kitchen").focus()
         page.keyboard.press("Enter")
         page.locator(".handle-chosen").wait_for(timeout=WAIT)
+        # Doors are drawn anew; the focus stays on the one that was reached by keys.
+        page.keyboard.press("ArrowUp")
+        visitor.wait("^1 room behind 1 door")
+        page.wait_for_function("document.activeElement.getAttribute('aria-label') === 'chosen kitchen <b>'")
         page.locator("body").press("Delete")
         visitor.wait("click on a wall")
         # A narrow screen shows all of the page without a sideways scroll.
         assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+
+
+def test_ctrl_s_saves_from_within_a_field_and_keys_work_after_a_name_was_typed(
+    corridor: Path, tmp_path: Path, serve: Serve, chromium: Any
+) -> None:
+    server = serve(corridor, "--out", tmp_path / "saved")
+    with visiting(chromium, server.address) as visitor:
+        visitor.click(*CLICKS[0])
+        visitor.wait("^1 room behind 1 door")
+        name = visitor.page.locator("[data-id=doors] input").first
+        name.fill("kitchen")
+        name.press("Enter")
+        visitor.page.locator("[data-door=kitchen]").wait_for(timeout=WAIT)
+        visitor.page.keyboard.press("Escape")
+        visitor.page.locator(".handle-chosen").wait_for(state="detached")
+        visitor.page.locator("[data-door=kitchen]").click()
+        visitor.page.keyboard.press("Control+s")
+        visitor.page.get_by_text(f"saved to {tmp_path / 'saved'}").wait_for(timeout=WAIT)
+        visitor.page.keyboard.press("Control+s")
+        visitor.answer("keep it")
+    assert [door.id for door in read_doors(tmp_path / "saved" / "doors.geojson")] == ["kitchen"]
+
+
+def test_a_room_beyond_the_view_is_shown_by_a_key(corridor: Path, serve: Serve, chromium: Any) -> None:
+    server = serve(corridor)
+    with visiting(chromium, server.address) as visitor:
+        visitor.click(*CLICKS[0])
+        visitor.wait("^1 room behind 1 door")
+        visitor.page.locator("body").press("Escape")
+        for _ in range(20):
+            visitor.page.locator("body").press("ArrowRight")
+        visitor.page.wait_for_function("() => document.querySelector('.handle-note').getBoundingClientRect().x < 0")
+        visitor.page.locator("body").press("0")
+        visitor.page.wait_for_function("() => document.querySelector('.handle-note').getBoundingClientRect().x > 0")
 
 
 def test_the_tour_the_completed_map_and_another_method_can_be_chosen(
@@ -293,6 +331,10 @@ def test_a_hostile_map_and_a_hostile_list_of_doors_are_told_on_the_page(
             visitor.page.get_by_label("take doors from a GeoJSON file").click()
         chooser.value.set_files({"name": "<i>.geojson", "mimeType": "text/plain", "buffer": b"[" * 100_000})
         visitor.page.get_by_text("broken JSON").or_(visitor.page.get_by_text("nested")).first.wait_for(timeout=WAIT)
+        with visitor.page.expect_file_chooser() as chooser:
+            visitor.page.get_by_label("take doors from a GeoJSON file").click()
+        chooser.value.set_files({"name": "big.geojson", "mimeType": "text/plain", "buffer": b" " * 20_000_001})
+        visitor.page.get_by_text("more than 20 MB").wait_for(timeout=WAIT)
         assert visitor.names() == []
     server.stop()
     corridor.write_text("image: map.png\nresolution: -1\norigin: [0, 0, 0]\n")

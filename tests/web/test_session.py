@@ -1,14 +1,17 @@
+import json
 import math
+import tempfile
 from pathlib import Path
 
 import pytest
 
-from closedrooms.core.errors import OutputError
+from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError
 from closedrooms.core.files.geojson import read_doors, read_rooms
 from closedrooms.core.pose import Pose2
 from closedrooms.pipeline.config import PredictConfig
 from closedrooms.pipeline.predict import predict_map
 from closedrooms.web.config import EditConfig
+from closedrooms.web.document import MOST_DOORS
 from closedrooms.web.drafts import Drafts
 from closedrooms.web.session import NO_WALL, EditSession
 from closedrooms.web.sheet import open_sheet
@@ -126,16 +129,31 @@ def test_hostile_doors_are_told_and_change_nothing(corridor: Path, tmp_path: Pat
     before = session.document
     for content in (b"", b"\xff\xfe", b"[" * 9999, b'{"type": "Polygon", "coordinates": [[[0,0],[1,0],[1,1],[0,0]]]}',
                     b'{"type": "Point", "coordinates": [1e12, 0]}', b'{"type": "Feature"}'):  # fmt: skip
-        told = session.load_doors("../../etc/x.geojson", content)
-        assert told
-        assert str(tmp_path) not in told
-        assert "\n" not in told
+        with pytest.raises(ClosedroomsError) as refused:
+            session.load_doors("../../etc/x.geojson", content)
+        assert str(tmp_path) not in str(refused.value)
+        assert tempfile.gettempdir() not in str(refused.value)
+        assert "\n" not in str(refused.value)
         assert session.document is before
-    assert session.load_doors("a", b'{"type": "Point", "coordinates": [3, 0]}') == ""
+    told = session.load_doors("a", b'{"type": "Point", "coordinates": [3, 0]}')
+    assert told == "1 door read from a, in place of those that were here"
     assert [door.id for door in session.document.doors] == ["d00"]
     broken = tmp_path / "broken.geojson"
     broken.write_text("{")
     assert "broken JSON" in begin(corridor, doors=broken).trouble
+
+
+def test_more_doors_than_a_browser_draws_are_refused_from_the_start_and_later(corridor: Path, tmp_path: Path) -> None:
+    points = [[0.01 * number, 0.0] for number in range(MOST_DOORS + 1)]
+    content = json.dumps({"type": "Feature", "geometry": {"type": "MultiPoint", "coordinates": points}}).encode()
+    many = tmp_path / "many.geojson"
+    many.write_bytes(content)
+    session = begin(corridor, doors=many)
+    assert session.document.doors == ()
+    assert session.trouble.startswith(f"{MOST_DOORS + 1} doors; expected at most {MOST_DOORS} on the page")
+    with pytest.raises(InvalidInputError, match=f"at most {MOST_DOORS}"):
+        session.load_doors("many.geojson", content)
+    assert session.document.doors == ()
 
 
 def test_a_prediction_that_fails_is_told(corridor: Path, monkeypatch: pytest.MonkeyPatch) -> None:

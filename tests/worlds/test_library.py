@@ -4,7 +4,7 @@ import pytest
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.worlds.formats.native import read_plan, write_plan
-from closedrooms.worlds.library import DEFAULT_WORLD, bundled_names, load_world, read_world
+from closedrooms.worlds.library import DEFAULT_WORLD, bundled_names, load_world, read_world, world_source
 from closedrooms.worlds.plan import FloorPlan, PlanDoor
 
 
@@ -49,3 +49,15 @@ def test_entrances_are_walled_up_for_a_robot_and_kept_for_conversion(small: Floo
     assert load_world(str(path)).doors == small.doors
     assert load_world(str(path)).meta["sealed"] == ["e0"]
     assert read_world(str(path)) == read_plan(path)
+
+
+def test_a_world_is_named_so_that_any_folder_finds_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "office-01").write_text("a file of the name of a bundled world")
+    (tmp_path / "plan.building.yaml").write_text("levels: {}")
+    (tmp_path / "noon:12.json").write_text("{}")
+    assert world_source("office-01") == "office-01"
+    assert world_source("plan.building.yaml:L1") == f"{tmp_path.resolve()}/plan.building.yaml:L1"
+    assert world_source("noon:12.json") == f"{tmp_path.resolve()}/noon:12.json"
+    with pytest.raises(InvalidInputError, match="unknown world"):
+        world_source("nowhere.json")

@@ -16,7 +16,7 @@ ROW = 11
 
 
 class Curves:
-    """Store of what belongs into curves, sent as whole columns: many times cheaper than one call a value."""
+    """Store of what is plotted as curves, sent as whole columns: many times cheaper than one call a value."""
 
     def __init__(self, stream: RecordingStream) -> None:
         self._stream = stream
@@ -63,7 +63,7 @@ class Curves:
             value: The value.
             name: Of the curve, for people.
             colour: Of the curve.
-            stamp: When [s]; ``None`` where no time goes by.
+            stamp: Timestamp [s]; ``None`` where no time goes by.
             stage: At which stage.
             dots: Mark the values.
         """
@@ -122,6 +122,7 @@ class Curves:
         self._send("metrics/odometry_error/position", stamps[given], drift, "odometry", colours.ODOMETRY)
 
     def _send(self, path: str, stamps: FloatArray, values: FloatArray, name: str, colour: colours.Colour) -> None:
+        """Send a whole curve over its stamps [s]; over the stages its first and last value stand for it."""
         self._stream.log(path, rr.SeriesLines(colors=[colour], names=[name], widths=[1.5]), static=True)
         self._stream.columns(path, rr.Scalars.columns(scalars=values), stamps=stamps)
         if len(values):

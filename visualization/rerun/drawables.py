@@ -65,7 +65,7 @@ def picture(pixels: npt.NDArray[np.uint8], frame: GridFrame) -> rr.GridMap:
     )
 
 
-def fill(shapes: Sequence[BaseGeometry], colour: Colour, *, alpha: int = 110, z: float = Z_FILL) -> rr.Mesh3D:
+def filled(shapes: Sequence[BaseGeometry], colour: Colour, *, alpha: int = 110, z: float = Z_FILL) -> rr.Mesh3D:
     """Fill polygons with one colour; ``alpha`` from 0 to 255."""
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(np.asarray(list(shapes), dtype=object)))
     corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)

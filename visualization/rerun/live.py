@@ -73,12 +73,18 @@ def _program() -> str:
 
 
 def _free_port() -> int:
+    """Find a port of this machine that nobody uses now."""
     with socket.socket() as probe:
         probe.bind((HOST, 0))
         return int(probe.getsockname()[1])
 
 
 def _wait_for(viewer: "subprocess.Popen[bytes]", port: int) -> None:
+    """Wait until the viewer listens.
+
+    Raises:
+        InvalidInputError: It ended before, or took too long.
+    """
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end and viewer.poll() is None:
         with contextlib.suppress(OSError), socket.create_connection((HOST, port), timeout=1.0):

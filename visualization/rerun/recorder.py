@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import rerun as rr
-import shapely
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor, Point
@@ -18,43 +17,31 @@ from closedrooms.core.names import markdown_text
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.core.scan import LaserScan
-from closedrooms.core.shapes import Shape
+from closedrooms.core.shapes import Shape, polygon_iou
 from closedrooms.visualization import colours
 from closedrooms.visualization.rerun import drawables
-from closedrooms.visualization.rerun.blueprint import Bounds, Contents, arrange
+from closedrooms.visualization.rerun.blueprint import make_blueprint
 from closedrooms.visualization.rerun.curves import Curves
-from closedrooms.visualization.rerun.prediction import draw_doors, draw_input, draw_rooms, draw_tours, draw_trace
+from closedrooms.visualization.rerun.documents import LEGEND, configuration_text, room_line, rooms_table, text_document
+from closedrooms.visualization.rerun.drawn_prediction import draw_doors, draw_input, draw_rooms, draw_tours, draw_trace
+from closedrooms.visualization.rerun.recorded_robot import RecordedRobot
 from closedrooms.visualization.rerun.stream import RecordingStream, Stage
 from closedrooms.visualization.rerun.sureness import draw_nothing_yet, draw_sureness
+from closedrooms.visualization.rerun.tabs import Contents
+from closedrooms.visualization.rerun.views import Bounds
 from closedrooms.visualization.rerun.weighed import draw_weighed, room_name
 
 if TYPE_CHECKING:
     from closedrooms.coverage.tour.coverage_tour import CoverageTour
     from closedrooms.predictor.prediction import Level, Prediction
     from closedrooms.sim.bystanders import Mover
-    from closedrooms.visualization.rerun.building import RecordedBuilding
+    from closedrooms.visualization.rerun.recorded_building import RecordedBuilding
     from closedrooms.worlds.plan import FloorPlan
 
-# Out of ten scans a second two are kept, and a map every two seconds: what the eye can follow.
-SCAN_PERIOD, MAP_PERIOD = 0.5, 2.0
-# Scans are handed over in batches of this size.
-SCAN_BATCH = 64
-# A vertex of a drawn path every so many metres.
-PATH_STEP = 0.1
+# A map every so often: what the eye can follow [s].
+MAP_PERIOD = 2.0
 NOTHING = np.zeros((0, 2))
-LEGEND = """| colour | what |
-| --- | --- |
-| blue | estimated robot and path |
-| green | true robot and path |
-| orange | odometry |
-| sky blue | scan |
-| red | closed doors |
-| pink | frontiers |
-| yellow | goal and the way there |
-| violet | loops that were closed |
-| ochre | people and boxes that move |
-| crimson | where the robot touched something |
-"""
+MAPS = {"closed": "map with its closed doors", "predicted": "predicted map", "truth": "true map"}
 
 
 class Recorder:
@@ -87,22 +74,18 @@ class Recorder:
         self._curves = Curves(self._stream)
         self._holds = Contents()
         self._bounds = bounds
-        self._radius = robot_radius
+        self._robot = RecordedRobot(self._stream, robot_radius)
         self._building: RecordedBuilding | None = None
         self._palette: dict[str, colours.Colour] = {}
         self._stage: int = Stage.BUILDING
-        self._scans: list[tuple[float, int, FloatArray]] = []
-        self._paths: dict[str, list[Point]] = {"odometry": [], "estimate": [], "truth": []}
         self._seen: set[str] = set()
-        self._floor, self._quarters = 0.0, 0
         self._grids: dict[str, OccupancyGrid] = {}
         self._truth: dict[str, Shape] = {}
-        self._touched: list[Point] = []
-        self._last_scan = self._last_map = -np.inf
+        self._last_map = -np.inf
 
     def __enter__(self) -> Self:
         self._stream.__enter__()
-        self._stream.log("legend", _markdown(LEGEND), static=True)
+        self._stream.log("legend", text_document(LEGEND), static=True)
         self._stream.at(stage=Stage.BUILDING)
         return self
 
@@ -116,7 +99,7 @@ class Recorder:
                 self._curves.send_errors()
                 self._curves.send_stages(self._last_stage())
                 self._hold(reference=self._curves.has_reference)
-                self._stream.arrange(arrange(self._holds, self._bounds))
+                self._stream.arrange(make_blueprint(self._holds, self._bounds))
         finally:
             self._stream.__exit__(kind, error, trace)
 
@@ -129,14 +112,13 @@ class Recorder:
     def configuration(self, values: Mapping[str, object]) -> None:
         """Record the configuration as it was resolved; paths (``out``) are left out, so that equal runs stay equal."""
         kept = {key: value for key, value in values.items() if key != "out"}
-        text = json.dumps(kept, indent=2, default=str)
         self._hold(configuration=True)
-        self._stream.log("configuration", _markdown(f"# Configuration\n```json\n{text}\n```"), static=True)
+        self._stream.log("configuration", text_document(configuration_text(kept)), static=True)
         self._stream.property("configuration", {key: json.dumps(value, default=str) for key, value in kept.items()})
 
     def building(self, plan: "FloorPlan", map_T_world: Pose2, closed: Collection[str]) -> None:
         """Record walls, floors and doors in three dimensions."""
-        from closedrooms.visualization.rerun.building import RecordedBuilding
+        from closedrooms.visualization.rerun.recorded_building import RecordedBuilding
         from closedrooms.worlds.truth import truth_bounds
 
         self._palette = colours.room_colours(closed)
@@ -146,20 +128,19 @@ class Recorder:
         self._stream.say("Building", text)
         self.note(f"{text}: {', '.join(sorted(closed)) or 'none'}")
         self._bounds = truth_bounds(plan, map_T_world)
-        self._floor = float(sum(room.polygon.area for room in plan.rooms))
         self._building = RecordedBuilding(self._stream, plan, map_T_world, closed)
-        self._draw_robot("building/robot", colours.TRUTH)
+        self._robot.draw_body("building/robot", colours.TRUTH)
         self._hold(building=True, door_states=bool(closed), active="Building")
 
     def door_states(self, states: Mapping[str, float], stamp: float) -> None:
-        """Record doors that move."""
+        """Record how far doors are open, by id: 0 closed, 1 open; ``stamp`` is the simulated time [s]."""
         if self._building is not None:
             self._stream.at(stamp, self._stage)
             self._building.move(states)
 
     def movers(self, movers: Sequence["Mover"], stamp: float) -> None:
         """Record where people and boxes are that move by themselves, as often as scans are kept."""
-        if self._building is not None and movers and self._last_scan == stamp:
+        if self._building is not None and movers and self._robot.last_scan == stamp:
             self._stream.at(stamp, self._stage)
             self._building.draw_movers(movers)
 
@@ -167,13 +148,8 @@ class Recorder:
         """Record where something pressed against the robot, by directions in its frame [rad]."""
         if not bumps:
             return
-        ends = self._radius * np.column_stack((np.cos(bumps), np.sin(bumps)))
-        first = not self._touched
-        self._touched += [(float(x), float(y)) for x, y in map_T_robot.transform(ends)]
         self._stream.at(stamp, self._stage)
-        places = np.array(self._touched)
-        self._stream.log("map/contacts", drawables.points(places, colours.CONTACT, radius=2 * drawables.THICK))
-        if first:
+        if self._robot.draw_contacts(bumps, map_T_robot):
             self.note("the robot touches something for the first time", stamp)
 
     def scan(self, scan: LaserScan, odometry: Pose2, map_T_robot: Pose2, *, truth: Pose2 | None = None) -> None:
@@ -181,20 +157,12 @@ class Recorder:
         if len(self._curves) == 1:
             self._begin_mapping(scan.stamp)
         if not len(self._curves):
-            self._draw_robot("map/robot", colours.ESTIMATE)
-            style = rr.Points3D.from_fields(colors=[colours.SCAN], radii=[drawables.MEDIUM])
-            self._stream.log("map/scan", style, static=True)
+            self._robot.draw_body("map/robot", colours.ESTIMATE)
+            self._robot.style_scans()
         self._curves.add_poses(scan.stamp, self._stage, odometry, map_T_robot, truth)
-        for name, pose in {"odometry": odometry, "estimate": map_T_robot, "truth": truth}.items():
-            path = self._paths[name]
-            if pose is not None and (not path or np.hypot(pose.x - path[-1][0], pose.y - path[-1][1]) > PATH_STEP):
-                path.append((pose.x, pose.y))
-        if scan.stamp >= self._last_scan + SCAN_PERIOD - 1e-6:
-            self._last_scan = scan.stamp
-            ends = map_T_robot.transform(Pose2(*scan.robot_T_sensor).transform(scan.points_sensor()))
-            self._scans.append((scan.stamp, self._stage, ends))
-            if len(self._scans) >= (1 if self._stream.live else SCAN_BATCH):
-                self._send_scans()
+        self._robot.add_poses(odometry, map_T_robot, truth)
+        if self._robot.add_scan(scan, map_T_robot, self._stage):
+            self._send_scans()
 
     def _begin_mapping(self, stamp: float) -> None:
         """Begin mapping; the first scan still belongs to the stage before, so that every view of it holds a map."""
@@ -226,24 +194,13 @@ class Recorder:
         area = float(np.count_nonzero(grid.known)) * grid.frame.resolution**2
         name, colour = "known area", colours.ESTIMATE
         self._curves.add("metrics/known_area/map", area, name, colour, stamp=stamp, stage=self._stage)
-        self._note_share(area)
-        for name, path in self._paths.items():
-            if path:
-                colour = {"odometry": colours.ODOMETRY, "estimate": colours.ESTIMATE, "truth": colours.TRUTH}[name]
-                self._stream.log(f"map/path/{name}", drawables.strips([np.array(path)], colour, z=drawables.Z_PATH))
+        self._robot.draw_paths()
         self._hold(mapping=True)
 
     def _draw_nothing_yet(self, grid: OccupancyGrid) -> None:
         """Draw what there is before the first prediction, so that no view is empty."""
         self._stream.log("rooms/predicted/grid", drawables.grid_map(grid))
         draw_nothing_yet(self._stream, grid)
-
-    def _note_share(self, area: float) -> None:
-        """Log a line whenever another quarter of the floor is known."""
-        quarters = 0 if not self._floor else min(int(4 * area / self._floor), 3)
-        if self._stage == Stage.MAPPING and quarters > self._quarters:
-            self._quarters = quarters
-            self.note(f"{25 * quarters} % of the floor is known, {area:.0f} m²")
 
     def frontiers(self, points: FloatArray, goal: Point | None, path: FloatArray | None, stamp: float) -> None:
         """Record frontiers, the goal and the path there."""
@@ -273,9 +230,7 @@ class Recorder:
         """Record the whole trajectory after the last optimisation."""
         if len(stamps):
             self._stream.at(float(stamps[-1]), self._stage)
-            path = np.asarray(poses, dtype=np.float64)[:, :2]
-            self._paths["estimate"] = [(float(x), float(y)) for x, y in path[:: max(len(path) // 2000, 1)]]
-            self._stream.log("map/path/estimate", drawables.strips([path], colours.ESTIMATE, z=drawables.Z_PATH))
+            self._robot.correct_path(poses)
             self._curves.corrected = (np.asarray(stamps, dtype=np.float64), np.asarray(poses, dtype=np.float64))
 
     def reference(self, stamps: FloatArray, poses: FloatArray) -> None:
@@ -284,8 +239,7 @@ class Recorder:
             return
         self._curves.set_reference(poses)
         self._stream.at(float(stamps[-1]), self._stage)
-        way = np.asarray(poses, dtype=np.float64)[:, :2]
-        self._stream.log("map/path/truth", drawables.strips([way], colours.TRUTH, z=drawables.Z_PATH))
+        self._robot.draw_reference(poses)
 
     def truth(self, grid: OccupancyGrid, rooms: Sequence[Room]) -> None:
         """Record the true map and rooms, there whatever the time."""
@@ -319,11 +273,11 @@ class Recorder:
         failed = "".join(f"\n- {door}: {why}" for door, why in failures.items())
         self._stream.say("Rooms", f"{len(prediction.rooms)} rooms predicted, {len(prediction.failures)} failed{failed}")
         for room in prediction.rooms:
-            self.note(_room_said(room, iou or {}))
+            self.note(room_line(room, iou or {}))
         for door, why in prediction.failures.items():
             self.note(f"behind {door}: nothing predicted, {why}")
         self._grids = {"closed": observed, "predicted": prediction.grid}
-        self.table(_rooms_table(prediction))
+        self.table(rooms_table(prediction))
         self._hold(active="Rooms")
 
     def growth(
@@ -335,7 +289,15 @@ class Recorder:
         *,
         iou: Mapping[str, float] | None = None,
     ) -> None:
-        """Record what would be predicted by what is known now, while the robot still explores."""
+        """Record the prediction on the map so far, while the robot still explores.
+
+        Args:
+            observed: The map so far.
+            doors: Closed doors seen so far.
+            prediction: Made of both.
+            stamp: Simulated time [s].
+            iou: Of each room, by door id, where the truth is known.
+        """
         self._stream.at(stamp, self._stage)
         self._draw_prediction(observed, doors, prediction, iou or {}, stamp=stamp)
 
@@ -349,6 +311,7 @@ class Recorder:
         staged: bool = False,
         stamp: float | None = None,
     ) -> None:
+        """Draw a prediction and how it came about, each step at its stage where ``staged``; else at ``stamp`` [s]."""
         from closedrooms.predictor.prediction import WeighedTrace
 
         self._palette = colours.room_colours({*self._palette, *(door.id for door in doors)})
@@ -376,7 +339,7 @@ class Recorder:
         """Add how well each room is predicted level by level to the curves over the stages."""
         for level in levels:
             true = {door: self._truth[door] for door in level.layouts if door in self._truth}
-            iou = {door: measure_iou(level.layouts[door], shape) for door, shape in true.items()}
+            iou = {door: polygon_iou(level.layouts[door], shape) for door, shape in true.items()}
             stage = min(Stage.EXPANSION + level.k, Stage.ROOMS - 1)
             self._curves.add_iou(iou, self._palette, stamp=None, stage=stage)
 
@@ -387,7 +350,7 @@ class Recorder:
             grid = self._grids.get(name)
             if grid is not None:
                 self._stream.log(f"coverage/{name}/grid", drawables.grid_map(grid), static=True)
-            self.note(f"tour on the {name} map: {tours[name].length:.1f} m")
+            self.note(f"tour on the {MAPS.get(name, name)}: {tours[name].length:.1f} m")
         self._stage = Stage.DRIVING
         self._hold(tours=tuple(tours))
 
@@ -405,76 +368,24 @@ class Recorder:
         self._stream.at(stamp)
         self._stream.log("log/run", rr.TextLog(text, level=rr.TextLogLevel.INFO))
 
-    def table(self, markdown: str) -> None:
-        """Record the table of results."""
-        self._stream.log("result", _markdown(markdown), static=True)
+    def table(self, text: str) -> None:
+        """Record the table of results, Markdown."""
+        self._stream.log("result", text_document(text), static=True)
         self._hold(result=True)
 
     def _hold(self, **parts: Any) -> None:
         """Note what the recording holds by now; who watches sees a tab for it at once."""
         before, self._holds = self._holds, replace(self._holds, **parts)
         if self._stream.live and before != self._holds:
-            self._stream.arrange(arrange(self._holds, self._bounds))
-
-    def _draw_robot(self, path: str, colour: colours.Colour) -> None:
-        self._stream.log(
-            f"{path}/body",
-            rr.Cylinders3D(
-                lengths=[0.3], radii=[self._radius], centers=[[0, 0, 0.15]], colors=[colour], fill_mode="solid"
-            ),
-            static=True,
-        )
-        self._stream.log(
-            f"{path}/heading",
-            rr.Arrows3D(origins=[[0, 0, 0.32]], vectors=[[3 * self._radius, 0, 0]], colors=[colour], radii=[0.05]),
-            static=True,
-        )
+            self._stream.arrange(make_blueprint(self._holds, self._bounds))
 
     def _send_scans(self) -> None:
-        """Send the scans kept since the last time in one call: many times cheaper than one call each."""
+        """Send poses and scans kept since the last time."""
         self._curves.send_poses()
-        if not self._scans:
-            return
-        lengths = [len(ends) for _, _, ends in self._scans]
-        places = drawables.lifted(np.concatenate([ends for _, _, ends in self._scans]), drawables.Z_POINT)
-        columns = rr.Points3D.columns(positions=places).partition(lengths)
-        stages = [stage for _, stage, _ in self._scans]
-        stamps = np.array([stamp for stamp, _, _ in self._scans])
-        self._stream.columns("map/scan", columns, stamps=stamps, stages=stages)
-        self._scans = []
+        self._robot.send_scans()
 
 
 def _known_bounds(grid: OccupancyGrid) -> Bounds | None:
+    """Find the bounds of what a map knows [m], ``None`` where it knows nothing."""
     window = grid.known_bounds()
     return None if window is None else grid.frame.cropped(*window).bounds
-
-
-def _rooms_table(prediction: "Prediction") -> str:
-    """Write the table that stands under ``result`` until the run's own comes."""
-    rows = [
-        [", ".join(room.doors), room.kind or "", f"{room.polygon.area:.1f} m²", "cut" if room.bounded else ""]
-        for room in prediction.rooms
-    ]
-    rows += [[door, f"not predicted: {why}", "", ""] for door, why in prediction.failures.items()]
-    rows = [[markdown_text(cell) for cell in row] for row in rows]
-    head = [["doors", "room", "area", "search"], ["---"] * 4]
-    return "\n".join(["# Prediction", "", *("| " + " | ".join(row) + " |" for row in [*head, *rows])])
-
-
-def _room_said(room: Room, iou: Mapping[str, float]) -> str:
-    """Describe a predicted room in one line of the log."""
-    known = [iou[door] for door in room.doors if door in iou]
-    held = f", IoU with the true room {min(known):.2f}" if known else ""
-    sure = "" if room.confidence is None else f", confidence {room.confidence:.2f}"
-    kind = f"{room.kind} room" if room.kind else "room"
-    return f"behind {', '.join(room.doors)}: {kind} of {room.polygon.area:.1f} m²{sure}{held}"
-
-
-def measure_iou(one: Shape, other: Shape) -> float:
-    """Measure the intersection over union of two shapes, 0..1."""
-    shared = shapely.intersection(one, other).area
-    return float(shared / max(one.area + other.area - shared, 1e-9))
-
-
-def _markdown(text: str) -> rr.TextDocument:
-    return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)

@@ -16,6 +16,7 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import OutputError
 from closedrooms.core.files.unfinished import final_place
 from closedrooms.core.runtime.stopping import wait_for_nothing
+from closedrooms.visualization.rerun.documents import text_document
 
 APPLICATION = "closedrooms"
 # Chunks are cut by size alone: a cut by wall-clock time would differ from one run to the next.
@@ -130,6 +131,7 @@ class RecordingStream:
 
     @contextlib.contextmanager
     def _clear_errors(self) -> Iterator[None]:
+        """Say what cannot be written as rerun's own errors do not: with the path."""
         try:
             yield
         except RuntimeError as failure:
@@ -164,7 +166,7 @@ class RecordingStream:
 
     def say(self, title: str, text: str) -> None:
         """Say what happens at this stage, in the view ``Stage``."""
-        self.log("stage", rr.TextDocument(f"## {title}\n{text}", media_type=rr.MediaType.MARKDOWN))
+        self.log("stage", text_document(f"## {title}\n{text}"))
 
     def clear(self, path: str) -> None:
         """Take away what lies below a path, from now on."""

@@ -11,6 +11,7 @@ from closedrooms.core.names import markdown_text
 from closedrooms.core.room import Room
 from closedrooms.visualization import colours
 from closedrooms.visualization.rerun import drawables
+from closedrooms.visualization.rerun.documents import text_document
 from closedrooms.visualization.rerun.stream import RecordingStream
 
 if TYPE_CHECKING:
@@ -34,13 +35,13 @@ def draw_sureness(
     """
     if prediction.probability is not None:
         stream.log("sureness/grid", probability_map(observed, prediction))
-    stream.log("sureness/table", rr.TextDocument(_table(prediction, iou), media_type=rr.MediaType.MARKDOWN))
+    stream.log("sureness/table", text_document(_table(prediction, iou)))
 
 
 def draw_nothing_yet(stream: RecordingStream, observed: OccupancyGrid) -> None:
     """Draw what stands there before the first prediction."""
     stream.log("sureness/grid", drawables.grid_map(observed))
-    stream.log("sureness/table", rr.TextDocument(NOTHING_YET, media_type=rr.MediaType.MARKDOWN))
+    stream.log("sureness/table", text_document(NOTHING_YET))
 
 
 def probability_map(observed: OccupancyGrid, prediction: "Prediction") -> rr.GridMap:
@@ -76,6 +77,7 @@ def _table(prediction: "Prediction", iou: Mapping[str, float]) -> str:
 
 
 def _row(room: Room, iou: Mapping[str, float]) -> list[str]:
+    """Make the row of a room."""
     known = [iou[door] for door in room.doors if door in iou]
     others = "; ".join(f"{other.polygon.area:.1f} m², {100 * other.probability:.0f} %" for other in room.alternatives)
     return [

@@ -12,6 +12,7 @@ from closedrooms.core.names import markdown_text
 from closedrooms.visualization import colours
 from closedrooms.visualization.colours import Colour
 from closedrooms.visualization.rerun import drawables
+from closedrooms.visualization.rerun.documents import text_document
 from closedrooms.visualization.rerun.stream import RecordingStream, Stage
 
 if TYPE_CHECKING:
@@ -49,12 +50,12 @@ def draw_weighed(
             stream.say(*LEVELS[min(level.k, 1)])
         for door, shape in sorted(level.layouts.items()):
             path = f"prediction/layouts/{rr.escape_entity_path_part(door)}"
-            stream.log(path, drawables.fill([shape], palette[door]))
+            stream.log(path, drawables.filled([shape], palette[door]))
             stream.log(f"{path}/outline", drawables.outlines([shape], palette[door]))
     if staged:
         for room in trace.rooms:
             _draw_bars(stream, room)
-        stream.log("weighing/candidates", _markdown(_candidates_table(trace.rooms)), static=True)
+        stream.log("weighing/candidates", text_document(_candidates_table(trace.rooms)), static=True)
 
 
 LEVELS = (
@@ -82,7 +83,7 @@ def _draw_candidates(stream: RecordingStream, room: "WeighedRoom", palette: Mapp
     shapes = np.asarray(shapely.polygons(room.corners))
     best = np.argsort(-room.joint, kind="stable")[:DRAWN]
     stream.log(f"{root}/others", drawables.outlines(list(shapes[best]), colour, radius=drawables.THIN))
-    stream.log(f"{root}/{CHOSEN}", drawables.fill([shapes[room.chosen]], colour))
+    stream.log(f"{root}/{CHOSEN}", drawables.filled([shapes[room.chosen]], colour))
     stream.log(f"{root}/{CHOSEN}/outline", drawables.outlines([shapes[room.chosen]], colour, radius=drawables.THICK))
     places, labels = [_corner(room.corners[room.chosen], 0)], [f"{'+'.join(room.doors)} {room.joint[room.chosen]:.1f}"]
     if room.runner_up is not None:
@@ -121,7 +122,7 @@ def _draw_bars(stream: RecordingStream, room: "WeighedRoom") -> None:
     title = markdown_text(", ".join(room.doors))
     none = "" if room.runner_up is not None else "\n\nAll candidates are much the same room: there is no runner-up."
     table = "\n".join([f"## {title}", "", *head, *rows]) + none
-    stream.log(f"weighing/{room_name(room)}/terms", _markdown(table), static=True)
+    stream.log(f"weighing/{room_name(room)}/terms", text_document(table), static=True)
 
 
 def _candidates_table(rooms: Sequence["WeighedRoom"]) -> str:
@@ -141,7 +142,3 @@ def _candidates_table(rooms: Sequence["WeighedRoom"]) -> str:
             lines.append(f"| {doors} | {what} | {sides[0]:.2f} x {sides[1]:.2f} | {scores} |")
     note = "The chosen one agrees best with all candidates, weighed by their scores: it need not have the highest."
     return "\n".join(["# Candidates", "", *lines, "", note])
-
-
-def _markdown(text: str) -> rr.TextDocument:
-    return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)

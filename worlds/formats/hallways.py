@@ -92,9 +92,11 @@ class JoinedRooms:
         return DeepDoor(segment, pair, round(depth, 4), self._wall)
 
     def _straighten(self, hall: int, room: int) -> None:
+        """Cut the end of a hallway square where it meets a room."""
         self.polygons[hall], self.polygons[room] = _straight_end(self.polygons[hall], self.polygons[room])
 
     def _add_door(self, point: shapely.Point, a: int, b: int, hallway: Hallway, *, has_door: bool = True) -> None:
+        """Add a portal as wide as the hallway."""
         pair = (min(a, b), max(a, b))
         self.portals.append(Portal((point.x, point.y), pair, has_door, hallway.width, hallway.name))
 

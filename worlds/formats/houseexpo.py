@@ -81,6 +81,7 @@ def read_houseexpo(path: str | Path) -> FloorPlan:
 
 
 def _outline(data: Any, path: Path, remarks: list[Remark]) -> Polygon:
+    """Read the outline of the whole home [m]."""
     verts = data.get("verts") if isinstance(data, dict) else None
     try:
         points = np.array(verts, dtype=np.float64)
@@ -95,6 +96,7 @@ def _outline(data: Any, path: Path, remarks: list[Remark]) -> Polygon:
 
 
 def _boxes(data: dict[str, Any], path: Path, remarks: list[Remark]) -> list[tuple[str, Polygon]]:
+    """Read the boxes of the rooms with their labels, the smallest first [m]."""
     categories = data.get("room_category") or {}
     if not isinstance(categories, dict):
         raise InvalidInputError("room_category", expected="boxes by category", where=path)
@@ -145,6 +147,7 @@ def _rooms(outline: Polygon, boxes: list[tuple[str, Polygon]]) -> tuple[list[str
 
 
 def _parts(area: BaseGeometry, smallest: float) -> list[Polygon]:
+    """List the polygons of at least a size [m2], from left to right."""
     parts = [part for part in shapely.get_parts(areal(area)) if isinstance(part, Polygon) and part.area >= smallest]
     return sorted(parts, key=lambda part: (round(part.bounds[0], 3), round(part.bounds[1], 3)))
 

@@ -98,6 +98,7 @@ def _lines(space: Any, metres: float) -> list[tuple[Any, Segment]]:
 
 
 def _outline(space: Any, name: str, metres: float, remarks: list[Remark]) -> Polygon | None:
+    """Read the contour of a room [m]; one whose lines are out of order is put together by their ends."""
     lines = _lines(space, metres)
     broken = len(descendants(child(space, "contour"), "linesegment")) - len(lines)
     if lines and broken:

@@ -71,6 +71,7 @@ def _scale(root: Any, path: Path) -> float:
 
 
 def _spaces(root: Any, path: Path) -> list[Any]:
+    """List the spaces of all floors."""
     floors = children(root, "floor")
     spaces = [space for floor in floors for space in children(child(floor, "spaces"), "space")]
     if len(spaces) > MAX_SPACES:
@@ -83,6 +84,7 @@ def _label(space: Any) -> str:
 
 
 def _point(element: Any, metres: float) -> Point | None:
+    """Read a point [m], y up; ``None`` for one without two finite coordinates."""
     try:
         x, y = float(attribute(element, "x") or "nan"), float(attribute(element, "y") or "nan")
     except ValueError:
@@ -110,6 +112,7 @@ def _outline(space: Any, name: str, metres: float, remarks: list[Remark]) -> Pol
 
 
 def _from_segments(space: Any, metres: float) -> Polygon | None:
+    """Make a room of the lines of its outline where its polygon is not usable [m]."""
     lines = []
     for segment in children(child(space, "space_representation"), "linesegment"):
         points = [_point(point, metres) for point in children(segment, "point")]

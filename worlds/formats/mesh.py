@@ -13,6 +13,7 @@ from closedrooms.worlds.boxes import BoxLeaf, box_leaves
 from closedrooms.worlds.door_hinges import without_entrances
 from closedrooms.worlds.extrusion import WALL_HEIGHT, extrude
 from closedrooms.worlds.formats.sdf import CLEARANCE, DOOR_HEIGHT, FURNITURE_HEIGHT, LEAF_MASS, OPEN
+from closedrooms.worlds.formats.xml_text import number_text
 from closedrooms.worlds.geometry import areal, wall_area
 from closedrooms.worlds.plan import FloorPlan
 
@@ -77,28 +78,26 @@ def _add_leaf(robot: Element, name: str, leaf: BoxLeaf) -> None:
     box, sliding = leaf.box, leaf.hinge is None
     x, y = leaf.hinge if leaf.hinge is not None else (box.x, box.y)
     length, height = box.length - 2 * CLEARANCE, DOOR_HEIGHT - CLEARANCE
-    middle = _numbers(0.0 if sliding else box.length / 2, 0.0, (CLEARANCE + DOOR_HEIGHT) / 2)
+    middle = number_text(0.0 if sliding else box.length / 2, 0.0, (CLEARANCE + DOOR_HEIGHT) / 2)
     link = SubElement(robot, "link", name=f"door_{name}")
     for tag in ("visual", "collision"):
         part = SubElement(link, tag)
         SubElement(part, "origin", xyz=middle, rpy="0 0 0")
-        SubElement(SubElement(part, "geometry"), "box", size=_numbers(length, box.thickness, height))
+        SubElement(SubElement(part, "geometry"), "box", size=number_text(length, box.thickness, height))
     mass = LEAF_MASS * length * height
     inertial = SubElement(link, "inertial")
     SubElement(inertial, "origin", xyz=middle, rpy="0 0 0")
-    SubElement(inertial, "mass", value=_numbers(mass))
+    SubElement(inertial, "mass", value=number_text(mass))
     sides = {"ixx": (box.thickness, height), "iyy": (length, height), "izz": (length, box.thickness)}
-    moments = {tag: _numbers(mass / 12.0 * (a * a + b * b)) for tag, (a, b) in sides.items()}
+    moments = {tag: number_text(mass / 12.0 * (a * a + b * b)) for tag, (a, b) in sides.items()}
     SubElement(inertial, "inertia", moments | {"ixy": "0", "ixz": "0", "iyz": "0"})
     joint = SubElement(robot, "joint", name=name, type="prismatic" if sliding else "revolute")
     SubElement(joint, "parent", link="walls")
     SubElement(joint, "child", link=f"door_{name}")
-    SubElement(joint, "origin", xyz=_numbers(x, y, 0.0), rpy=_numbers(0.0, 0.0, math.remainder(box.angle, math.tau)))
-    SubElement(joint, "axis", xyz=_numbers(leaf.turn, 0, 0) if sliding else _numbers(0, 0, leaf.turn))
-    upper = _numbers(box.length if sliding else OPEN)
-    SubElement(joint, "limit", lower="0", upper=upper, effort=_numbers(EFFORT), velocity=_numbers(VELOCITY))
+    SubElement(
+        joint, "origin", xyz=number_text(x, y, 0.0), rpy=number_text(0.0, 0.0, math.remainder(box.angle, math.tau))
+    )
+    SubElement(joint, "axis", xyz=number_text(leaf.turn, 0, 0) if sliding else number_text(0, 0, leaf.turn))
+    upper = number_text(box.length if sliding else OPEN)
+    SubElement(joint, "limit", lower="0", upper=upper, effort=number_text(EFFORT), velocity=number_text(VELOCITY))
     SubElement(joint, "dynamics", damping="1")
-
-
-def _numbers(*values: float) -> str:
-    return " ".join(f"{round(value, 5) + 0.0:g}" for value in values)

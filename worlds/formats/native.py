@@ -82,6 +82,7 @@ def _material(material: Material) -> dict[str, str]:
 
 
 def _rounded(value: float) -> float:
+    """Round a length as the files hold it: to 0.1 mm."""
     return round(float(value), 4) + 0.0
 
 
@@ -90,6 +91,7 @@ def _segment(segment: Segment) -> list[list[float]]:
 
 
 def _polygon_fields(polygon: Polygon) -> dict[str, Any]:
+    """Write a polygon as its outline, and its holes where it has some."""
     rings = [[[_rounded(x), _rounded(y)] for x, y, *_ in ring.coords[:-1]] for ring in _rings(polygon)]
     return {"polygon": rings[0], "holes": rings[1:]} if len(rings) > 1 else {"polygon": rings[0]}
 
@@ -150,7 +152,7 @@ def _plan_name(value: Any, path: Path) -> str:
 
 
 class _Reader:
-    """Reads fields and names the element that is wrong."""
+    """Reader of fields that names the element that is wrong."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -262,4 +264,5 @@ class _Reader:
         return points
 
     def _error(self, what: str, expected: str) -> InvalidInputError:
+        """Make the error of the element that is being read."""
         return InvalidInputError(f"{self._element}: {what}", expected=expected, where=self._path)

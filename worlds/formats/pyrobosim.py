@@ -112,6 +112,7 @@ def _hallways(
 
 
 def _rows(data: dict[str, Any], key: str, path: Path) -> list[dict[str, Any]]:
+    """List the entries of a part of the world, a bounded number of tables."""
     rows = data.get(key) or []
     if not isinstance(rows, list) or len(rows) > MAX_ELEMENTS or not all(isinstance(row, dict) for row in rows):
         raise InvalidInputError(f"{key} of a pyrobosim world", expected=f"a list of at most {MAX_ELEMENTS}", where=path)
@@ -119,6 +120,7 @@ def _rows(data: dict[str, Any], key: str, path: Path) -> list[dict[str, Any]]:
 
 
 def _number(value: Any, what: str, path: Path, *, above: float = 0.0) -> float:
+    """Check a number of the file."""
     if not isinstance(value, int | float) or isinstance(value, bool) or not above < value < LARGEST:
         raise InvalidInputError(
             f"{what} {str(value)[:60]!r}", expected=f"a number above {above:g}, below {LARGEST:g}", where=path
@@ -204,6 +206,7 @@ def _wall_width(rows: list[dict[str, Any]]) -> float:
 
 
 def _points(value: Any, what: str, path: Path) -> list[Point]:
+    """Check a list of points of the file."""
     try:
         points = [(float(x), float(y)) for x, y, *_ in value]
     except (TypeError, ValueError, OverflowError):

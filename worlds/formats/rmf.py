@@ -143,6 +143,7 @@ def _rooms(
 
 
 def _doors(level: RmfLevel, rooms: Sequence[PlanRoom], remarks: list[Remark]) -> list[PlanDoor]:
+    """Make the doors that have a room on either side, or on one: those are entrances."""
     tree = STRtree([room.polygon for room in rooms])
     doors: list[PlanDoor] = []
     entrances: list[str] = []

@@ -117,6 +117,7 @@ def read_level(path: Path, level: str | None, remarks: list[Remark]) -> RmfLevel
 
 
 def _level_fields(data: dict[str, Any], level: str | None, path: Path) -> tuple[str, dict[str, Any]]:
+    """Find the level that is wanted, by name, and its fields."""
     levels = data.get("levels")
     if not isinstance(levels, dict) or not levels:
         raise InvalidInputError("a building without levels", expected=WHAT, where=path)
@@ -134,6 +135,7 @@ def _level_fields(data: dict[str, Any], level: str | None, path: Path) -> tuple[
 
 
 def _rows(fields: dict[str, Any], key: str, path: Path) -> list[Any]:
+    """List the entries of a part of the level, a bounded number."""
     rows = fields.get(key) or []
     if not isinstance(rows, list) or len(rows) > MAX_ELEMENTS:
         raise InvalidInputError(f"{key} of an RMF level", expected=f"a list of at most {MAX_ELEMENTS}", where=path)
@@ -174,6 +176,7 @@ def _scale(data: dict[str, Any], fields: dict[str, Any], path: Path, remarks: li
 
 
 def _measured(row: Any, vertices: list[Any]) -> float | None:
+    """Compute the scale that a measurement gives [m a pixel], ``None`` where it is broken."""
     try:
         a, b = vertices[row[0]], vertices[row[1]]
         value = float(row[2]["distance"][1]) / math.dist((float(a[0]), float(a[1])), (float(b[0]), float(b[1])))
@@ -227,6 +230,7 @@ def _door(row: Any, number: int, vertices: Sequence[Point | None], remarks: list
 def _floor(
     fields: dict[str, Any], vertices: Sequence[Point | None], remarks: list[Remark], path: Path
 ) -> Polygon | MultiPolygon:
+    """Join the floors of a level to one area [m]."""
     areas = []
     for number, row in enumerate(_rows(fields, "floors", path)):
         try:

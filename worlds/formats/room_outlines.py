@@ -9,7 +9,7 @@ from shapely.strtree import STRtree
 
 from closedrooms.core.door import Point
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.geometry import areal
+from closedrooms.worlds.geometry import areal, largest_part
 from closedrooms.worlds.wall_assembly import coverage, without_gaps
 
 # Gaps between rooms narrower than this are drawing inaccuracies or walls, not space [m].
@@ -56,7 +56,7 @@ def clean_outlines(
     overlap = sum(outline.area for outline in given) - shapely.union_all(given).area
     polygons, gaps = without_gaps(coverage(given, snap=JOG / 2), GAP, touching=GRID)
     polygons = coverage(polygons, gap=GAP, snap=JOG / 2)
-    simple = iter([_largest(part) for part in shapely.coverage_simplify(polygons, JOG)])
+    simple = iter([largest_part(part) for part in shapely.coverage_simplify(polygons, JOG)])
     if overlap > 0.01:
         why = f"{overlap:.2f} square metres given to one room each"
         remarks.append(Remark(action="repaired", what="overlaps of rooms", why=why))
@@ -95,8 +95,3 @@ def outline_lines(outlines: Sequence[Polygon | None], kept: Sequence[Polygon | N
     twice = [areal(given[a].intersection(given[b])).buffer(-GAP / 4) for a, b in zip(first, second, strict=True)]
     claimed = shapely.union_all(twice).buffer(GAP / 2)
     return shapely.union_all([outline.boundary for outline in given]).difference(claimed)
-
-
-def _largest(area: shapely.Geometry) -> Polygon:
-    parts = [part for part in shapely.get_parts(area) if isinstance(part, Polygon)]
-    return max(parts, key=lambda part: part.area, default=Polygon())

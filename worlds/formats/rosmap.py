@@ -71,6 +71,7 @@ def read_raster(path: str | Path, doors_path: Path | None = None) -> FloorPlan:
 
 
 def _checked(grid: OccupancyGrid, path: Path) -> OccupancyGrid:
+    """Refuse a map that is too large or too fine to become a plan."""
     frame = grid.frame
     if frame.rows * frame.cols > MAX_CELLS:
         raise InvalidInputError(
@@ -110,6 +111,7 @@ def _map(path: Path) -> RosMap:
 
 
 def _doors_beside(path: Path) -> Path | None:
+    """Find the file of doors beside a map: of its own name, or ``doors.geojson``."""
     options = (path.with_name(f"{path.stem}.doors.geojson"), path.with_name("doors.geojson"))
     return next((option for option in options if is_file(option)), None)
 

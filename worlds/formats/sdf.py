@@ -9,6 +9,7 @@ from closedrooms.core.names import xml_text
 from closedrooms.worlds.boxes import Box, BoxLeaf, box_leaves, wall_boxes
 from closedrooms.worlds.door_hinges import without_entrances
 from closedrooms.worlds.extrusion import WALL_HEIGHT
+from closedrooms.worlds.formats.xml_text import number_text
 from closedrooms.worlds.plan import FloorPlan
 
 VERSION = "1.9"
@@ -54,16 +55,14 @@ def write_sdf(path: Path, plan: FloorPlan) -> None:
 
 
 def _text(parent: Element, tag: str, value: str) -> Element:
+    """Add an element with a text."""
     element = SubElement(parent, tag)
     element.text = value
     return element
 
 
-def _numbers(*values: float) -> str:
-    return " ".join(f"{round(value, 5) + 0.0:g}" for value in values)
-
-
 def _light(world: Element) -> None:
+    """Add a sun."""
     light = SubElement(world, "light", name="sun", type="directional")
     _text(light, "pose", "0 0 10 0 0 0")
     _text(light, "direction", "-0.5 0.1 -0.9")
@@ -71,6 +70,7 @@ def _light(world: Element) -> None:
 
 
 def _ground(world: Element) -> None:
+    """Add the ground plane."""
     model = SubElement(world, "model", name="ground")
     _text(model, "static", "true")
     link = SubElement(model, "link", name="link")
@@ -81,11 +81,12 @@ def _ground(world: Element) -> None:
 
 
 def _solid(link: Element, name: str, box: Box, low: float, high: float, colour: str) -> None:
+    """Add a box between two heights [m], to see and to run into."""
     for tag in ("collision", "visual"):
         part = SubElement(link, tag, name=f"{name}_{tag}")
-        _text(part, "pose", _numbers(box.x, box.y, (low + high) / 2, 0.0, 0.0, box.angle))
+        _text(part, "pose", number_text(box.x, box.y, (low + high) / 2, 0.0, 0.0, box.angle))
         shape = SubElement(SubElement(part, "geometry"), "box")
-        _text(shape, "size", _numbers(box.length, box.thickness, high - low))
+        _text(shape, "size", number_text(box.length, box.thickness, high - low))
         if tag == "visual":
             material = SubElement(part, "material")
             _text(material, "ambient", colour)
@@ -93,12 +94,13 @@ def _solid(link: Element, name: str, box: Box, low: float, high: float, colour: 
 
 
 def _polyline(link: Element, name: str, points: list[tuple[float, float]]) -> None:
+    """Add a prism of a piece of furniture, to see and to run into."""
     for tag in ("collision", "visual"):
         part = SubElement(link, tag, name=f"{name}_{tag}")
         shape = SubElement(SubElement(part, "geometry"), "polyline")
         for point in points:
-            _text(shape, "point", _numbers(*point))
-        _text(shape, "height", _numbers(FURNITURE_HEIGHT))
+            _text(shape, "point", number_text(*point))
+        _text(shape, "height", number_text(FURNITURE_HEIGHT))
 
 
 def _leaf(model: Element, name: str, leaf: BoxLeaf) -> None:
@@ -106,17 +108,17 @@ def _leaf(model: Element, name: str, leaf: BoxLeaf) -> None:
     box = leaf.box
     x, y = leaf.hinge if leaf.hinge is not None else (box.x, box.y)
     link = SubElement(model, "link", name=f"door_{name}")
-    _text(link, "pose", _numbers(x, y, 0.0, 0.0, 0.0, box.angle))
+    _text(link, "pose", number_text(x, y, 0.0, 0.0, 0.0, box.angle))
     length = box.length - 2 * CLEARANCE
     middle = 0.0 if leaf.hinge is None else box.length / 2
     height = DOOR_HEIGHT - CLEARANCE
     mass = LEAF_MASS * length * height
     inertial = SubElement(link, "inertial")
-    _text(inertial, "pose", _numbers(middle, 0.0, (CLEARANCE + DOOR_HEIGHT) / 2, 0.0, 0.0, 0.0))
-    _text(inertial, "mass", _numbers(mass))
+    _text(inertial, "pose", number_text(middle, 0.0, (CLEARANCE + DOOR_HEIGHT) / 2, 0.0, 0.0, 0.0))
+    _text(inertial, "mass", number_text(mass))
     inertia = SubElement(inertial, "inertia")
     for tag, a, b in (("ixx", box.thickness, height), ("iyy", length, height), ("izz", length, box.thickness)):
-        _text(inertia, tag, _numbers(mass / 12.0 * (a * a + b * b)))
+        _text(inertia, tag, number_text(mass / 12.0 * (a * a + b * b)))
     local = Box(middle, 0.0, 0.0, length, box.thickness)
     _solid(link, f"door_{name}", local, CLEARANCE, DOOR_HEIGHT, "0.55 0.38 0.22 1")
     sliding = leaf.hinge is None
@@ -124,8 +126,8 @@ def _leaf(model: Element, name: str, leaf: BoxLeaf) -> None:
     _text(joint, "parent", "walls")
     _text(joint, "child", f"door_{name}")
     axis = SubElement(joint, "axis")
-    _text(axis, "xyz", _numbers(leaf.turn, 0, 0) if sliding else _numbers(0, 0, leaf.turn))
+    _text(axis, "xyz", number_text(leaf.turn, 0, 0) if sliding else number_text(0, 0, leaf.turn))
     limit = SubElement(axis, "limit")
     _text(limit, "lower", "0")
-    _text(limit, "upper", _numbers(box.length if sliding else OPEN))
+    _text(limit, "upper", number_text(box.length if sliding else OPEN))
     _text(SubElement(axis, "dynamics"), "damping", "1")

@@ -27,7 +27,7 @@ NOTICED = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """What a file holds, to compare the plan with.
+    """Content of a file, to compare the plan with.
 
     Attributes:
         rooms: How many; ``None`` where the format knows no rooms.
@@ -156,6 +156,7 @@ def _odd_scale(plan: FloorPlan, widths: Sequence[float]) -> list[Remark]:
 
 
 def _odd_rooms(areas: Sequence[float]) -> list[Remark]:
+    """Warn where the median room has a size that no building has."""
     usable = [area for area in areas if math.isfinite(area) and area > 0.0]
     area = float(np.median(usable)) if usable else USUAL_ROOM
     if SMALLEST_MEDIAN_ROOM <= area <= LARGEST_MEDIAN_ROOM:

@@ -51,6 +51,7 @@ def write_stage(path: Path, plan: FloorPlan) -> None:
 
 
 def _text(plan: FloorPlan, picture: str, bounds: tuple[float, float, float, float]) -> str:
+    """Write the world file that shows the picture, the leaves of the doors and a robot."""
     x0, y0, x1, y1 = bounds
     start = start_pose(plan)
     leaves = [

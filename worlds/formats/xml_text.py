@@ -1,4 +1,4 @@
-"""Untrusted XML, read without entities and without regard to the case of names."""
+"""XML: untrusted files, read without entities and without regard to the case of names; numbers as we write them."""
 
 from pathlib import Path
 from typing import Any
@@ -64,3 +64,8 @@ def attribute(element: Any, name: str) -> str | None:
 def text(element: Any) -> str:
     """Read the text of an element, empty without one."""
     return "" if element is None else (element.text or "")
+
+
+def number_text(*values: float) -> str:
+    """Format numbers for the files that we write, to five decimals, with spaces between them."""
+    return " ".join(f"{round(value, 5) + 0.0:g}" for value in values)

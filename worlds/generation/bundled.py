@@ -6,7 +6,6 @@ nine times, where 15 is the limit of its experiments and the building may have m
 
 from dataclasses import dataclass
 
-from closedrooms.worlds.formats.native import plan_text
 from closedrooms.worlds.generation.generator import generate
 from closedrooms.worlds.plan import FloorPlan
 
@@ -16,7 +15,7 @@ MOST_CLOSED = 15
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """What the generator is asked for.
+    """Request to the generator.
 
     Attributes:
         kind: ``office`` or ``school``.
@@ -62,7 +61,7 @@ RECIPES: dict[str, Recipe] = {
 
 
 def bundled_plan(name: str) -> FloorPlan:
-    """Generate a bundled world anew."""
+    """Generate a bundled world anew: its file is this plan's JSON text, byte for byte."""
     recipe = RECIPES[name]
     return generate(
         recipe.kind,
@@ -73,8 +72,3 @@ def bundled_plan(name: str) -> FloorPlan:
         name=name,
         version=recipe.version,
     )
-
-
-def bundled_text(name: str) -> str:
-    """Generate the JSON text of a bundled world anew, byte for byte that of its file."""
-    return plan_text(bundled_plan(name))

@@ -65,6 +65,7 @@ def build_plan(rng: np.random.Generator, sketch: Sketch) -> FloorPlan:
 
 
 def _place_all(passages: list[SketchPassage], edges: list[RoomEdge]) -> list[tuple[SketchPassage, Segment]]:
+    """Find a place in the walls for every passage, one after the other; those without one are left out."""
     taken: list[Segment] = []
     placed = []
     for passage in passages:
@@ -103,6 +104,7 @@ def _unreached(sketch: Sketch, passages: list[SketchPassage]) -> set[int]:
 
 
 def _without(sketch: Sketch, lost: set[int]) -> Sketch:
+    """Leave some rooms out of a sketch, and the passages to them; the others are numbered anew."""
     kept = [number for number in range(len(sketch.labels)) if number not in lost]
     index = {old: new for new, old in enumerate(kept)}
     passages = [

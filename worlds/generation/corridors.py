@@ -64,7 +64,7 @@ class Skeleton:
 
 @dataclass(frozen=True, slots=True)
 class Measures:
-    """What a building of one kind and size measures [m]."""
+    """Dimensions of a building of one kind and size [m]."""
 
     width: float
     depths: tuple[float, float]
@@ -159,6 +159,7 @@ def _sides(rng: np.random.Generator, m: Measures, legs: int) -> list[tuple[float
 
 
 def _shift(point: Point, angle: float, along: float, left: float) -> Point:
+    """Move a point along a direction and to its left [m]."""
     c, s = math.cos(angle), math.sin(angle)
     return (point[0] + c * along - s * left, point[1] + s * along + c * left)
 

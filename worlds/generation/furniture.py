@@ -60,6 +60,7 @@ def furnish(plan: FloorPlan, rng: np.random.Generator) -> FloorPlan:
 
 
 def _furnish_room(rng: np.random.Generator, label: str, interior: Polygon, doors: list[LineString]) -> list[Polygon]:
+    """Place the furniture of a room where its doors stay clear and nothing overlaps; none in a narrow corridor."""
     if label == "corridor" and shapely.maximum_inscribed_circle(interior).length * 2 < WIDE_CORRIDOR:
         return []
     keep_clear = shapely.union_all([door.buffer(DOOR_CLEAR) for door in doors])
@@ -89,6 +90,7 @@ def _frame(interior: Polygon) -> tuple[float, Point]:
 
 
 def _box(x: float, y: float, angle: float, item: _Item) -> Polygon:
+    """Make the outline of an item around its middle [m]."""
     c, s = math.cos(angle), math.sin(angle)
     corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
     half = [(a * item.length / 2, b * item.depth / 2) for a, b in corners]
@@ -113,6 +115,7 @@ def _rows(label: str, interior: Polygon) -> list[Polygon]:
 
 
 def _middle_table(label: str, interior: Polygon) -> list[Polygon]:
+    """Propose a table in the middle of a room that has one."""
     item = IN_MIDDLE.get(label)
     if item is None:
         return []

@@ -73,6 +73,7 @@ def _check(what: str, value: object, valid: tuple[object, ...]) -> None:
 def _version_1(
     kind: str, seed: int, shape: str | None, size: str | None, angle: float | None, furniture: bool
 ) -> FloorPlan:
+    """Generate as version 1 does, whose worlds are published: draws are never reordered."""
     rng = stream(seed, "generator", "1", kind)
     drawn_shape = str(rng.choice(list(SHAPE_WEIGHTS), p=np.array(list(SHAPE_WEIGHTS.values())) / 10.5))
     drawn_size = SIZES[int(rng.choice(3, p=[0.3, 0.45, 0.25]))]

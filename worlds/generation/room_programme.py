@@ -124,10 +124,12 @@ def draw_bays(rng: np.random.Generator, kind: str, length: float, counts: dict[s
 
 
 def _key(bay: Bay) -> str:
+    """Name a kind of bay, as they are counted."""
     return f"{bay.label}/{bay.layout}"
 
 
 def _draw(rng: np.random.Generator, bays: tuple[Bay, ...], left: float, counts: dict[str, int]) -> Bay | None:
+    """Draw a bay that fits into what is left [m] and that the building may still have, ``None`` without one."""
     possible = [bay for bay in bays if bay.widths[0] <= left and counts.get(_key(bay), 0) < bay.at_most]
     if not possible:
         return None

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
-from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.door import Point
 from closedrooms.worlds.generation.corridors import Run, Skeleton
 from closedrooms.worlds.generation.room_programme import BAYS, END_ROOMS, Bay, draw_bays
+from closedrooms.worlds.geometry import largest_part
 
 # Rooms that lose more than this to their neighbours at a bend are left out.
 KEPT_SHARE = 0.45
@@ -64,6 +64,7 @@ def sketch_rooms(rng: np.random.Generator, kind: str, skeleton: Skeleton) -> Ske
 
 
 def _draw_run(rng: np.random.Generator, kind: str, run: Run, sketch: Sketch, counts: dict[str, int]) -> None:
+    """Draw the rooms along one side of a corridor, one bay after the other."""
     bays = draw_bays(rng, kind, run.length - run.corner, counts)
     at, section, stepped = 0.0, 1.0, 0
     last: int | None = None
@@ -120,7 +121,7 @@ def _draw_bay(
     if bay.layout == "store":
         low = s0 if rng.random() < 0.5 else s1 - 2.4
         store = run.box(low, low + 2.4, depth - 1.8, depth)
-        box = _largest(shapely.difference(box, store))
+        box = largest_part(shapely.difference(box, store))
     room = _add(sketch, bay.label, box)
     if room is None:
         return []
@@ -161,7 +162,7 @@ def _add(sketch: Sketch, label: str, box: Polygon) -> int | None:
     """Draw a room where nothing is yet; ``None`` when too little of it is left."""
     occupied = shapely.union_all([p for p in sketch.polygons if p.intersects(box)])
     left = shapely.difference(box, occupied) if not occupied.is_empty else box
-    room = _largest(left)
+    room = largest_part(left)
     if room.area < KEPT_SHARE * box.area or shapely.maximum_inscribed_circle(room).length < NARROWEST:
         return None
     sketch.labels.append(label)
@@ -169,17 +170,14 @@ def _add(sketch: Sketch, label: str, box: Polygon) -> int | None:
     return len(sketch.polygons) - 1
 
 
-def _largest(area: BaseGeometry) -> Polygon:
-    parts = [part for part in shapely.get_parts(area) if isinstance(part, Polygon)]
-    return max(parts, key=lambda part: part.area, default=Polygon())
-
-
 def _connect(sketch: Sketch, room: int | None, other: int | None, width: float, where: float) -> None:
+    """Add a door between two rooms, where there are two."""
     if room is not None and other is not None:
         sketch.passages.append(SketchPassage((min(room, other), max(room, other)), width, where, True))
 
 
 def _door_width(rng: np.random.Generator) -> float:
+    """Draw the width of a door [m]."""
     return float(rng.choice([0.8, 0.85, 0.9, 0.9, 0.95, 1.0]))
 
 

@@ -11,12 +11,15 @@ from closedrooms.core.files.incoming import (
     MAX_DEPTH,
     MAX_DIGITS,
     is_file,
+    is_folder,
+    is_there,
     opened,
     read_bytes,
     read_json,
     read_text,
     reading,
 )
+from closedrooms.core.files.yaml_text import parse_yaml
 
 
 def refusal(path: Path, what: str = "a plan") -> str:
@@ -45,6 +48,30 @@ def test_names_that_no_file_system_takes_are_one_line() -> None:
         with pytest.raises(InvalidInputError):
             read_text(Path(name), what="a plan")
         assert not is_file(Path(name))
+
+
+@pytest.mark.parametrize("ending", ["json", "yaml"])
+@pytest.mark.parametrize("levels", [MAX_DEPTH, MAX_DEPTH + 1])
+def test_the_deepest_nesting_is_read_and_one_level_more_refused(tmp_path: Path, ending: str, levels: int) -> None:
+    path = tmp_path / f"a.{ending}"
+    path.write_text('{"a": ' + "[" * (levels - 1) + "]" * (levels - 1) + "}")
+    read = read_json if ending == "json" else parse_yaml
+    if levels == MAX_DEPTH:
+        assert read(path, what="a plan").keys() == {"a"}
+    else:
+        with pytest.raises(InvalidInputError, match=f"nested {MAX_DEPTH} levels deep"):
+            read(path, what="a plan")
+
+
+@pytest.mark.parametrize("name", ["x" * 300, "a\0b", "circle/below", "gone"])
+def test_nothing_has_a_name_that_the_system_refuses(tmp_path: Path, name: str) -> None:
+    (tmp_path / "circle").symlink_to(tmp_path / "circle")
+    (tmp_path / "file").write_text("x")
+    path = tmp_path / name
+    assert (is_file(path), is_there(path), is_folder(path)) == (False, False, False)
+    assert (is_file(tmp_path), is_there(tmp_path), is_folder(tmp_path)) == (False, True, True)
+    file = tmp_path / "file"
+    assert (is_file(file), is_there(file), is_folder(file)) == (True, True, False)
 
 
 def test_what_is_read_counts_and_not_what_the_system_says(tmp_path: Path) -> None:

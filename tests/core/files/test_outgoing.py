@@ -9,14 +9,9 @@ from pathlib import Path
 import pytest
 
 from closedrooms.core.errors import OutputError
-from closedrooms.core.files.outgoing import (
-    check_new_files,
-    check_output_folder,
-    is_ours,
-    new_files,
-    output_folder,
-    write_bytes,
-)
+from closedrooms.core.files.incoming import read_bytes
+from closedrooms.core.files.outgoing import check_new_files, new_files, write_bytes
+from closedrooms.core.files.output_folders import check_output_folder, output_folder
 
 
 def test_an_output_folder_appears_whole_and_lists_its_files(tmp_path: Path) -> None:
@@ -26,7 +21,6 @@ def test_an_output_folder_appears_whole_and_lists_its_files(tmp_path: Path) -> N
     manifest = json.loads((tmp_path / "out" / "run.json").read_text())
     assert manifest.pop("sha256").keys() == {"a.txt", "run.json"}
     assert manifest == {"seed": 3, "program": "closedrooms", "schema": 1, "files": ["a.txt"]}
-    assert is_ours(tmp_path / "out")
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
 
@@ -200,7 +194,8 @@ def test_two_folders_side_by_side_are_written_at_once(tmp_path: Path) -> None:
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from closedrooms.core.files.outgoing import output_folder, write_bytes
+from closedrooms.core.files.outgoing import write_bytes
+from closedrooms.core.files.output_folders import output_folder
 with output_folder(Path(sys.argv[1]), {"command": "predict"}) as folder:
     write_bytes(folder / "a", b"half")
     os.kill(os.getpid(), signal.SIGKILL)
@@ -296,6 +291,28 @@ def test_single_files_are_new_unless_told_and_never_the_source(tmp_path: Path) -
         check_new_files([tmp_path / "no" / "where"], force=True)
 
 
+@pytest.mark.parametrize("name", ["read", "hard", "soft"])
+def test_what_is_read_on_the_way_is_not_replaced_either(tmp_path: Path, name: str) -> None:
+    (tmp_path / "read").write_text("theirs")
+    (tmp_path / "hard").hardlink_to(tmp_path / "read")
+    (tmp_path / "soft").symlink_to(tmp_path / "read")
+
+    def overwrite(read: str) -> None:
+        with new_files([tmp_path / "new", tmp_path / name], force=True, sources=[]):
+            for path in (tmp_path / "new", tmp_path / name):
+                write_bytes(path, b"ours")
+            read_bytes(tmp_path / read, what="a picture")
+
+    with pytest.raises(OutputError, match="a file that was read"):
+        overwrite("read")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["hard", "read", "soft"]
+    assert (tmp_path / "read").read_text() == "theirs"
+    (tmp_path / "another").write_text("theirs too")
+    read_bytes(tmp_path / "read", what="a picture")
+    overwrite("another")
+    assert (tmp_path / name).read_text() == (tmp_path / "new").read_text() == "ours"
+
+
 def write_after(path: Path, text: str, *, force: bool) -> None:
     """Somebody else writes the file while ours is computed."""
     with new_files([path], force=force):
@@ -372,6 +389,14 @@ def test_a_folder_that_is_read_is_not_replaced(tmp_path: Path, source: str) -> N
     with pytest.raises(OutputError, match="holds what is read"):
         check_output_folder(tmp_path / "out", "predict", sources=[None, tmp_path / source])
     check_output_folder(tmp_path / "out", "predict", sources=[tmp_path, tmp_path / "missing"])
+
+
+@pytest.mark.parametrize("name", ["circle", "circle/below"])
+def test_a_circle_of_links_is_one_line(tmp_path: Path, name: str) -> None:
+    (tmp_path / "circle").symlink_to(tmp_path / "circle")
+    with pytest.raises(OutputError, match=r"a file; expected a folder|cannot write"):
+        check_output_folder(tmp_path / name, "predict", sources=[tmp_path])
+    check_output_folder(tmp_path / "out", "predict", sources=[tmp_path / name])
 
 
 def test_an_interrupted_swap_puts_the_old_folder_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,12 +7,12 @@ import pytest
 
 from closedrooms.cli.config_file import read_settings
 from closedrooms.core.errors import InvalidInputError, OutputError
-from closedrooms.core.files.outgoing import output_folder
+from closedrooms.core.files.output_folders import output_folder
 from closedrooms.core.files.schema import SCHEMA, check_schema
+from closedrooms.experiments.claimed_folder import claim_folder
 from closedrooms.experiments.dataset.layout import read_manifest
-from closedrooms.experiments.evaluation.claimed_folder import claim
-from closedrooms.experiments.evaluation.listing import SamplePath
-from closedrooms.experiments.evaluation.samples import read_sample
+from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
+from closedrooms.experiments.evaluation.samples.sample_reader import read_sample
 from closedrooms.pipeline.config import PredictConfig
 from closedrooms.pipeline.view import find_recording
 
@@ -29,7 +29,7 @@ def test_every_folder_that_is_written_says_its_version(tmp_path: Path) -> None:
     with output_folder(tmp_path / "result", {"command": "predict"}) as staging:
         (staging / "note.txt").write_text("here")
     assert json.loads((tmp_path / "result" / "run.json").read_text())["schema"] == SCHEMA
-    claim(tmp_path / "evaluation", "evaluate")
+    claim_folder(tmp_path / "evaluation", "evaluate")
     assert json.loads((tmp_path / "evaluation" / "run.json").read_text())["schema"] == SCHEMA
 
 
@@ -72,7 +72,7 @@ def test_a_newer_recording_is_not_shown(tmp_path: Path) -> None:
 def test_a_newer_evaluation_is_not_gone_on_with(tmp_path: Path) -> None:
     write(tmp_path / "run.json", {"command": "evaluate", "schema": SCHEMA + 1})
     with pytest.raises(InvalidInputError, match=NEWER + "run.json"):
-        claim(tmp_path, "evaluate")
+        claim_folder(tmp_path, "evaluate")
 
 
 def test_a_newer_folder_is_not_replaced(tmp_path: Path) -> None:

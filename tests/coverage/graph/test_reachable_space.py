@@ -73,7 +73,7 @@ def _two_rooms(seed, gap):
 
 @given(seed=st.integers(0, 10_000), gap=st.integers(1, 8), filtered=st.booleans())
 @example(seed=0, gap=8, filtered=True)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_no_edge_crosses_a_wall_seen_in_pieces_and_all_have_room_for_the_robot(seed, gap, filtered):
     grid = _two_rooms(seed, gap)
     config = CoverageConfig(parts="all", graph=GraphConfig(clutter_filter=filtered))
@@ -108,7 +108,7 @@ def _cluttered(seed):
 
 
 @given(seed=st.integers(0, 10_000), radius=st.sampled_from([0.1, 0.2, 0.3]), filtered=st.booleans())
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_all_of_a_graph_is_free_connected_and_wide_enough_on_cluttered_maps(seed, radius, filtered):
     grid = _cluttered(seed)
     config = CoverageConfig(graph=GraphConfig(clutter_filter=filtered, robot_radius=radius))

@@ -179,6 +179,14 @@ def test_the_bound_of_held_and_karp_is_below_every_tour(seed, n):
     assert 0.8 * best < bound <= best + 1e-9
 
 
+@pytest.mark.parametrize("n", [0, 1, 2, 3])
+def test_the_bound_of_three_vertices_or_fewer_is_the_only_tour_there_is(n: int) -> None:
+    points = np.random.default_rng(n).uniform(0, 9, (n, 2))
+    distances = np.linalg.norm(points[:, None] - points[None, :], axis=2)
+    ring = sum(float(np.linalg.norm(points[i] - points[i - 1])) for i in range(n))
+    assert find_lower_bound(distances, upper=1e9, steps=5) == pytest.approx(ring)
+
+
 @given(seed=st.integers(0, 10_000), n=st.integers(4, 40))
 @settings(max_examples=40, deadline=None)
 def test_moves_keep_a_tour_and_shorten_it(seed, n):

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from closedrooms.core.random import stream
-from closedrooms.experiments.training.synthetic_maps import draw_map, write_sample
+from closedrooms.experiments.training.synthetic_maps import synthesise_map, write_sample
 from closedrooms.worlds.closing import draw_closed
 from closedrooms.worlds.generation.generator import generate
 
@@ -17,6 +17,6 @@ def drawn_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
         kind, seed = (name.split("-")[0], int(name.split("-")[2])) if "-g1-" in name else ("office", 7)
         plan = generate(kind, seed)
         rng = stream(number, "test")
-        drawn = draw_map(plan, draw_closed(plan, 3, rng), rng)
+        drawn = synthesise_map(plan, draw_closed(plan, 3, rng), rng)
         write_sample(folder / name / "00", drawn, world=name, repetition=0)
     return folder

@@ -7,7 +7,7 @@ import shapely
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.random import stream
-from closedrooms.experiments.evaluation.listing import find_samples
+from closedrooms.experiments.evaluation.samples.listing import find_samples
 from closedrooms.experiments.training.batches import blur, draw_batches, hide_pockets, make_batch
 from closedrooms.experiments.training.buildings import group_of, may_train
 from closedrooms.experiments.training.config import TrainConfig
@@ -17,10 +17,10 @@ from closedrooms.experiments.training.examples import (
     draw_room,
     gather_examples,
     measure_sides,
-    pack,
-    unpack,
+    pack_patch,
+    unpack_patches,
 )
-from closedrooms.experiments.training.train import split_buildings
+from closedrooms.experiments.training.train import hold_out_buildings
 from closedrooms.predictor.learned.patches import ASIDE, BEHIND, CELL, FINE, SIZE, Patch
 
 
@@ -80,7 +80,7 @@ def test_patches_come_back_from_what_is_kept() -> None:
     occupied = WHOLE - free
     doors = rng.random((2, SIZE, SIZE)) < 0.1
     channels = np.stack((free / WHOLE, occupied / WHOLE, np.zeros((SIZE, SIZE)), *doors))
-    assert unpack(pack(upright(channels))[None])[0] == pytest.approx(channels, abs=1e-6)
+    assert unpack_patches(pack_patch(upright(channels))[None])[0] == pytest.approx(channels, abs=1e-6)
 
 
 def test_buildings_kept_to_choose_or_report_do_not_train() -> None:
@@ -112,17 +112,17 @@ def empty(groups: list[int]) -> Examples:
 def test_no_building_is_learned_from_and_held_out() -> None:
     examples = empty([0, 0, 1, 2, 2, 2, 3, 4])
     config = TrainConfig(datasets=(Path("x"),), out=Path("y"), held_out=0.4)
-    fit, held = split_buildings(examples, config)
+    fit, held = hold_out_buildings(examples, config)
     assert sorted([*fit, *held]) == list(range(8))
     assert not set(examples.groups[fit]) & set(examples.groups[held])
     assert len(set(examples.groups[held])) == 2
-    assert [list(part) for part in split_buildings(examples, config)] == [list(fit), list(held)]
+    assert [list(part) for part in hold_out_buildings(examples, config)] == [list(fit), list(held)]
 
 
 @pytest.mark.parametrize("groups", [[], [0, 0]])
 def test_one_building_is_too_few(groups: list[int]) -> None:
     with pytest.raises(InvalidInputError, match=r"buildings.*expected samples with truth_rooms\.geojson"):
-        split_buildings(empty(groups), TrainConfig(datasets=(Path("x"),), out=Path("y")))
+        hold_out_buildings(empty(groups), TrainConfig(datasets=(Path("x"),), out=Path("y")))
 
 
 def test_an_epoch_depends_on_seed_and_number_alone(gathered) -> None:

@@ -6,9 +6,9 @@ import pytest
 from closedrooms.core.files.rosmap import read_map
 from closedrooms.core.random import stream
 from closedrooms.core.shapes import cells_inside
-from closedrooms.experiments.evaluation.listing import find_samples
-from closedrooms.experiments.evaluation.samples import read_sample
-from closedrooms.experiments.training.synthetic_maps import DrawnMap, draw_map, write_sample
+from closedrooms.experiments.evaluation.samples.listing import find_samples
+from closedrooms.experiments.evaluation.samples.sample_reader import read_sample
+from closedrooms.experiments.training.synthetic_maps import DrawnMap, synthesise_map, write_sample
 from closedrooms.worlds.closing import draw_closed
 from closedrooms.worlds.library import load_world
 
@@ -17,7 +17,7 @@ from closedrooms.worlds.library import load_world
 def drawn() -> DrawnMap:
     plan = load_world("office-01")
     closed = draw_closed(plan, 3, stream(0, "test"))
-    return draw_map(plan, closed, stream(0, "test", "noise"))
+    return synthesise_map(plan, closed, stream(0, "test", "noise"))
 
 
 def test_a_hidden_room_is_not_seen_and_all_else_is(drawn: DrawnMap) -> None:
@@ -41,7 +41,7 @@ def test_walls_are_seen_from_their_near_side_alone(drawn: DrawnMap) -> None:
 def test_the_same_seed_draws_the_same_map() -> None:
     plan = load_world("office-01")
     closed = draw_closed(plan, 2, stream(1, "test"))
-    one, other = (draw_map(plan, closed, stream(1, "noise"), angle=0.3) for _ in range(2))
+    one, other = (synthesise_map(plan, closed, stream(1, "noise"), angle=0.3) for _ in range(2))
     assert np.array_equal(one.observed.cells, other.observed.cells)
     assert one.doors == other.doors
 

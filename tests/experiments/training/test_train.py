@@ -10,8 +10,8 @@ import pytest
 from closedrooms.core.errors import OutputError
 from closedrooms.core.runtime import packages
 from closedrooms.core.runtime.packages import MissingPackageError
-from closedrooms.experiments.evaluation.listing import find_samples
-from closedrooms.experiments.evaluation.samples import read_sample
+from closedrooms.experiments.evaluation.samples.listing import find_samples
+from closedrooms.experiments.evaluation.samples.sample_reader import read_sample
 from closedrooms.experiments.training.config import TrainConfig
 from closedrooms.experiments.training.train import CHECKPOINT, train
 from closedrooms.predictor.config import LearnedConfig

@@ -38,7 +38,7 @@ def message_types(*, ros1: bool) -> Any:
 
 
 class BagMaker:
-    """Collects messages, then writes them in the order of recording."""
+    """Collector of messages, which writes them in the order of recording."""
 
     def __init__(self, path: Path, storage: str) -> None:
         self._path, self._storage, self._store = path, storage, message_types(ros1=storage == "ros1")

@@ -37,7 +37,7 @@ def test_a_drive_written_and_read_again_is_the_same(tmp_path: Path, office: Any)
     assert again.scans[3].ranges == pytest.approx(run.scans[3].ranges, rel=1e-6)
     result = build_map(again)
     assert result.errors["final"][0] < 0.03
-    assert result.online.shape == result.trajectory.shape == run.odometry.shape
+    assert result.trajectory.shape == run.odometry.shape
 
 
 def test_scans_without_odometry_are_skipped_and_counted(tmp_path: Path) -> None:
@@ -72,3 +72,21 @@ def test_a_truncated_archive_is_clear(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:400])
     with pytest.raises(InvalidInputError, match="broken"):
         read_run(path)
+
+
+def test_arrays_of_mrpt_are_half_a_turn_of_beams_steps_of_odometry_and_ticks(tmp_path: Path) -> None:
+    path = tmp_path / "mrpt.npz"
+    ranges = np.array([[1.0, 2.0, 3.0, 0.0, 81.0], [1.0] * 5, [1.0] * 5])
+    # A quarter turn to the left, then a metre ahead.
+    steps = np.array([[0.0, 0.0, np.pi / 2], [1.0, 0.0, 0.0]])
+    ticks = np.array([0, 5_000_000, 20_000_000], dtype=np.uint64) + np.uint64(128_000_000_000_000_000)
+    np.savez(path, ranges=ranges, odom=steps, ts=ticks, sensor_xy=[0.2, -0.1])
+    run = read_run(path)
+    first = run.scans[0]
+    # From the right of the robot to its left, five beams 45 degrees apart.
+    assert first.angle_min == pytest.approx(-np.pi / 2)
+    assert first.angle_increment == pytest.approx(np.pi / 4)
+    assert first.ranges == pytest.approx([1.0, 2.0, 3.0, np.nan, np.nan], nan_ok=True)
+    assert run.odometry == pytest.approx(np.array([[0, 0, 0], [0, 0, np.pi / 2], [0, 1, np.pi / 2]]))
+    assert [scan.stamp for scan in run.scans] == pytest.approx([0.0, 0.5, 2.0])
+    assert first.robot_T_sensor == pytest.approx((0.2, -0.1, 0.0))

@@ -17,7 +17,7 @@ from closedrooms.predictor.best.door_frame import door_frame, sum_up, turn_map
 from closedrooms.predictor.best.hypotheses import Hypotheses
 from closedrooms.predictor.best.method import predict_best
 from closedrooms.predictor.best.pair_features import PAIR_FEATURES, Pairs
-from closedrooms.predictor.best.selection import choose
+from closedrooms.predictor.best.selection import JointSearch, choose
 from closedrooms.predictor.config import BestConfig
 from closedrooms.predictor.structure.wall_directions import find_wall_directions
 from closedrooms.predictor.structure.wall_faces import find_face_edges, find_faces
@@ -116,7 +116,7 @@ def _draw(rng: np.random.Generator, u: float) -> Hypotheses:
 def test_two_doors_are_chosen_as_well_as_by_trying_every_pair(seed: int) -> None:
     rng = np.random.default_rng(seed)
     doors = [_draw(rng, 0.0), _draw(rng, 70.0)]
-    chosen, scores, cut = choose(doors, 4)
+    chosen, scores, cut = choose(JointSearch(doors, 4), safe=False)
     assert not cut
 
     def total(i: int, j: int) -> float:
@@ -124,7 +124,7 @@ def test_two_doors_are_chosen_as_well_as_by_trying_every_pair(seed: int) -> None
             Hypotheses(s.boxes[[k]], s.corners[[k]], s.scores[[k]], s.angle, s.quarter, s.u, s.v, s.measured)
             for s, k in zip(doors, (i, j), strict=True)
         ]
-        _, both, _ = choose(one, 4)
+        _, both, _ = choose(JointSearch(one, 4), safe=False)
         return both[0] + float(doors[1].scores[j])
 
     best = max(total(i, j) for i, j in itertools.product(range(4), repeat=2))

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from closedrooms.predictor.best.door_pose import SAME_WALL
 from closedrooms.predictor.best.hypotheses import Hypotheses
-from closedrooms.predictor.best.lattice import in_cells
 from closedrooms.predictor.best.pair_features import (
     DEPTH_REACH,
     OFF_DEPTH,
@@ -19,6 +18,7 @@ from closedrooms.predictor.best.pair_features import (
     score_pairs,
     weigh_pairs,
 )
+from closedrooms.predictor.best.resolution import in_cells
 
 # Where the room lies in the turned map, by quarter (`door_frame`: left of +y by so many quarter turns).
 INWARD = [(0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.0)]

@@ -9,7 +9,7 @@ from closedrooms.predictor.best.features import FEATURES
 from closedrooms.predictor.confidence.belief import Belief, Spread
 from closedrooms.predictor.confidence.calibration import Curve, calibration_of, read_calibrations
 from closedrooms.predictor.confidence.room_features import NAMES, measure_rooms
-from closedrooms.predictor.confidence.variants import FACTORS, SAME, RoomVariants
+from closedrooms.predictor.confidence.shape_variants import FACTORS, SAME, RoomVariants
 from closedrooms.predictor.config import FacesConfig
 from closedrooms.predictor.inpainting import withdraw_unsure
 from closedrooms.predictor.learned.ratings import WORDS

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.predictor.paper.arrangement import arrange, box_of, unite_faces
+from closedrooms.predictor.paper.arrangement import box_of, build_arrangement, unite_faces
 from closedrooms.predictor.paper.initial_faces import find_entrance, splits_between
 from closedrooms.predictor.paper.lines import Line
 from closedrooms.predictor.paper.unknown_faces import observed_shares, unknown_faces
@@ -27,7 +27,7 @@ LINES = st.lists(
 
 def _grid(xs, ys):
     """Faces between vertical lines at xs and horizontal ones at ys."""
-    return arrange([Line(math.pi / 2, -x) for x in xs] + [Line(0.0, y) for y in ys], BOX)
+    return build_arrangement([Line(math.pi / 2, -x) for x in xs] + [Line(0.0, y) for y in ys], BOX)
 
 
 def _at(arrangement, x, y):
@@ -37,7 +37,7 @@ def _at(arrangement, x, y):
 @given(LINES)
 @settings(max_examples=60, deadline=None)
 def test_faces_tile_the_box_without_overlap(lines):
-    arrangement = arrange(lines, BOX)
+    arrangement = build_arrangement(lines, BOX)
     box = box_of(BOX)
     assert arrangement.areas.sum() == pytest.approx(box.area, abs=1e-4)
     assert shapely.union_all(list(arrangement.faces)).area == pytest.approx(box.area, abs=1e-4)
@@ -50,7 +50,7 @@ def test_faces_tile_the_box_without_overlap(lines):
 @given(LINES)
 @settings(max_examples=60, deadline=None)
 def test_neighbours_are_symmetric_and_share_their_edge(lines):
-    arrangement = arrange(lines, BOX)
+    arrangement = build_arrangement(lines, BOX)
     for face, beside in enumerate(arrangement.neighbours):
         for other, edge in beside.items():
             assert arrangement.neighbours[other][face] == edge
@@ -63,7 +63,7 @@ def test_neighbours_are_symmetric_and_share_their_edge(lines):
 @given(LINES)
 @settings(max_examples=40, deadline=None)
 def test_border_faces_are_those_that_touch_the_box(lines):
-    arrangement = arrange(lines, BOX)
+    arrangement = build_arrangement(lines, BOX)
     ring = box_of(BOX).exterior
     for face, border in zip(arrangement.faces, arrangement.border, strict=True):
         shared = face.buffer(1e-9).intersection(ring).length
@@ -80,7 +80,7 @@ def test_a_hand_made_arrangement_is_exact():
 
 
 def test_faces_of_many_lines_with_one_crossing_have_no_slivers():
-    arrangement = arrange([Line(a, 0.0) for a in np.linspace(0.1, 3.0, 7)], BOX)
+    arrangement = build_arrangement([Line(a, 0.0) for a in np.linspace(0.1, 3.0, 7)], BOX)
     assert len(arrangement.faces) == 14
     assert arrangement.areas.min() > 1.0
 
@@ -151,7 +151,7 @@ def test_doors_on_one_edge_are_parted_in_the_middle():
     splits = splits_between(arrangement, entrances)
     crossings = sorted(float(-line.offset * math.sin(line.angle)) for line in splits)
     np.testing.assert_allclose(crossings, [-1.5, 1.0], atol=1e-9)
-    again = arrange([*arrangement.lines[:-4], *splits], BOX)
+    again = build_arrangement([*arrangement.lines[:-4], *splits], BOX)
     unknown = unknown_faces(again, _half_known(), min_unknown=0.3, max_free=0.5)
     faces = [find_entrance(again, unknown, door, reach=1.0).face for door in doors]
     assert len(set(faces)) == 3
@@ -163,9 +163,9 @@ def test_a_line_with_a_span_ends_at_full_lines() -> None:
     # A grid of 2 m; a slanted line whose walls lie in the cell around the origin.
     places = (-3.0, -1.0, 1.0, 3.0)
     full = [Line(math.pi / 2, -x) for x in places] + [Line(0.0, y) for y in places]
-    whole = arrange(full, BOX)
+    whole = build_arrangement(full, BOX)
     slanted = Line(math.pi / 4, 0.3, span=(-0.5, 0.5))
-    cut = arrange([*full, slanted], BOX)
+    cut = build_arrangement([*full, slanted], BOX)
     # y = x + 0.3 sqrt(2) enters at x = -1 and leaves at y = 1: that cell alone falls in two.
     assert len(cut.faces) == len(whole.faces) + 1
     own = shapely.box(-1.0, -1.0, 1.0, 1.0).buffer(1e-3)
@@ -173,7 +173,7 @@ def test_a_line_with_a_span_ends_at_full_lines() -> None:
     areas = sorted(face.area for face in cut.faces if own.contains(face))
     assert areas == pytest.approx([corner, 4.0 - corner], abs=1e-3)
     # One that reaches further cuts as many cells as it crosses, one without a span all of them.
-    longer = arrange([*full, Line(math.pi / 4, 0.3, span=(-2.0, 2.0))], BOX)
-    everywhere = arrange([*full, Line(math.pi / 4, 0.3)], BOX)
+    longer = build_arrangement([*full, Line(math.pi / 4, 0.3, span=(-2.0, 2.0))], BOX)
+    everywhere = build_arrangement([*full, Line(math.pi / 4, 0.3)], BOX)
     assert len(cut.faces) < len(longer.faces) < len(everywhere.faces)
     assert all(face.area == pytest.approx(face.convex_hull.area, abs=1e-9) for face in longer.faces)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.predictor.config import PaperConfig
-from closedrooms.predictor.paper.arrangement import arrange
+from closedrooms.predictor.paper.arrangement import build_arrangement
 from closedrooms.predictor.paper.border import border_rooms
 from closedrooms.predictor.paper.expansion import Growth, expand
 from closedrooms.predictor.paper.face_swaps import swap_faces
@@ -20,7 +20,7 @@ CONFIG = PaperConfig()
 
 def _arrangement(xs, ys, size=20.0):
     box = [Line(a, o, "border") for a in (0.0, math.pi / 2) for o in (-size, size)]
-    return arrange([Line(math.pi / 2, -x) for x in xs] + [Line(0.0, y) for y in ys], box)
+    return build_arrangement([Line(math.pi / 2, -x) for x in xs] + [Line(0.0, y) for y in ys], box)
 
 
 def _at(arrangement, x, y):
@@ -39,7 +39,7 @@ def _random_growth(seed, count):
     cuts = [np.sort(rng.choice(np.arange(-18, 19, 3), size=rng.integers(3, 7), replace=False)) for _ in range(2)]
     lines = [Line(math.pi / 2, -float(x)) for x in cuts[0]] + [Line(0.0, float(y)) for y in cuts[1]]
     lines += [Line(float(rng.uniform(0, np.pi)), float(rng.uniform(-8, 8))) for _ in range(2)]
-    arrangement = arrange(lines, [Line(a, o, "border") for a in (0.0, math.pi / 2) for o in (-20.0, 20.0)])
+    arrangement = build_arrangement(lines, [Line(a, o, "border") for a in (0.0, math.pi / 2) for o in (-20.0, 20.0)])
     unknown = rng.random(len(arrangement.faces)) < 0.75
     entrances = []
     for face in rng.permutation(np.flatnonzero(unknown))[:count]:

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from closedrooms.predictor.config import Weights
-from closedrooms.predictor.paper.arrangement import arrange
+from closedrooms.predictor.paper.arrangement import build_arrangement
 from closedrooms.predictor.paper.layout_score import FaceSet, Terms, face_set, score_layouts
 from closedrooms.predictor.paper.lines import Line
 from closedrooms.predictor.paper.subsets import best_subset
@@ -59,7 +59,7 @@ def _pool(xs, ys, unknown_share, seed):
     """A random set of faces between slightly slanted lines, one of them fixed."""
     rng = np.random.default_rng(seed)
     lines = [Line(math.pi / 2 + 0.02, -x) for x in xs] + [Line(0.0, y) for y in ys]
-    arrangement = arrange(lines, BOX)
+    arrangement = build_arrangement(lines, BOX)
     inner = np.flatnonzero(~arrangement.border)
     start = int(inner[rng.integers(inner.size)])
     unknown = rng.random(len(arrangement.faces)) < unknown_share

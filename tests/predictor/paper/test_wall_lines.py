@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from closedrooms.core.errors import InvalidInputError
@@ -56,6 +56,7 @@ def test_a_map_without_walls_has_no_segments():
     assert find_segments(grid, CONFIG).shape == (0, 4)
 
 
+@settings(max_examples=40)
 @given(st.floats(0.0, math.pi, exclude_max=True), st.lists(st.floats(-0.03, 0.03), min_size=4, max_size=20))
 def test_any_two_perpendicular_directions_are_found(angle, wobble):
     segments = [_segment(angle + w, 3.0 * i, 0.0, 4.0 + i) for i, w in enumerate(wobble)]
@@ -145,6 +146,7 @@ def test_collinear_walls_far_apart_share_a_line_and_parallel_ones_do_not():
     assert abs(abs(merged.offset) - 1.05) < 1e-6
 
 
+@settings(max_examples=30)
 @given(st.lists(st.integers(-80, 80), min_size=2, max_size=30, unique=True), st.integers(0, 5))
 def test_lines_are_the_same_from_either_side(offsets, seed):
     lengths = np.random.default_rng(seed).uniform(1.0, 4.0, len(offsets))
@@ -159,6 +161,7 @@ def test_lines_are_the_same_from_either_side(offsets, seed):
     np.testing.assert_allclose(found(segments), np.sort(-found(mirrored)), atol=1e-9)
 
 
+@settings(max_examples=30)
 @given(st.floats(0.0, math.pi, exclude_max=True))
 def test_boundary_lines_hold_all_segments_at_the_margin(angle):
     segments = np.array([_segment(angle, 2.0, 0.0, 9.0), _segment(angle + math.pi / 2, 3.0, -4.0, 2.0)])

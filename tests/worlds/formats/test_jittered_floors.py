@@ -78,7 +78,7 @@ def test_walls_near_the_axes_stay(tmp_path: Path, degrees: float, jitter: float)
     check_floor(read_kth(path))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     degrees=st.one_of(st.sampled_from([0.0, 90.0, 180.0, 270.0]), st.floats(0.0, 360.0)),
     jitter=st.floats(0.0, 0.02),

@@ -79,7 +79,7 @@ def test_another_form_is_refused_with_the_name_of_the_room(tmp_path: Path, pose:
     assert "\n" not in str(caught.value)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     gap=st.floats(0.0, 3.0),
     wall=st.sampled_from([0.05, 0.1, 0.2, 0.3]),

@@ -18,8 +18,9 @@ from closedrooms.core.pose import Pose2
 from closedrooms.sim.building import building_solids
 from closedrooms.sim.config import RobotConfig
 from closedrooms.sim.contacts import Obstacles, edges_of
-from closedrooms.sim.differential_drive import Drive
-from closedrooms.sim.physics_world import PhysicsWorld, upright
+from closedrooms.sim.physics_world import PhysicsWorld
+from closedrooms.sim.robot.differential_drive import Drive
+from closedrooms.sim.solids import upright
 from closedrooms.worlds.extrusion import extrude
 from closedrooms.worlds.formats.rosmap import read_raster
 from closedrooms.worlds.geometry import room_interior

@@ -9,7 +9,8 @@ import pytest
 import shapely
 
 from closedrooms.sim.building import building_solids
-from closedrooms.sim.physics_world import PhysicsWorld, upright
+from closedrooms.sim.physics_world import PhysicsWorld
+from closedrooms.sim.solids import upright
 from closedrooms.worlds.extrusion import extrude
 from closedrooms.worlds.geometry import WallAxes
 from closedrooms.worlds.library import load_world

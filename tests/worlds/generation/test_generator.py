@@ -8,7 +8,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.formats.native import plan_text
-from closedrooms.worlds.generation.bundled import MOST_CLOSED, RECIPES, bundled_text
+from closedrooms.worlds.generation.bundled import MOST_CLOSED, RECIPES, bundled_plan
 from closedrooms.worlds.generation.corridors import SHAPES
 from closedrooms.worlds.generation.generator import GENERATOR_VERSION, KINDS, SIZES, VERSIONS, generate
 from closedrooms.worlds.geometry import room_interior, wall_area
@@ -101,7 +101,7 @@ def test_the_latest_version_is_among_those_kept() -> None:
 
 @pytest.mark.parametrize("name", RECIPES)
 def test_the_generator_reproduces_the_bundled_worlds_byte_for_byte(name: str) -> None:
-    assert bundled_text(name) == (PLANS / f"{name}.json").read_text()
+    assert plan_text(bundled_plan(name)) == (PLANS / f"{name}.json").read_text()
 
 
 def test_the_bundled_worlds_follow_table_1_of_the_paper() -> None:

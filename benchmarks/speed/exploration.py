@@ -1,0 +1,63 @@
+"""Exploration side by side: known area, simulated time and the share of each step, on any worlds.
+
+    python benchmarks/speed/exploration.py [WORLD ...] [--noise medium] [--close 5] [--seed 0] [--quick]
+
+Prints one row a world: status, simulated seconds, travelled distance, plans, share of the reachable free cells that is
+known at the end, trajectory error, doors seen, and milliseconds a scan for sensing, mapping and navigating.
+"""
+
+import argparse
+
+from closedrooms.core.random import stream
+from closedrooms.mapping.config import MapperConfig
+from closedrooms.mapping.mapper import Mapper
+from closedrooms.mapping.trajectory import ate
+from closedrooms.navigation.config import NavigationConfig
+from closedrooms.pipeline.reporting.progress import Silent
+from closedrooms.pipeline.reporting.run_log import RunLog
+from closedrooms.pipeline.reporting.scores import area_mapped
+from closedrooms.pipeline.survey import survey_building
+from closedrooms.sim.config import SimConfig, noise_level
+from closedrooms.sim.simulation import Simulation
+from closedrooms.worlds.closing import closable_rooms, draw_closed
+from closedrooms.worlds.library import load_world
+from closedrooms.worlds.truth import reachable, truth_bounds
+
+
+def measure(world: str, *, noise: str, close: int, seed: int) -> str:
+    plan = load_world(world)
+    closed = draw_closed(plan, min(close, len(closable_rooms(plan))), stream(seed, "closed doors"))
+    with Simulation(plan, closed, SimConfig(noise=noise_level(noise)), seed) as sim:
+        log, mapper = RunLog(sim, Silent(), keep_scans=False), Mapper(MapperConfig())
+        survey = survey_building(log, mapper, NavigationConfig())
+        result = survey.exploration
+        start = sim.world_T_map
+    map_T_world = start.inverse()
+    x_min, y_min, x_max, y_max = truth_bounds(plan, map_T_world)
+    grid = mapper.grid()
+    grid = grid.on(grid.frame.covering(x_min, y_min, x_max, y_max))
+    cells = reachable(plan, closed, grid.frame, map_T_world, (start.x, start.y))
+    error, _ = ate(mapper.trajectory()[1], log.truth)
+    each = {step: 1e3 * seconds / result.scans for step, seconds in result.wall_seconds.items()}
+    return (
+        f"{plan.name[:24]:<24} {x_max - x_min:4.0f} x {y_max - y_min:3.0f} m  {result.status:<9}"
+        f"{result.seconds:6.0f} s {result.distance:6.0f} m {survey.searches:5d} searches  "
+        f"known {100 * area_mapped(grid, cells):6.2f} %  ate {error:.3f} m  doors {len(mapper.doors())}/{len(closed)}  "
+        f"sense {each['sense']:.2f}  map {each['map']:.2f}  navigate {each['navigate']:.2f} ms/scan"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("worlds", nargs="*", default=["office-01", "office-07"])
+    parser.add_argument("--quick", action="store_true", help="the first world only")
+    parser.add_argument("--noise", default="medium")
+    parser.add_argument("--close", type=int, default=5)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    for world in options.worlds[: 1 if options.quick else None]:
+        print(measure(world, noise=options.noise, close=options.close, seed=options.seed), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,108 @@
+"""Maps as large as one likes, tiled from mapped buildings: processor time and memory of whole processes.
+
+    python benchmarks/speed/large_maps.py RUN... [--cells 4000 8000] [--doors 20] [--methods paper best]
+
+A run is a folder with ``map.yaml`` and ``doors.geojson``. Every method reads the map, predicts and, where it is one of
+``closedrooms predict``, writes its folder, in a process of its own.
+"""
+
+import itertools
+import json
+import resource
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from closedrooms.core.door import ClosedDoor
+from closedrooms.core.files.geojson import read_doors, write_doors
+from closedrooms.core.files.rosmap import read_map, write_map
+from closedrooms.core.grid import UNKNOWN, GridFrame, OccupancyGrid
+from closedrooms.predictor.structure.known_window import known_window
+
+RESOLUTION = 0.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """Options of a measurement."""
+
+    runs: tyro.conf.Positional[tuple[Path, ...]]
+    """Folders with a map and its doors."""
+    cells: tuple[int, ...] = (4000, 8000)
+    """Cells along each side of the tiled maps."""
+    doors: int = 20
+    """How many of the doors are closed, drawn with a fixed seed."""
+    methods: tuple[str, ...] = ("paper", "rose", "best", "line-of-sight", "geometric")
+    """paper, rose, best, line-of-sight, geometric."""
+
+
+def tile(runs: tuple[Path, ...], cells: int, doors: int, folder: Path) -> None:
+    """Write a map of buildings side by side, without space between them, and doors spread over it."""
+    windows = []
+    for run in runs:
+        window = known_window(read_map(run / "map.yaml"), margin=0)
+        assert window is not None, f"{run}: nothing is known"
+        windows.append((window, read_doors(run / "doors.geojson")))
+    drawn, places, row = np.full((cells, cells), UNKNOWN, dtype=np.int8), [], 0
+    endless = itertools.cycle(windows)
+    while row < cells:
+        col, height = 0, cells
+        while col < cells:
+            window, closed = next(endless)
+            part = window.cells[: cells - row, : cells - col]
+            drawn[row : row + part.shape[0], col : col + part.shape[1]] = part
+            for door in closed:
+                x, y = np.subtract(door.midpoint, (window.frame.origin_x, window.frame.origin_y)).tolist()
+                if x < part.shape[1] * RESOLUTION - 1.0 and y < part.shape[0] * RESOLUTION - 1.0:
+                    places.append((x + col * RESOLUTION, y + row * RESOLUTION))
+            height, col = min(height, part.shape[0]), col + part.shape[1]
+        row += height
+    chosen = np.random.default_rng(0).permutation(len(places))[:doors]
+    write_map(folder / "map", OccupancyGrid(GridFrame(RESOLUTION, 0.0, 0.0, cells, cells), drawn))
+    write_doors(folder / "doors.geojson", [ClosedDoor(f"d{n:02d}", places[at]) for n, at in enumerate(chosen)])
+
+
+def measure(method: str, folder: Path) -> tuple[float, float, int]:
+    """Measure processor seconds, megabytes at the peak and rooms of one method in a process of its own."""
+    here = Path(__file__).resolve()
+    words = [sys.executable, str(here), "--only", method, str(folder)]
+    text = subprocess.run(words, check=True, capture_output=True, text=True).stdout
+    seconds, memory, rooms = json.loads(text.splitlines()[-1])
+    return seconds, memory, rooms
+
+
+def only(method: str, folder: Path) -> None:
+    """Predict by one method and say what it took."""
+    from closedrooms.pipeline.config import PredictConfig
+    from closedrooms.pipeline.predict import predict_map
+
+    files = {"map": folder / "map.yaml", "doors": folder / "doors.geojson", "out": folder / method}
+    rooms = len(predict_map(PredictConfig(**files, method=method)).figures["rooms"])
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    print(json.dumps((used.ru_utime + used.ru_stime, used.ru_maxrss / 1024, rooms)))
+
+
+def main() -> None:
+    options = tyro.cli(Options, description=__doc__)
+    table = Table("cells", *(f"{method}: s, MB, rooms" for method in options.methods))
+    for cells in options.cells:
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            tile(options.runs, cells, options.doors, folder)
+            measured = [measure(method, folder) for method in options.methods]
+        table.add_row(f"{cells} x {cells}", *(f"{seconds:.1f}, {memory:.0f}, {n}" for seconds, memory, n in measured))
+    Console(width=200).print(table)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--only"]:
+        only(sys.argv[2], Path(sys.argv[3]))
+    else:
+        main()

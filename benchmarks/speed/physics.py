@@ -1,0 +1,110 @@
+"""What bodies cost: processor time a simulated second, kinematic beside wheels beside bare ``stepSimulation``.
+
+    python benchmarks/speed/physics.py [WORLD ...] [--seconds S]
+
+The robot drives the same commands in every row. Bare steps are those of the world with wheels, without commands,
+encoders or contacts being read. Rays are one sweep of 720 beams a tenth of a second. The figures are this machine's and
+should be quoted as ratios. With ``--sweeps`` it drives at 1 m/s and turns at 2 rad/s instead, and says how far the
+mapper is off with instant and rolling sweeps, straightened and not.
+"""
+
+import argparse
+import math
+from collections.abc import Callable
+from itertools import pairwise
+from time import process_time
+
+import numpy as np
+
+from closedrooms.core.pose import Pose2
+from closedrooms.core.robot import RobotConfig
+from closedrooms.mapping.config import MapperConfig
+from closedrooms.mapping.mapper import Mapper
+from closedrooms.mapping.trajectory import ate
+from closedrooms.sim.config import STEPS, LidarConfig, SimConfig
+from closedrooms.sim.simulation import Simulation
+from closedrooms.worlds.closing import closable_rooms, draw_closed
+from closedrooms.worlds.library import load_world
+from closedrooms.worlds.plan import FloorPlan
+
+WORLDS = ("office-01", "office-07", "school-09")
+CLOSED = 5
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("worlds", nargs="*", default=WORLDS)
+    parser.add_argument("--seconds", type=float, default=20.0, help="simulated [s]")
+    parser.add_argument("--sweeps", action="store_true", help="errors of rolling sweeps instead of costs")
+    options = parser.parse_args()
+    if options.sweeps:
+        for name in options.worlds:
+            compare_sweeps(name, load_world(name), options.seconds)
+        return
+    heads = "".join(f"{head:>13}" for head in ("move [ms/s]", "rays [ms/s]", "us a step", "x kinematic"))
+    print(f"{'world':<12}{'doors':>6}{'body':>11}{heads}")
+    for name in options.worlds:
+        compare_bodies(name, load_world(name), options.seconds)
+
+
+def compare_bodies(name: str, plan: FloorPlan, seconds: float) -> None:
+    """Measure one row a body, and one for the steps alone."""
+    closed = draw_closed(plan, min(CLOSED, len(closable_rooms(plan))), np.random.default_rng(0))
+    first = 0.0
+    for body in ("kinematic", "wheels"):
+        config = SimConfig(body="wheels") if body == "wheels" else SimConfig()
+        with Simulation(plan, closed, config, 0) as sim:
+            count = round(seconds / 0.1)
+            moved, rays = 0.0, 0.0
+            for number in range(count):
+                moved += cost(lambda n=number: sim.step(0.3, 0.8 * math.sin(n / 9), 0.1))
+                rays += cost(sim.observe)
+            first = first or moved + rays
+            row(name, len(plan.doors), body, moved / seconds, rays / seconds, (moved + rays) / first)
+            if body == "wheels":
+                bare = sum(cost(sim.physics.step) for _ in range(round(seconds * STEPS)))
+                row(name, len(plan.doors), "bare steps", bare / seconds, 0.0, bare / first)
+
+
+def row(name: str, doors: int, body: str, moved: float, rays: float, share: float) -> None:
+    step = f"{moved / STEPS * 1e6:.1f}" if body != "kinematic" else ""
+    print(f"{name:<12}{doors:>6}{body:>11}{1e3 * moved:>13.2f}{1e3 * rays:>13.2f}{step:>13}{share:>13.2f}", flush=True)
+
+
+def cost(work: Callable[[], object]) -> float:
+    """Measure processor time [s]."""
+    begun = process_time()
+    work()
+    return process_time() - begun
+
+
+def compare_sweeps(name: str, plan: FloorPlan, seconds: float) -> None:
+    """Compare trajectory errors on one drive back and forth with turns on the spot, at 10 Hz."""
+    for sweep, undistort in (("instant", True), ("rolling", False), ("rolling", True)):
+        lidar = LidarConfig(sweep="rolling") if sweep == "rolling" else LidarConfig()
+        robot = RobotConfig(max_speed=1.0, max_turn_rate=2.0)
+        with Simulation(plan, (), SimConfig(lidar=lidar, robot=robot), 0) as sim:
+            mapper, truth = Mapper(MapperConfig(undistort=undistort)), []
+            for number in range(round(seconds / 0.1)):
+                seen = sim.observe()
+                mapper.process(seen.scan, seen.odometry)
+                truth.append(sim.map_T_robot.as_tuple())
+                sim.step(*command(number, seen.scan.ranges), 0.1)
+            mapper.finish()
+            position, heading = ate(mapper.trajectory()[1], np.array(truth))
+            way = sum(Pose2(*a).distance(Pose2(*b)) for a, b in pairwise(truth))
+            how = "straightened" if sweep == "rolling" and undistort else ""
+            print(f"{name:<12}{sweep:<8} {how:<13}{way:6.1f} m  ATE {position:.4f} m {math.degrees(heading):.3f} deg")
+
+
+def command(number: int, ranges: np.ndarray) -> tuple[float, float]:
+    """Choose speeds: 1 m/s ahead where 1.5 m are free, else 2 rad/s on the spot; a whole turn every 6 s."""
+    middle = len(ranges) // 2
+    ahead = np.nanmin(ranges[middle - 40 : middle + 40])
+    if number % 60 < 32 and number % 60 >= 0 and number >= 60:
+        return (0.0, 2.0)
+    return (1.0, 0.0) if ahead > 1.5 else (0.0, 2.0)
+
+
+if __name__ == "__main__":
+    main()

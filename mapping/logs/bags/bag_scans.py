@@ -1,0 +1,88 @@
+"""Laser scans of a bag as the robot sees them."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.pose import wrap_angle
+from closedrooms.core.scan import LaserScan
+from closedrooms.mapping.logs.bags.transform_tree import Mount
+
+LARGEST_VIEW = 2.0 * math.pi + 0.1
+"""No sweep looks further around [rad], one beam and rounding more than a turn."""
+SAME_VIEW = 0.02
+"""Share by which last angle less first may miss the beams' steps: headers are rounded."""
+SCAN, ECHOES = "sensor_msgs/msg/LaserScan", "sensor_msgs/msg/MultiEchoLaserScan"
+
+
+def ranges_of(message: Any) -> tuple[FloatArray, int]:
+    """Read the ranges of one sweep, the first echo of each beam; returns how many other echoes there were too."""
+    if message.__msgtype__ == SCAN:
+        return np.array(message.ranges, dtype=np.float64), 0
+    beams = [np.asarray(beam.echoes, dtype=np.float64) for beam in message.ranges]
+    first = [_first_echo(echoes, max(float(message.range_min), 0.0)) for echoes in beams]
+    return np.array(first, dtype=np.float64), sum(max(echoes.size - 1, 0) for echoes in beams)
+
+
+def _first_echo(echoes: FloatArray, shortest: float) -> float:
+    """Choose the nearest echo that the sensor can measure; a beam without any says nothing (dust is nearer)."""
+    measured = echoes[np.isfinite(echoes) & (echoes >= shortest)]
+    if measured.size:
+        return float(measured.min())
+    return math.inf if (echoes == math.inf).any() else math.nan
+
+
+def sector_of(message: Any, beams: int) -> tuple[float, float, str]:
+    """Resolve the angles of a sweep whose header need not make sense: public writers put degrees or a count of steps.
+
+    Args:
+        message: LaserScan or MultiEchoLaserScan.
+        beams: Number of its ranges.
+
+    Returns:
+        Angle of the first beam and from one beam to the next [rad], and what was mended; empty where nothing was.
+
+    Raises:
+        InvalidInputError: Nothing to tell the angles by.
+    """
+    start, step = float(message.angle_min), float(message.angle_increment)
+    view = float(message.angle_max) - start
+    if not (math.isfinite(start) and math.isfinite(step) and beams):
+        raise InvalidInputError("a scan without angles", expected="finite angles")
+    if step != 0.0 and abs(step) * (beams - 1) <= LARGEST_VIEW:
+        return start, step, ""
+    agree = step != 0.0 and any(abs(step * gaps - view) <= SAME_VIEW * abs(view) for gaps in (beams - 1, beams))
+    if agree and math.radians(abs(step)) * (beams - 1) <= LARGEST_VIEW:
+        return math.radians(start), math.radians(step), "in degrees"
+    if beams > 1 and 0.0 < abs(view) <= LARGEST_VIEW:
+        return start, view / (beams - 1), "the step makes no sense; taken from the first and the last angle"
+    raise InvalidInputError("a scan of more than a turn, or of none", expected="angles in radians")
+
+
+def scan_of(message: Any, ranges: FloatArray, mount: Mount) -> LaserScan:
+    """Convert a message to a sweep, counter-clockwise from above.
+
+    Args:
+        message: LaserScan or MultiEchoLaserScan.
+        ranges: Its ranges, shape (n,) [m].
+        mount: Where the lidar sits.
+
+    Raises:
+        InvalidInputError: Angles or limits of no sense, or no ranges.
+    """
+    start, step, _ = sector_of(message, ranges.size)
+    longest, shortest = float(message.range_max), max(float(message.range_min), 0.0)
+    if mount.upside_down:
+        start, step = -start, -step
+    if step < 0.0:
+        start, step, ranges = start + step * (ranges.size - 1), -step, ranges[::-1]
+    if abs(step * ranges.size - 2.0 * math.pi) < step / 2.0:
+        # All around, the sweep begins behind the robot: how the lidar is turned does not decide which beams are taken.
+        turned = round((wrap_angle(start + mount.pose.theta + math.pi + step / 2.0) - step / 2.0) / step)
+        start, ranges = wrap_angle(start - turned * step), np.roll(ranges, turned)
+    # Zero and what lies below range_min is no measurement (REP-117).
+    ranges = np.where(ranges < max(shortest, 1e-6), np.nan, ranges)
+    return LaserScan(ranges, start, step, longest, shortest, robot_T_sensor=mount.pose.as_tuple())

@@ -1,0 +1,227 @@
+"""Recorded runs in rosbag 1, rosbag 2 and MCAP files, through the optional ``rosbags``."""
+
+import contextlib
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.files.incoming import check_regular, is_file, is_folder, read_head, reading
+from closedrooms.core.pose import Pose2
+from closedrooms.core.remarks import Remark
+from closedrooms.core.scan import LaserScan
+from closedrooms.mapping.logs.bags.bag_limits import limited
+from closedrooms.mapping.logs.bags.bag_messages import (
+    MAX_SCANS,
+    BagMessages,
+    choose_connections,
+    read_messages,
+    stamp_of,
+)
+from closedrooms.mapping.logs.bags.bag_options import BagOptions
+from closedrooms.mapping.logs.bags.bag_scans import ranges_of, scan_of, sector_of
+from closedrooms.mapping.logs.bags.transform_tree import Mount, TransformTree, clean_name
+from closedrooms.mapping.logs.clocks import Times, forward, scan_and_odometry_times
+from closedrooms.mapping.logs.recorded_odometry import bridge_jumps, jump_remarks, odometry_at
+from closedrooms.mapping.logs.recorded_run import RecordedRun
+
+SUFFIXES = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite": ".db3"}
+"""What the files of a bag begin with, and how their names should end."""
+
+
+def read_bag(path: Path, options: BagOptions) -> RecordedRun:
+    """Read laser scans, and the odometry interpolated at their times.
+
+    Odometry comes from ``nav_msgs/Odometry``, else from the transforms, else there is none. Where the lidar sits comes
+    from the transforms between it and the frame that the odometry moves.
+
+    Args:
+        path: A ``.bag``, ``.mcap`` or ``.db3`` file, or a rosbag 2 folder.
+        options: What to take where it holds several, and the mounting where it does not say.
+
+    Raises:
+        InvalidInputError: ``rosbags`` is not installed, a broken bag, a topic missing or ambiguous, a mounting that is
+            unknown or not level.
+    """
+    with opened_bag(path) as reader:
+        wanted, remarks = choose_connections(reader.connections, options)
+        messages = read_messages(reader, wanted)
+    with reading(path, "a rosbag"):
+        return _resolved(messages, options, remarks)
+
+
+@contextlib.contextmanager
+def opened_bag(path: Path) -> Iterator[Any]:
+    """Open a bag of any kind.
+
+    Raises:
+        InvalidInputError: ``rosbags`` is not installed, or a broken bag.
+    """
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError as error:
+        raise InvalidInputError(
+            "bags need the optional package rosbags", expected="pip install 'closedrooms[bags]'", where=path
+        ) from error
+    for file in path.iterdir() if is_folder(path) else [path]:
+        check_regular(file, "a rosbag")
+    with (
+        reading(path, "a rosbag"),
+        limited(path),
+        _named(path) as named,
+        # Bags of ROS 2 before Iron do not carry the definitions of their messages.
+        AnyReader([named], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader,
+    ):
+        yield reader
+
+
+@contextlib.contextmanager
+def _named(path: Path) -> Iterator[Path]:
+    """Link to the bag by a name that ends as rosbags expects it: it tells the kinds by their names."""
+    suffix = path.suffix
+    if is_file(path):
+        start = read_head(path, what="a rosbag", size=8)
+        suffix = next((suffix for magic, suffix in SUFFIXES.items() if start.startswith(magic)), suffix)
+    if suffix == path.suffix:
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        named = Path(folder) / f"bag{suffix}"
+        named.symlink_to(path.absolute())
+        yield named
+
+
+def _resolved(messages: BagMessages, options: BagOptions, remarks: list[Remark]) -> RecordedRun:
+    """Put scans, motion and mounting of the messages together to a run, on one clock."""
+    remarks = [*remarks, *_reading_remarks(messages)]
+    if not messages.scans:
+        return RecordedRun((), np.empty((0, 3)), None, tuple(remarks))
+    frames = Counter(clean_name(message.header.frame_id) for message, _ in messages.scans)
+    lidar = frames.most_common(1)[0][0]
+    track, base, found = _motion(messages, lidar, options)
+    mounts, mount_remarks = _mounts(messages.tree, base, list(frames), options, measured=track is not None)
+    scan_times = Times(*np.array([(stamp_of(message), at) for message, at in messages.scans]).T)
+    times = None if track is None else Times(track[:, 0], track[:, 1])
+    stamps, odometry_stamps, clock_remarks = scan_and_odometry_times(scan_times, times)
+    remarks += [*found, *mount_remarks, *clock_remarks]
+    if track is None:
+        poses, known = np.zeros((len(stamps), 3)), np.ones(len(stamps), dtype=np.bool_)
+    else:
+        order = np.argsort(odometry_stamps, kind="stable")
+        odometry_stamps, moved = odometry_stamps[order], track[order, 2:]
+        moved, jumps = bridge_jumps(odometry_stamps, moved)
+        poses, known, lost = odometry_at(np.column_stack((odometry_stamps, moved)), stamps)
+        remarks += [*jump_remarks(jumps), *lost]
+    return _run(messages, known, poses, stamps, mounts, remarks, has_odometry=track is not None)
+
+
+def _run(
+    messages: BagMessages,
+    known: Any,
+    poses: FloatArray,
+    stamps: FloatArray,
+    mounts: dict[str, Mount],
+    remarks: list[Remark],
+    *,
+    has_odometry: bool,
+) -> RecordedRun:
+    """Put the scans that have odometry together."""
+    scans, rows, broken, echoes = [], [], 0, 0
+    mended: Counter[str] = Counter()
+    for row, i in enumerate(np.flatnonzero(known).tolist()):
+        message = messages.scans[i][0]
+        try:
+            ranges, dropped = ranges_of(message)
+            scan = scan_of(message, ranges, mounts[clean_name(message.header.frame_id)])
+            repair = sector_of(message, ranges.size)[2]
+        except InvalidInputError:
+            broken += 1
+            continue
+        echoes += dropped
+        mended.update([repair] if repair else [])
+        scans.append(scan)
+        rows.append(row)
+    if broken:
+        why = "no finite angles, no ranges, or no sense in their limits"
+        remarks.append(Remark(action="dropped", what="scans", why=why, count=broken, loss=True))
+    remarks += [
+        Remark(action="repaired", what="angles of scans", why=how, count=count) for how, count in mended.items()
+    ]
+    if echoes:
+        remarks.append(Remark(action="dropped", what="echoes", why="the first of each beam is mapped", count=echoes))
+    forwards, backwards = forward(stamps[np.flatnonzero(known)[rows]] if rows else np.zeros(0))
+    swept = tuple(
+        LaserScan(s.ranges, s.angle_min, s.angle_increment, s.range_max, s.range_min, float(stamp), s.robot_T_sensor)
+        for s, stamp in zip(scans, forwards, strict=True)
+    )
+    return RecordedRun(swept, poses[rows].reshape(-1, 3), None, (*remarks, *backwards), has_odometry)
+
+
+def _reading_remarks(messages: BagMessages) -> list[Remark]:
+    """Say which messages were broken or too many."""
+    remarks = [
+        Remark(action="dropped", what=what, why="broken in the bag", count=count, loss=what == "scans")
+        for what, count in messages.broken.items()
+    ]
+    if messages.surplus:
+        why = f"more than {MAX_SCANS}"
+        remarks.append(Remark(action="dropped", what="scans", why=why, count=messages.surplus, loss=True))
+    return remarks
+
+
+def _motion(
+    messages: BagMessages, lidar: str, options: BagOptions
+) -> tuple[FloatArray | None, str | None, list[Remark]]:
+    """Read odometry as ``header stamp, recording time, x, y, yaw``; says which frame moves and what was guessed."""
+    odometry = np.array(messages.odometry, dtype=np.float64).reshape(-1, 5)
+    odometry = odometry[np.isfinite(odometry).all(axis=1)]
+    moving = messages.tree.odometry(lidar)
+    # Simulators and drivers without wheels publish an odometry that stands still beside transforms that move.
+    stands = options.odometry_topic is None and len(odometry) > 0 and not np.ptp(odometry[:, 2:], axis=0).any()
+    if len(odometry) and not (stands and moving is not None and np.ptp(moving.track[:, 2:], axis=0).any()):
+        base = messages.base or messages.tree.base_of(lidar)
+        if messages.base or base is None:
+            return odometry, base, []
+        why = f"the odometry does not say what it moves; taken to be {base}"
+        return odometry, base, [Remark(action="guessed", what="frame of the robot", why=why)]
+    if moving is not None:
+        what = "nav_msgs/Odometry never changes" if stands else "no nav_msgs/Odometry"
+        why = f"{what}; taken from the transforms {moving.frame} to {moving.base}"
+        return moving.track, moving.base, [Remark(action="guessed", what="odometry", why=why)]
+    if options.odometry_topic is not None:
+        raise InvalidInputError(
+            f"no odometry on {options.odometry_topic}", expected="transforms from odom to the robot's base"
+        )
+    corrected = messages.tree.corrected
+    beside = f" (poses in {', '.join(corrected)} are no odometry)" if corrected else ""
+    why = f"no odometry in the bag{beside}; found by matching scans alone"
+    return None, messages.tree.base_of(lidar), [Remark(action="guessed", what="motion", why=why)]
+
+
+def _mounts(
+    tree: TransformTree, base: str | None, frames: list[str], options: BagOptions, *, measured: bool
+) -> tuple[dict[str, Mount], list[Remark]]:
+    """Find where each frame of the scans sits on the robot.
+
+    Without odometry it does not matter for the map; the lidar is taken to be the robot where nobody says more.
+    """
+    if options.mount is not None or options.upside_down:
+        mount = Mount(Pose2(*(options.mount or (0.0, 0.0, 0.0))), options.upside_down)
+        return dict.fromkeys(frames, mount), []
+    if not measured and base is None:
+        why = "no transform to the lidar; it is taken to hang upright in the middle of the robot"
+        level = Mount(Pose2(), upside_down=False)
+        return dict.fromkeys(frames, level), [Remark(action="guessed", what="mounting", why=why)]
+    remarks = []
+    for frame in (*frames, base or ""):
+        found = tree.find(frame)
+        if frame and found is not None and found != clean_name(frame):
+            why = f"{frame} is not among the transforms; taken to be {found}"
+            remarks.append(Remark(action="guessed", what="frame", why=why))
+    return {frame: tree.mount(base or "", frame) for frame in frames}, remarks
