@@ -37,7 +37,9 @@ def generate_world(config: GenerateWorld, *, progress: Progress) -> Report:  # n
     """Generate a floor plan."""
     from closedrooms.pipeline.world_files import generate_world as work
 
-    plan = work(config.kind, config.seed, config.out, furniture=config.furniture, force=config.force)
+    plan = work(
+        config.kind, config.seed, config.out, furniture=config.furniture, glass=config.glass, force=config.force
+    )
     return _report(plan, config.out)
 
 

@@ -36,10 +36,10 @@ THICK = 0.12
 """Standard deviation across a pane up to which its cells are in line [m]: walls are seen from both sides."""
 SOLID = 0.10
 """Distance from a solid surface up to which what was seen through is its noise [m]."""
-FRAME = 0.7
+FRAME = 0.5
 """How far beyond what was hit a pane goes on up to the solid wall in its line [m]: less than a door is wide."""
-MARGIN = 0.10
-"""How far a pane goes on in any case [m]: two cells, or beams slip through between its end and the wall."""
+MARGIN = 0.05
+"""How far a pane goes on in any case [m]: a cell, or beams slip through between its end and the wall."""
 FARTHEST = 2.0
 """How far beyond what was hit a pane goes on at most, all in all [m]."""
 SAMPLES = 16
