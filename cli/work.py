@@ -36,7 +36,9 @@ def report_generated(config: GenerateWorld, *, progress: Progress) -> Report:  #
     """Generate a floor plan."""
     from closedrooms.pipeline.world_files import generate_world
 
-    plan = generate_world(config.kind, config.seed, config.out, furniture=config.furniture, force=config.force)
+    plan = generate_world(
+        config.kind, config.seed, config.out, furniture=config.furniture, glass=config.glass, force=config.force
+    )
     return _report(plan, config.out)
 
 

@@ -237,6 +237,9 @@ class MapperConfig:
     undistort: bool = True
     """Straighten sweeps that took time by the odometry's motion; scans of one instant stay as they are."""
 
+    glass: bool = True
+    """Find panes of glass, which only come into view near their normal, and map nothing that is seen through them."""
+
     matcher: MatcherConfig = field(default_factory=MatcherConfig)
     """Scan matching."""
 

@@ -1,12 +1,13 @@
 """The log-odds grid: evidence of hits and misses per cell, from which scans can be taken back exactly."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from closedrooms.core.arrays import CellArray, FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, CellArray, FloatArray, IntArray
 from closedrooms.core.grid import UNKNOWN, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
@@ -15,6 +16,8 @@ from closedrooms.mapping.lattice import Lattice, grown
 
 SUBCELL_BITS = 6
 """Fraction bits of OpenCV's fixed-point polygon corners: 1/64 cell."""
+CROSSED, CROSSED_SHARE = 3, 0.25
+"""Scans that went through a surface, and how many more for each that saw it, from which on it counts as crossed."""
 LatticeWindow = tuple[int, int, int, int]
 """First row and column in the arrays, and number of rows and columns."""
 Mask = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
@@ -55,6 +58,7 @@ class EvidenceGrid:
         self._misses = np.zeros(shape, dtype=np.float32)
         self._cells: CellArray = np.full(shape, UNKNOWN, dtype=np.int8)
         self._dirty: LatticeWindow | None = None
+        self._redrawn: LatticeWindow = (0, 0, *shape)
         self._grid: OccupancyGrid | None = None
         self._percent: CellArray = self._probabilities(1, 1)
 
@@ -161,11 +165,33 @@ class EvidenceGrid:
             places = hits * self._percent.shape[1]
             places += misses.astype(np.int32)
             self._cells[rows, cols] = self._percent.ravel().take(places)
-            self._dirty = None
+            self._redrawn, self._dirty = self._dirty, None
         cells = self._cells.copy()
         cells.flags.writeable = False  # so that it is not copied again
         self._grid = OccupancyGrid(self._lattice.frame, cells)
         return self._grid
+
+    def crossed(self, points: FloatArray, apart: float) -> BoolArray:
+        """Check which places scans went through although a surface was seen there, shape (n,).
+
+        The noise of a wall is crossed, too: what is within ``apart`` [m] of a surface that is not crossed does not
+        count. Only what the last :meth:`grid` drew is looked at.
+
+        Args:
+            points: Map frame, shape (n, 2) [m].
+            apart: Reach of the noise of a surface [m].
+        """
+        row, col, n_rows, n_cols = self._redrawn
+        hits, misses = (a[row : row + n_rows, col : col + n_cols] for a in (self._hits, self._misses))
+        through = misses >= CROSSED + hits * np.float32(CROSSED_SHARE)
+        span = 2 * math.ceil(apart / self._lattice.resolution) + 1
+        solid = ((hits > 0) & ~through).astype(np.uint8)
+        through &= cv2.dilate(solid, np.ones((span, span), dtype=np.uint8)) == 0
+        rows, cols = self._lattice.cells(points)
+        rows, cols = rows - row, cols - col
+        result = (rows >= 0) & (rows < n_rows) & (cols >= 0) & (cols < n_cols)
+        result[result] = through[rows[result], cols[result]]
+        return result
 
     def _probabilities(self, hits: int, misses: int) -> CellArray:
         """Tabulate the probability in percent for each number of hits (rows) and misses (columns): it is quicker."""

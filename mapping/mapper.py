@@ -15,6 +15,7 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.beams import Beams, clean, hit_points, matched_range, thin_points
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.door_fusion import fuse_doors
+from closedrooms.mapping.glass import Panes, before_glass
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.graph.keyframe_graph import KeyframeGraph
 from closedrooms.mapping.graph.pose_graph import Edge
@@ -38,6 +39,9 @@ COMPARED_KEYFRAMES = 2
 """Keyframes that a scan must contradict."""
 GOOD_SCORE = 0.75
 """Mean likelihood [0..1] of a good match, before the usual one is known."""
+GLIMPSE, GLIMPSE_RANGE = 0.06, 1.2
+"""Distance between scans whose near surfaces are looked at for glass [m], and up to which those are near [m]: of a pane
+that is 0.3 m away, 0.1 m is in view."""
 
 
 class Mapper:
@@ -56,6 +60,9 @@ class Mapper:
         self._trusted = True
         self._lost = 0
         self._evidence = EvidenceGrid(self._config)
+        self._corrected = False
+        self._glimpsed = Pose2()
+        self._panes = Panes(self._config.resolution)
         self._pose = Pose2()
         self._prediction = MotionPrediction(self._config.recovery, self._events)
         self._motion = UncertainMotion()
@@ -129,11 +136,27 @@ class Mapper:
         self._last_odometry = odometry
         latest = self.keyframes[-1]
         keyframe_T_robot = latest.pose.inverse() @ self._pose
+        if self._config.glass:
+            self._look_for_glass(scan, latest, keyframe_T_robot, motion)
         for sighting in sightings:
             latest.remember(sighting, keyframe_T_robot)
         self._stamps.append(scan.stamp)
         self._references.append((latest.index, keyframe_T_robot))
         return self._pose
+
+    def _look_for_glass(
+        self, scan: LaserScan, latest: Keyframe, keyframe_T_robot: Pose2, motion: SweepMotion | None
+    ) -> None:
+        """Note what is met near its normal: by keyframes, and between them what is near and so in view for a moment."""
+        if latest.stamp == scan.stamp:
+            points, origin = latest.beams.points, latest.beams.origin
+        elif self._glimpsed.distance(self._pose) < GLIMPSE:
+            return
+        else:
+            points = hit_points(scan, max_range=GLIMPSE_RANGE, motion=motion)
+            origin = np.array(scan.robot_T_sensor[:2])
+        self._glimpsed = self._pose
+        self._panes.glimpse(latest.index, keyframe_T_robot, points, origin)
 
     def _sweep_motion(self, scan: LaserScan, odometry: Pose2 | None) -> SweepMotion | None:
         """Find how the robot moved while a sweep was taken, ``None`` where that does not matter or is not known."""
@@ -309,15 +332,31 @@ class Mapper:
         """Move what hangs on the keyframes (the robot's pose, doors, map) with them."""
         self._pose = self.keyframes[-1].pose
         self._local.clear()
-        self._drawn = 0
+        self._drawn, self._corrected = 0, True
 
     def grid(self) -> OccupancyGrid:
         """Draw the map so far, from the keyframes' present poses."""
+        new = self._drawn < len(self.keyframes)
+        grid = self._draw()
+        if not (new and self._config.glass):
+            return grid
+        changed = self._panes.update(self.keyframes, self._evidence, moved=self._corrected)
+        self._corrected = False
+        if not len(changed):
+            return grid
+        for keyframe in self.keyframes:
+            if self._panes.seen_through(keyframe, changed):
+                keyframe.shown = None
+        self._drawn = 0
+        return self._draw()
+
+    def _draw(self) -> OccupancyGrid:
         moved = [keyframe for keyframe in self.keyframes[self._drawn :] if _outdated(keyframe)]
-        self._evidence.add_all([(k.beams, k.drawn) for k in moved if k.drawn is not None], sign=-1)
-        self._evidence.add_all([(k.beams, k.pose) for k in moved])
+        self._evidence.add_all([k.drawn for k in moved if k.drawn is not None], sign=-1)
         for keyframe in moved:
-            keyframe.drawn = keyframe.pose
+            keyframe.shown = before_glass(keyframe.beams, keyframe.pose, self._panes.segments)
+            keyframe.drawn = (keyframe.shown, keyframe.pose)
+        self._evidence.add_all([k.drawn for k in moved if k.drawn is not None])
         self._drawn = len(self.keyframes)
         return self._evidence.grid()
 
@@ -343,6 +382,8 @@ class Mapper:
 
 
 def _outdated(keyframe: Keyframe) -> bool:
-    """Check whether a keyframe is not drawn where it is now."""
-    drawn, pose = keyframe.drawn, keyframe.pose
-    return drawn is None or drawn.distance(pose) > MOVED[0] or abs(wrap_angle(drawn.theta - pose.theta)) > MOVED[1]
+    """Check whether a keyframe is not drawn as, and where, it is now."""
+    if keyframe.drawn is None or keyframe.shown is not keyframe.drawn[0]:
+        return True
+    drawn, pose = keyframe.drawn[1], keyframe.pose
+    return drawn.distance(pose) > MOVED[0] or abs(wrap_angle(drawn.theta - pose.theta)) > MOVED[1]

@@ -22,6 +22,8 @@ CHECK_AHEAD = 3.0
 SAME_PLACE = 0.5
 # A robot that gets stuck so many times on the way to one goal does not get through there.
 HELD_UP = 3
+# So often the robot tries again, at the end, what something kept it from.
+CHANCES = 2
 # A robot that faces its goal waits this long for the map to take in what it sees [s].
 SETTLE = 0.4
 
@@ -47,6 +49,7 @@ class Explorer(Decider):
         self._checked_at = -math.inf
         self._replanned_at = -math.inf
         self._facing_since: float | None = None
+        self._chances = CHANCES
 
     @property
     def frontiers(self) -> FloatArray:
@@ -79,6 +82,8 @@ class Explorer(Decider):
             # or not at all, and the search goes on elsewhere.
             self._search.map.add_obstacles(barrier(now.pose, self._driver.ahead(SAME_PLACE), self.config))
         self.goal = None
+        if self._driver.recoveries > self.config.max_recoveries:
+            self._second_chance()
 
     def _check(self, pose: Pose2, grid: OccupancyGrid, now: float) -> None:
         """Drop a goal that has become known; plan anew where the path is blocked or something nearer has turned up."""
@@ -111,13 +116,24 @@ class Explorer(Decider):
         while True:
             goal = self._search.find(pose, grid)
             if goal is None:
+                if self._second_chance():
+                    continue
                 self.status = "stuck" if self._search.enclosed else "complete"
                 return False
             if self._count(goal.place) <= self.config.max_attempts:
                 break
-            self._search.give_up(goal.frontier)
+            self._search.put_off(goal.frontier)
         self._replanned_at = self._checked_at = now
         self._take(goal, now)
+        return True
+
+    def _second_chance(self) -> bool:
+        """Try once more what something kept the robot from that may have walked on; whether there is anything."""
+        if self._chances == 0 or not self._search.try_again():
+            return False
+        self._chances -= 1
+        self._chosen.clear()
+        self._driver.recoveries = 0
         return True
 
     def _take(self, goal: Goal, now: float) -> None:

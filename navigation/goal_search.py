@@ -47,11 +47,25 @@ class GoalSearch:
         self.count = 0
         self.enclosed = False
         self._given_up: list[FloatArray] = []
+        self._out_of_reach: list[FloatArray] = []
         self._origin: Point | None = None
 
     def give_up(self, points: FloatArray) -> None:
         """Leave frontier cells, map frame, shape (n, 2) [m], out from now on."""
         self._given_up.append(points)
+
+    def put_off(self, points: FloatArray) -> None:
+        """Leave frontier cells out that the robot did not get to; until :meth:`try_again`."""
+        self._out_of_reach.append(points)
+
+    def try_again(self) -> bool:
+        """Forget obstacles that the robot met, and what they kept it from: people walk on.
+
+        Returns:
+            Whether there was anything to forget.
+        """
+        kept_from, self._out_of_reach = bool(self._out_of_reach), []
+        return self.map.forget_obstacles() or kept_from
 
     def find(self, pose: Pose2, grid: OccupancyGrid) -> Goal | None:
         """Find the nearest frontier; ``None`` when there is none that can be reached.
@@ -64,7 +78,8 @@ class GoalSearch:
         config, here = self.config, (pose.x, pose.y)
         self._origin = here if self._origin is None else self._origin
         self.map.update(grid)
-        given_up = np.vstack(self._given_up) if self._given_up else None
+        left_out = self._given_up + self._out_of_reach
+        given_up = np.vstack(left_out) if left_out else None
         found = find_frontiers(self.map, config, given_up=given_up)
         self.frontiers = found.points
         costmap = self.map.costmap

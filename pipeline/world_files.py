@@ -112,19 +112,22 @@ def show_world(world: str, out_png: str | Path, *, level: str | None = None, for
 
 
 def generate_world(
-    kind: str, seed: int, out_json: str | Path, *, furniture: bool = False, force: bool = False
+    kind: str, seed: int, out_json: str | Path, *, furniture: bool = False, glass: float = 0.0, force: bool = False
 ) -> "FloorPlan":
     """Write a generated world as JSON; returns its plan.
 
     Raises:
-        InvalidInputError: An unknown kind, a negative seed.
+        InvalidInputError: An unknown kind, a negative seed, a share of glass that is none.
         OutputError: The file cannot be written, or is there already and ``force`` is not set.
     """
     from closedrooms.worlds.formats.native import write_plan
     from closedrooms.worlds.generation.generator import generate
+    from closedrooms.worlds.glazing import glazed
 
+    if not 0.0 <= glass <= 1.0:
+        raise InvalidInputError(f"--glass {glass:g}", expected="a share from 0 to 1")
     with new_files([Path(out_json)], force=force):
-        plan = generate(kind, seed, furniture=furniture)
+        plan = glazed(generate(kind, seed, furniture=furniture), glass, seed)
         write_plan(Path(out_json), plan)
     return plan
 

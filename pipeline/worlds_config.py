@@ -57,6 +57,9 @@ class GenerateWorld:
     furniture: bool = False
     """Put furniture into the rooms."""
 
+    glass: float = 0.0
+    """Share of the walls, by length, that are of glass (0 to 1), in panes of up to 2 m."""
+
     force: bool = False
     """Replace a file that is there already."""
 

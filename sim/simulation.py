@@ -21,7 +21,6 @@ from closedrooms.sim.bystanders import Floor, MovedBox, Person
 from closedrooms.sim.config import FaultConfig, NoiseConfig, SimConfig
 from closedrooms.sim.contacts import SKIN, distance
 from closedrooms.sim.faults import Faults
-from closedrooms.sim.glass import glazed
 from closedrooms.sim.lidar import Lidar
 from closedrooms.sim.odometry import Odometry
 from closedrooms.sim.physics_world import PhysicsWorld
@@ -31,6 +30,7 @@ from closedrooms.sim.robot.robot_model import TRACK_SHARE, RobotModel, make_mode
 from closedrooms.sim.robot.robot_urdf import read_robot
 from closedrooms.sim.robot.wheeled_robot import WheeledRobot
 from closedrooms.worlds.geometry import areal
+from closedrooms.worlds.glazing import glazed
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start_pose import start_pose
 

@@ -23,7 +23,8 @@ class Keyframe:
         travelled: Distance travelled up to here [m].
         submap: Number of its submap: a new one begins where the robot was lost; a loop that joins two gives them one
             number.
-        drawn: The pose at which it is drawn into the map, ``None`` while it is not.
+        shown: What the map shows of it: without what lies behind glass; ``None`` where that is to be found.
+        drawn: What is drawn into the map, and the pose at which; ``None`` while nothing is.
         sightings: Closed doors seen while this was the latest keyframe, by id: the nearest sighting in the
             keyframe's frame and its distance from the robot [m].
         middle: Median of ``points``, ``(x, y)`` [m].
@@ -36,7 +37,8 @@ class Keyframe:
     points: FloatArray
     travelled: float
     submap: int = 0
-    drawn: Pose2 | None = None
+    shown: Beams | None = None
+    drawn: tuple[Beams, Pose2] | None = None
     sightings: dict[str, tuple[Segment, float]] = field(default_factory=dict)
     middle: FloatArray = field(init=False)
 

@@ -92,6 +92,12 @@ class NavigationMap:
         self._obstacles.append(points)
         self._grid_frame = None
 
+    def forget_obstacles(self) -> bool:
+        """Forget what the robot met; returns whether there was anything."""
+        met, self._obstacles = bool(self._obstacles), []
+        self._grid_frame = None
+        return met
+
     def update(self, grid: OccupancyGrid) -> None:
         """Take over the map as it is now."""
         if self._grid is grid and self._grid_frame is not None:

@@ -71,7 +71,7 @@ def test_a_loop_takes_out_what_scan_matching_drifted(ring: Any) -> None:
     assert error(closed, drive)[0] < max(0.6 * error(without, drive)[0], 0.10)
     assert error(closed, drive)[0] < 0.25
     # The map was redrawn from the corrected poses: no keyframe is left where it was first drawn.
-    assert all(k.drawn is not None and k.drawn.distance(k.pose) < 0.02 for k in _drawn(closed))
+    assert all(k.drawn is not None and k.drawn[1].distance(k.pose) < 0.02 for k in _drawn(closed))
 
 
 def _drawn(mapper: Mapper) -> Any:

@@ -1,3 +1,4 @@
+import math
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,23 @@ def test_a_picture_into_a_missing_folder_is_a_clear_error(tmp_path: Path) -> Non
 def test_generate_writes_a_plan(tmp_path: Path) -> None:
     plan = generate_world("office", 7, tmp_path / "a.json")
     assert read_plan(tmp_path / "a.json").rooms == plan.rooms
+
+
+def test_generate_glazes_a_share_of_the_walls_on_demand(tmp_path: Path) -> None:
+    generate_world("office", 7, tmp_path / "a.json", glass=0.3)
+    walls = read_plan(tmp_path / "a.json").walls
+    length = {kind: sum(math.dist(*w.segment) for w in walls if w.material == kind) for kind in ("glass", "solid")}
+    assert length["glass"] / sum(length.values()) == pytest.approx(0.3, abs=0.1)
+    plain = generate_world("office", 7, tmp_path / "b.json")
+    assert {wall.material for wall in plain.walls} == {"solid"}
+    assert sum(length.values()) == pytest.approx(sum(math.dist(*wall.segment) for wall in plain.walls))
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.5, float("nan")])
+def test_a_share_of_glass_that_is_none_is_refused_and_nothing_is_written(tmp_path: Path, share: float) -> None:
+    with pytest.raises(InvalidInputError, match="expected a share from 0 to 1"):
+        generate_world("office", 7, tmp_path / "a.json", glass=share)
+    assert not list(tmp_path.iterdir())
 
 
 def test_convert_to_a_ros_map_gives_the_true_map_of_the_building(tmp_path: Path) -> None:

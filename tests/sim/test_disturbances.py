@@ -14,10 +14,11 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
 from closedrooms.sim.building import building_solids
 from closedrooms.sim.config import Body, FaultConfig, SimConfig, noise_level
-from closedrooms.sim.glass import comes_back, glass_area, glazed
+from closedrooms.sim.glass import comes_back, glass_area
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.formats.native import read_plan, write_plan
 from closedrooms.worlds.geometry import wall_area
+from closedrooms.worlds.glazing import glazed
 from closedrooms.worlds.plan import FloorPlan, PlanRoom, Wall
 
 QUIET = noise_level("none")

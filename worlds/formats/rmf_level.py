@@ -52,6 +52,7 @@ class RmfLevel:
         vertices: All of its vertices [m]; ``None`` for one that is no place.
         names: The name of each vertex (a waypoint), empty without one.
         walls: Centre lines of its walls, each once [m].
+        glass: Those that the file lets one see through.
         doors: Those that can be doors.
         listed_doors: How many the file lists.
         floor: What it calls floor [m], empty where it names none.
@@ -61,6 +62,7 @@ class RmfLevel:
     vertices: tuple[Point | None, ...]
     names: tuple[str, ...]
     walls: tuple[Segment, ...]
+    glass: frozenset[Segment]
     doors: tuple[RmfDoor, ...]
     listed_doors: int
     floor: Polygon | MultiPolygon
@@ -91,14 +93,16 @@ def read_level(path: Path, level: str | None, remarks: list[Remark]) -> RmfLevel
         why = "no [x, y, z, name]; what stands on them is left out"
         remarks.append(Remark(action="dropped", what="vertices", why=why, names=bad, count=len(bad)))
     names = [str(row[3]).strip() if isinstance(row, list) and len(row) > 3 and row[3] else "" for row in rows]
-    walls = []
+    walls, glass = [], set()
     for number, row in enumerate(_rows(fields, "walls", path)):
         segment = _segment(row, vertices)
         if segment is None:
             why = "without two vertices of the level"
             remarks.append(Remark(action="dropped", what="walls", why=why, names=(f"walls[{number}]",), loss=True))
             continue
-        walls.append(segment)
+        walls.append((min(segment), max(segment)))
+        if _is_seen_through(row):
+            glass.add(walls[-1])
     doors = []
     listed = _rows(fields, "doors", path)
     for number, row in enumerate(listed):
@@ -109,7 +113,8 @@ def read_level(path: Path, level: str | None, remarks: list[Remark]) -> RmfLevel
         name,
         tuple(vertices),
         tuple(names),
-        tuple(dict.fromkeys((min(wall), max(wall)) for wall in walls if math.dist(*wall) > 0.01)),
+        tuple(dict.fromkeys(wall for wall in walls if math.dist(*wall) > 0.01)),
+        frozenset(glass),
         tuple(doors),
         len(listed),
         _floor(fields, vertices, remarks, path),
@@ -210,6 +215,14 @@ def _parameter(row: Any, key: str) -> str:
         return str(row[2][key][1]).strip()
     except (IndexError, KeyError, TypeError):
         return ""
+
+
+def _is_seen_through(row: Any) -> bool:
+    """Check whether a wall's ``alpha``, with which the RMF tools draw it, is below 1."""
+    try:
+        return 0.0 <= float(_parameter(row, "alpha")) < 1.0
+    except ValueError:
+        return False
 
 
 def _door(row: Any, number: int, vertices: Sequence[Point | None], remarks: list[Remark]) -> RmfDoor | None:

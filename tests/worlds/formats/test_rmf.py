@@ -54,6 +54,25 @@ def test_pixels_are_scaled_by_the_measurements_and_metres_are_not(tmp_path: Path
         assert x1 - x0 == pytest.approx(width)
 
 
+@pytest.mark.parametrize(
+    ("alpha", "material"),
+    [
+        ([3, 0.4], "glass"),
+        ([3, 0.0], "glass"),
+        ([3, 1.0], "solid"),
+        ([3, -1], "solid"),
+        ([1, "x"], "solid"),
+        (2, "solid"),
+    ],
+)
+def test_a_wall_that_one_sees_through_is_of_glass(tmp_path: Path, alpha: object, material: str) -> None:
+    data = building()
+    data["levels"]["L1"]["walls"][1][2] = {"alpha": alpha}
+    walls = {wall.segment: wall.material for wall in read(tmp_path, data).walls}
+    assert walls[((10, 0), (10, 3))] == material
+    assert [m for segment, m in walls.items() if segment != ((10, 0), (10, 3))] == ["solid"] * (len(walls) - 1)
+
+
 @pytest.mark.parametrize("system", ["wgs84", "web_mercator", "WGS84", 3, ["a"]])
 def test_other_systems_are_refused_by_name(tmp_path: Path, system: object) -> None:
     with pytest.raises(InvalidInputError, match=r"coordinates in .*; expected reference_image or cartesian_meters"):

@@ -1,0 +1,135 @@
+import math
+
+import numpy as np
+import pytest
+
+from closedrooms.core.arrays import FloatArray
+from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.pose import Pose2
+from closedrooms.mapping.beams import clean
+from closedrooms.mapping.config import MapperConfig
+from closedrooms.mapping.mapper import Mapper
+from closedrooms.mapping.view import View, faces
+from tests.conftest import SegmentWorld
+
+SEEN = math.radians(15.0)
+PANE = (3.0, 6.0, 5.0, 6.0)
+HALL = [
+    (0.0, 0.0, 8.0, 0.0), (8.0, 0.0, 8.0, 6.0), (0.0, 0.0, 0.0, 6.0), (0.0, 6.0, 3.0, 6.0), (5.0, 6.0, 8.0, 6.0),
+    (2.0, 6.0, 2.0, 9.0), (2.0, 9.0, 6.0, 9.0), (6.0, 9.0, 6.0, 6.0), (6.5, 2.0, 6.5, 2.6),
+]  # fmt: skip
+ROUTE = [(1.0, 1.5), (1.0, 4.6), (7.0, 4.6), (7.0, 1.5)]
+
+
+class GlassWorld(SegmentWorld):
+    """A hall with a pane of glass that returns what meets it near its normal, and a closed room behind."""
+
+    def __init__(self, segments: list[tuple[float, float, float, float]], pane: tuple[float, ...] = PANE) -> None:
+        super().__init__(segments)
+        self.pane = SegmentWorld([pane])  # type: ignore[list-item]
+
+    def ranges(self, pose: Pose2, angles: FloatArray, range_max: float = 20.0) -> FloatArray:
+        solid, pane = super().ranges(pose, angles, range_max), self.pane.ranges(pose, angles, range_max)
+        x0, y0, x1, y1 = self.pane.segments[0]
+        normal = math.atan2(x1 - x0, y0 - y1)
+        incidence = np.abs((angles + pose.theta - normal + math.pi / 2) % math.pi - math.pi / 2)
+        return np.where(incidence < SEEN, np.minimum(solid, pane), solid)
+
+
+def mapped(world: SegmentWorld, route: list[tuple[float, float]], *, glass: bool = True) -> tuple[OccupancyGrid, Pose2]:
+    """Map a drive, drawing now and then; returns the map and where the world lies in it."""
+    drive = world.drive(route, noise=0.01, beams=720)
+    mapper = Mapper(MapperConfig(glass=glass))
+    for number, (scan, odometry) in enumerate(zip(drive.scans, drive.odometry, strict=True)):
+        mapper.process(scan, Pose2(*odometry))
+        if number % 5 == 0:
+            mapper.grid()
+    mapper.finish()
+    (x0, y0), (x1, y1) = route[:2]
+    return mapper.grid(), Pose2(x0, y0, math.atan2(y1 - y0, x1 - x0)).inverse()
+
+
+def known_share(grid: OccupancyGrid, map_T_world: Pose2, box: tuple[float, float, float, float]) -> float:
+    """How much of a box in the world is known in the map."""
+    x, y = np.meshgrid(np.arange(box[0], box[2], 0.1), np.arange(box[1], box[3], 0.1))
+    cells = grid.frame.to_cells(map_T_world.transform(np.column_stack((x.ravel(), y.ravel()))))
+    inside = grid.frame.contains(cells)
+    return float(np.mean([bool(i) and grid.known[r, c] for (r, c), i in zip(cells.tolist(), inside, strict=True)]))
+
+
+def occupied_share(grid: OccupancyGrid, map_T_world: Pose2, line: tuple[float, ...]) -> float:
+    """How much of a line in the world has an occupied cell within 0.1 m."""
+    share = np.linspace(0.0, 1.0, 40)[:, None]
+    points = map_T_world.transform(np.array(line[:2]) + share * (np.array(line[2:]) - np.array(line[:2])))
+    walls = grid.frame.to_points(np.argwhere(grid.occupied))
+    return float(np.mean([np.hypot(*(walls - p).T).min() < 0.1 for p in points]))
+
+
+ROOM_BEHIND = (2.3, 6.3, 5.7, 8.7)
+
+
+def test_nothing_behind_a_pane_is_mapped_and_the_pane_is_a_wall() -> None:
+    grid, map_T_world = mapped(GlassWorld(HALL), ROUTE)
+    assert known_share(grid, map_T_world, ROOM_BEHIND) < 0.05
+    assert occupied_share(grid, map_T_world, PANE) > 0.95
+
+
+def test_without_it_the_room_behind_is_mapped_through_the_pane() -> None:
+    grid, map_T_world = mapped(GlassWorld(HALL), ROUTE, glass=False)
+    assert known_share(grid, map_T_world, ROOM_BEHIND) > 0.5
+    assert occupied_share(grid, map_T_world, PANE) < 0.7
+
+
+def test_a_slanted_pane_is_one_too() -> None:
+    turn = Pose2(0.0, 0.0, 0.5)
+    segments = [tuple(turn.transform(np.array(s).reshape(2, 2)).ravel().tolist()) for s in [*HALL, PANE]]
+    route = [tuple(turn.transform(np.array([p]))[0].tolist()) for p in ROUTE]
+    grid, map_T_world = mapped(GlassWorld(segments[:-1], segments[-1]), route)  # type: ignore[arg-type]
+    behind = map_T_world @ turn
+    assert known_share(grid, behind, ROOM_BEHIND) < 0.05
+    assert occupied_share(grid, behind, PANE) > 0.95
+
+
+def test_where_there_is_no_glass_the_map_is_the_same_with_and_without(office: SegmentWorld) -> None:
+    route = [(1.0, 1.0), (11.0, 1.0), (7.4, 1.0), (7.4, -2.0), (7.4, 1.0), (2.5, 1.0), (2.5, 4.0)]
+    (with_it, _), (without, _) = mapped(office, route), mapped(office, route, glass=False)
+    assert with_it.frame == without.frame
+    assert (with_it.cells == without.cells).all()
+
+
+def test_a_doorway_that_was_seen_from_the_front_stays_open_beside_a_pane() -> None:
+    # The pane is the left half of what was one; the right half is a doorway into the room.
+    pane = (3.0, 6.0, 4.0, 6.0)
+    grid, map_T_world = mapped(GlassWorld(HALL, pane), ROUTE)
+    assert occupied_share(grid, map_T_world, pane) > 0.95
+    assert occupied_share(grid, map_T_world, (4.25, 6.0, 4.75, 6.0)) == 0.0
+
+
+def test_somebody_who_stood_there_and_left_is_no_pane() -> None:
+    person = [(3.8, 3.0, 4.2, 3.0), (3.8, 3.4, 4.2, 3.4), (3.8, 3.0, 3.8, 3.4), (4.2, 3.0, 4.2, 3.4)]
+    route = [(1.0, 1.5), (1.0, 4.6), (4.0, 4.6), (6.0, 4.6), (6.0, 2.0)]
+    solid = [*HALL, PANE]
+    there, gone = SegmentWorld([*solid, *person]).drive(route, beams=720), SegmentWorld(solid).drive(route, beams=720)
+    mapper, left = Mapper(), len(there.scans) // 2
+    for scan, odometry in zip([*there.scans[:left], *gone.scans[left:]], there.odometry, strict=True):
+        mapper.process(scan, Pose2(*odometry))
+        mapper.grid()
+    start = Pose2(1.0, 1.5, math.pi / 2).inverse()
+    assert occupied_share(mapper.grid(), start, (3.9, 3.2, 4.1, 3.2)) == 0.0
+
+
+@pytest.mark.parametrize("lateral", [0.0, 0.12])
+def test_a_view_tells_how_far_beams_went_beyond_a_place(office: SegmentWorld, lateral: float) -> None:
+    view = View(clean(office.scan(Pose2(6.0, 1.0, 0.0), beams=720), max_range=25.0))
+    places = np.array([[3.0, 0.0], [5.95, 0.0], [6.6, 0.0]])
+    assert view.beyond(places, lateral) == pytest.approx([3.0, 0.05, -0.6], abs=0.03)
+
+
+def test_faces_of_a_wall_point_across_it(office: SegmentWorld) -> None:
+    beams = clean(office.scan(Pose2(10.0, 1.0, 0.0), beams=720), max_range=25.0)
+    normals, incidence = faces(beams.points, beams.origin)
+    on_wall = (np.abs(beams.points[:, 1] - 1.0) < 0.01) & (np.abs(beams.points[:, 0]) < 1.5)
+    assert on_wall.sum() > 50
+    assert np.abs(normals[on_wall, 1]) == pytest.approx(1.0, abs=1e-3)
+    expected = np.abs(np.arctan2(beams.points[on_wall, 0], beams.points[on_wall, 1]))
+    assert incidence[on_wall] == pytest.approx(expected, abs=0.02)
