@@ -48,8 +48,8 @@ class Story:
             return
         cells = grid.frame.to_cells(self._floor)
         cells = cells[grid.frame.contains(cells)]
-        share = np.count_nonzero(grid.known[cells[:, 0], cells[:, 1]]) / len(self._floor)
-        quarters = sum(share >= quarter for quarter in QUARTERS)
+        share = int(np.count_nonzero(grid.known[cells[:, 0], cells[:, 1]])) / len(self._floor)
+        quarters = sum(1 for quarter in QUARTERS if share >= quarter)
         if quarters > self._quarters:
             self._quarters = quarters
             self._recorder.note(f"{100 * QUARTERS[quarters - 1]:.0f} % of the floor is known", stamp)
