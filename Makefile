@@ -43,7 +43,7 @@ docs: $(VENV)/.ready  ## The site, into docs/_build/html; warnings are errors, a
 
 model: $(VENV)/.ready  ## Train the network of the method `learned`, on drawn maps of the floor plans in PLANS; writes $(MODEL)/
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[train]'
-	$(BIN)/python benchmarks/fitting/drawn_maps.py "$(PLANS)" --use fit --maps 6 --generated 40 --bundled --out $(MODEL)/fit
+	$(BIN)/python benchmarks/fitting/drawn_maps.py "$(PLANS)" --use fit --maps 10 --generated 80 --bundled --out $(MODEL)/fit
 	$(BIN)/closedrooms train $(MODEL)/fit --out $(MODEL)/trained --threads 1
 
 lint: $(VENV)/.ready  ## Style and types

@@ -29,6 +29,10 @@ LEAST_DRAWN = 100
 # Drawn is what differs from the commonest colour by so much in any channel; in plots, whose axes are grey, what has
 # colour: channels apart by so much.
 DIFFERS, COLOURED = 24, 48
+# Columns of a plot with colour in them, at least: the mark of a legend takes ten, a curve or bars hundreds [pixels].
+LEAST_COLUMNS = 24
+# Three dots in the upper right corner of a view say that it is still being loaded [pixels].
+LOADING = (64, 24)
 # The headless window: menu, bar of tabs or title of a view, collapsed time panel, and what of a view may
 # belong to the line between two [pixels].
 MENU, BAR, TIME_PANEL, EDGE = 38, 28, 29, 4
@@ -293,12 +297,16 @@ def _find_empty(viewer: ViewerClient, blueprint: dict[str, Any], picture: Image.
 
 
 def is_empty(pixels: "np.ndarray[Any, Any]", *, plot: bool) -> bool:
-    """Check whether a picture of a view shows nothing, shape (rows, columns, 3)."""
+    """Check whether a picture of a view shows nothing, shape (rows, columns, 3).
+
+    What says that the viewer still loads is nothing, and a plot with a legend alone is empty.
+    """
     if plot:
-        drawn = np.ptp(pixels, axis=-1) >= COLOURED
-    else:
-        colours, counts = np.unique(pixels.reshape(-1, 3), axis=0, return_counts=True)
-        drawn = np.abs(pixels - colours[counts.argmax()]).max(axis=-1) >= DIFFERS
+        columns = (np.ptp(pixels, axis=-1) >= COLOURED).any(axis=0)
+        return bool(columns.sum() < LEAST_COLUMNS)
+    colours, counts = np.unique(pixels.reshape(-1, 3), axis=0, return_counts=True)
+    drawn = np.abs(pixels - colours[counts.argmax()]).max(axis=-1) >= DIFFERS
+    drawn[: LOADING[1], -LOADING[0] :] = False
     return bool(drawn.mean() < LEAST_DRAWN / 1e6)
 
 

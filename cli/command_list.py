@@ -79,23 +79,23 @@ COMMANDS = (
         "worlds list",
         "List the bundled worlds, one a line, its name first.",
         "pipeline.worlds_config:ListWorlds",
-        "cli.work:list_worlds",
+        "cli.work:report_worlds",
     ),
     Command(
         "worlds show",
         "Draw a floor plan.",
         "pipeline.worlds_config:ShowWorld",
-        "cli.work:show_world",
+        "cli.work:report_world",
         needs=("matplotlib",),
     ),
     Command(
-        "worlds generate", "Generate a floor plan.", "pipeline.worlds_config:GenerateWorld", "cli.work:generate_world"
+        "worlds generate", "Generate a floor plan.", "pipeline.worlds_config:GenerateWorld", "cli.work:report_generated"
     ),
     Command(
         "worlds convert",
         "Convert a floor plan to another format.",
         "pipeline.worlds_config:ConvertWorld",
-        "cli.work:convert_world",
+        "cli.work:report_converted",
     ),
     Command(
         "dataset",

@@ -12,43 +12,41 @@ if TYPE_CHECKING:
     from closedrooms.worlds.plan import FloorPlan
 
 
-def list_worlds(config: ListWorlds, *, progress: Progress) -> Iterable[str]:  # noqa: ARG001
+def report_worlds(config: ListWorlds, *, progress: Progress) -> Iterable[str]:  # noqa: ARG001
     """List the bundled worlds."""
-    from closedrooms.pipeline.world_files import list_worlds as work
+    from closedrooms.pipeline.world_files import list_worlds
 
-    return work(verbose=config.verbose)
+    return list_worlds(verbose=config.verbose)
 
 
-def show_world(config: ShowWorld, *, progress: Progress) -> Report | Iterable[str]:  # noqa: ARG001
+def report_world(config: ShowWorld, *, progress: Progress) -> Report | Iterable[str]:  # noqa: ARG001
     """Draw a floor plan, or tell what is in it, or both."""
-    from closedrooms.pipeline.world_files import describe_world
-    from closedrooms.pipeline.world_files import show_world as work
+    from closedrooms.pipeline.world_files import describe_world, show_world
     from closedrooms.worlds.library import load_world
 
     if config.out is None:
         return describe_world(load_world(config.world, level=config.level))
-    plan = work(config.world, config.out, level=config.level, force=config.force)
+    plan = show_world(config.world, config.out, level=config.level, force=config.force)
     if config.text:
         return [*describe_world(plan), "", f"written to {config.out}"]
     return _report(plan, config.out)
 
 
-def generate_world(config: GenerateWorld, *, progress: Progress) -> Report:  # noqa: ARG001
+def report_generated(config: GenerateWorld, *, progress: Progress) -> Report:  # noqa: ARG001
     """Generate a floor plan."""
-    from closedrooms.pipeline.world_files import generate_world as work
+    from closedrooms.pipeline.world_files import generate_world
 
-    plan = work(
+    plan = generate_world(
         config.kind, config.seed, config.out, furniture=config.furniture, glass=config.glass, force=config.force
     )
     return _report(plan, config.out)
 
 
-def convert_world(config: ConvertWorld, *, progress: Progress) -> Report:  # noqa: ARG001
+def report_converted(config: ConvertWorld, *, progress: Progress) -> Report:  # noqa: ARG001
     """Convert a floor plan to another format."""
-    from closedrooms.pipeline.world_files import beside
-    from closedrooms.pipeline.world_files import convert_world as work
+    from closedrooms.pipeline.world_files import beside, convert_world
 
-    plan = work(config.source, config.destination, config.to, level=config.level, force=config.force)
+    plan = convert_world(config.source, config.destination, config.to, level=config.level, force=config.force)
     return _report(plan, config.destination, beside(config.destination, config.to))
 
 

@@ -3,8 +3,12 @@
 import difflib
 from collections.abc import Iterable
 
+from closedrooms.core.names import shown
+
 # Names that a message lists where none of them is near.
 MOST_LISTED = 12
+# A longer name is cut, so that the line still says what there is [characters].
+LONGEST = 80
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -22,6 +26,7 @@ def unknown(what: str, name: str, known: Iterable[str]) -> str:
     """
     names = list(known)
     near = nearest(name, names)
+    name = shown(name, longest=LONGEST)
     if near:
         return f"unknown {what} {name!r}; did you mean {near}?"
     listed = ", ".join(names[:MOST_LISTED]) + (", ..." if len(names) > MOST_LISTED else "")

@@ -48,7 +48,7 @@ class GraphConfig:
     corner of a rectangular room lies at a share of sqrt(2) - 1 = 0.41: whether thinning leaves a branch there is
     chance."""
 
-    wall_thickness: float = 0.35
+    leaf_reach: float = 0.35
     """Cells up to this distance from a door's leaf [m], across it, are its own and do not block its edge. The thickest
     walls measure 0.3 m, and the leaf may hang on either face."""
 

@@ -157,7 +157,7 @@ def measure_excursion(shape: Shape, door: ClosedDoor, frame: GridFrame, config: 
         frame: Whose cells it is drawn with.
         config: Graph and tour.
     """
-    grid = _draw_room(shape, door, frame)
+    grid = _rasterise_room(shape, door, frame)
     graph = replace(config.graph, clutter_filter=False)
     try:
         built = build_graph(grid, [door], replace(config, graph=graph), start=door.midpoint)
@@ -171,7 +171,7 @@ def measure_excursion(shape: Shape, door: ClosedDoor, frame: GridFrame, config: 
     return 2.0 * away + solve_tour(built.graph, tour, start=built.start).length
 
 
-def _draw_room(shape: Shape, door: ClosedDoor, frame: GridFrame) -> OccupancyGrid:
+def _rasterise_room(shape: Shape, door: ClosedDoor, frame: GridFrame) -> OccupancyGrid:
     """Draw one room with its door open and nothing around it."""
     if door.segment is None:
         opening: Shape = shapely.Point(door.midpoint).buffer(WIDTH / 2)

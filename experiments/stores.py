@@ -232,8 +232,8 @@ def file_digest(store: Store, name: str) -> str:
     return found.hexdigest()
 
 
-class Summed:
-    """File to write into, whose bytes are counted and hashed by SHA-256."""
+class HashingWriter:
+    """Writer into a file that counts the bytes and hashes them (SHA-256)."""
 
     closed = False
 

@@ -178,7 +178,7 @@ class RecoveryConfig:
     max_rival: float = 0.9
     """Score of the best other pose there, as a share of the found one's, above which none is taken."""
 
-    lost_scans: int = 10
+    submap_after: int = 10
     """Scans in a row that fit nowhere after which a new submap is started."""
 
     lost_distance: float = 2.5
@@ -226,10 +226,10 @@ class MapperConfig:
     """Longest range that is mapped [m]; longer ones clear the cells up to here."""
 
     log_odds_hit: float = 3.2
-    """Evidence of one hit for a cell being occupied (natural log-odds): more than two passes, less than three."""
+    """Evidence of one hit for a cell being occupied (natural log-odds): more than two misses, less than three."""
 
-    log_odds_pass: float = 1.45
-    """Evidence of one beam passing for a cell being free (natural log-odds): once is enough for p < 0.196."""
+    log_odds_miss: float = 1.45
+    """Evidence of one miss (a beam passes) for a cell being free (natural log-odds): once is enough for p < 0.196."""
 
     log_odds_limit: float = 12.0
     """Largest evidence either way that a cell reports (natural log-odds)."""

@@ -1,4 +1,4 @@
-"""The log-odds grid: evidence of hits and passes per cell, from which scans can be taken back exactly."""
+"""The log-odds grid: evidence of hits and misses per cell, from which scans can be taken back exactly."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,7 +18,8 @@ SUBCELL_BITS = 6
 """Fraction bits of OpenCV's fixed-point polygon corners: 1/64 cell."""
 CROSSED, CROSSED_SHARE = 3, 0.25
 """Scans that went through a surface, and how many more for each that saw it, from which on it counts as crossed."""
-Window = tuple[int, int, int, int]
+LatticeWindow = tuple[int, int, int, int]
+"""First row and column in the arrays, and number of rows and columns."""
 Mask = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 
@@ -30,19 +31,19 @@ class Imprint:
         row: First row of its window, on the lattice (not in the array, which grows).
         col: First column.
         shape: Rows and columns of the window.
-        passes: Which cells were crossed: the window's mask, eight cells a byte.
+        misses: Which cells were crossed: the window's mask, eight cells a byte.
         hits: Cells that were hit, as flat indices in the window, each once.
     """
 
     row: int
     col: int
     shape: tuple[int, int]
-    passes: Mask
+    misses: Mask
     hits: IntArray
 
 
 class EvidenceGrid:
-    """Occupancy after Moravec and Elfes as counts of hits and passes; log-odds are their weighted difference.
+    """Occupancy after Moravec and Elfes as counts of hits and misses; log-odds are their weighted difference.
 
     A scan counts once per cell. Counts are sums, so a keyframe that moved is taken out at its old pose and put in at
     its new one without drawing the others again.
@@ -54,10 +55,10 @@ class EvidenceGrid:
         shape = self._lattice.frame.shape
         self._hits = np.zeros(shape, dtype=np.int32)
         # Whole numbers, exact up to 2^24: OpenCV adds a mask to floats five times as quickly as to integers.
-        self._passes = np.zeros(shape, dtype=np.float32)
+        self._misses = np.zeros(shape, dtype=np.float32)
         self._cells: CellArray = np.full(shape, UNKNOWN, dtype=np.int8)
-        self._dirty: Window | None = None
-        self._redrawn: Window = (0, 0, *shape)
+        self._dirty: LatticeWindow | None = None
+        self._redrawn: LatticeWindow = (0, 0, *shape)
         self._grid: OccupancyGrid | None = None
         self._percent: CellArray = self._probabilities(1, 1)
 
@@ -75,20 +76,20 @@ class EvidenceGrid:
             self._count(*drawn, sign)
 
     def imprint(self, beams: Beams, map_T_robot: Pose2) -> Imprint | None:
-        """Find what :meth:`add` would count, for :meth:`stamp`; ``None`` for a scan that crossed nothing."""
+        """Find what :meth:`add` would count, for :meth:`count_imprint`; ``None`` for a scan that crossed nothing."""
         for (row, col, rows, cols), mask, hits in self._draw([(beams, map_T_robot)]):
             lattice = self._lattice
             return Imprint(row + lattice.row0, col + lattice.col0, (rows, cols), np.packbits(mask), np.unique(hits))
         return None
 
-    def stamp(self, imprint: Imprint, *, sign: int = 1) -> None:
+    def count_imprint(self, imprint: Imprint, *, sign: int = 1) -> None:
         """Count a scan that :meth:`imprint` of this very grid drew, in (``sign`` 1) or out again (-1)."""
         rows, cols = imprint.shape
-        mask = np.unpackbits(imprint.passes, count=rows * cols).reshape(rows, cols)
+        mask = np.unpackbits(imprint.misses, count=rows * cols).reshape(rows, cols)
         window = (imprint.row - self._lattice.row0, imprint.col - self._lattice.col0, rows, cols)
         self._count(window, mask, imprint.hits, sign)
 
-    def _draw(self, scans: Sequence[tuple[Beams, Pose2]]) -> Iterator[tuple[Window, Mask, IntArray]]:
+    def _draw(self, scans: Sequence[tuple[Beams, Pose2]]) -> Iterator[tuple[LatticeWindow, Mask, IntArray]]:
         """Draw the window of each scan that crossed anything, its crossed cells and flat indices of those hit.
 
         The arrays grow to hold them all.
@@ -113,19 +114,19 @@ class EvidenceGrid:
             mask.ravel()[flat] = 0
             yield window, mask, flat
 
-    def _count(self, window: Window, mask: Mask, flat: IntArray, sign: int) -> None:
-        """Add hits (``flat``: indices in the window) and passes (``mask``) of a keyframe, or take them off."""
+    def _count(self, window: LatticeWindow, mask: Mask, flat: IntArray, sign: int) -> None:
+        """Add hits (``flat``: indices in the window) and misses (``mask``) of a keyframe, or take them off."""
         rows, cols = slice(window[0], window[0] + window[2]), slice(window[1], window[1] + window[3])
-        hits, passes = self._hits[rows, cols], self._passes[rows, cols]
+        hits, misses = self._hits[rows, cols], self._misses[rows, cols]
         # A cell that several beams hit counts once: the same sum is written for each.
         hits[flat // window[3], flat % window[3]] += sign
         if sign > 0:
-            cv2.accumulate(mask, passes)
+            cv2.accumulate(mask, misses)
         else:
-            cv2.subtract(passes, mask, passes, dtype=cv2.CV_32F)
+            cv2.subtract(misses, mask, misses, dtype=cv2.CV_32F)
         self._dirty = window if self._dirty is None else _union(self._dirty, window)
 
-    def _crossed(self, outline: FloatArray, window: Window) -> Mask:
+    def _crossed(self, outline: FloatArray, window: LatticeWindow) -> Mask:
         """Mark the cells that beams cross before they end: the inside of the scan's outline [m] without its rim."""
         lattice = self._lattice
         # OpenCV puts integer coordinates on cell centres.
@@ -142,7 +143,7 @@ class EvidenceGrid:
         if padding is None:
             return
         self._hits = grown(self._hits, padding)
-        self._passes = grown(self._passes, padding)
+        self._misses = grown(self._misses, padding)
         self._cells = grown(self._cells, padding, UNKNOWN)
         if self._dirty is not None:
             row, col, rows, cols = self._dirty
@@ -155,14 +156,14 @@ class EvidenceGrid:
         if self._dirty is not None:
             row, col, n_rows, n_cols = self._dirty
             rows, cols = slice(row, row + n_rows), slice(col, col + n_cols)
-            hits, passes = self._hits[rows, cols], self._passes[rows, cols]
-            most_hits, most_passes = self._percent.shape
-            if hits.max() >= most_hits or passes.max() >= most_passes:
+            hits, misses = self._hits[rows, cols], self._misses[rows, cols]
+            most_hits, most_misses = self._percent.shape
+            if hits.max() >= most_hits or misses.max() >= most_misses:
                 most_hits = max(most_hits, 16 + int(1.25 * hits.max()))
-                most_passes = max(most_passes, 16 + int(1.25 * float(passes.max())))
-                self._percent = self._probabilities(most_hits, most_passes)
+                most_misses = max(most_misses, 16 + int(1.25 * float(misses.max())))
+                self._percent = self._probabilities(most_hits, most_misses)
             places = hits * self._percent.shape[1]
-            places += passes.astype(np.int32)
+            places += misses.astype(np.int32)
             self._cells[rows, cols] = self._percent.ravel().take(places)
             self._redrawn, self._dirty = self._dirty, None
         cells = self._cells.copy()
@@ -181,8 +182,8 @@ class EvidenceGrid:
             apart: Reach of the noise of a surface [m].
         """
         row, col, n_rows, n_cols = self._redrawn
-        hits, passes = (a[row : row + n_rows, col : col + n_cols] for a in (self._hits, self._passes))
-        through = passes >= CROSSED + hits * np.float32(CROSSED_SHARE)
+        hits, misses = (a[row : row + n_rows, col : col + n_cols] for a in (self._hits, self._misses))
+        through = misses >= CROSSED + hits * np.float32(CROSSED_SHARE)
         span = 2 * math.ceil(apart / self._lattice.resolution) + 1
         solid = ((hits > 0) & ~through).astype(np.uint8)
         through &= cv2.dilate(solid, np.ones((span, span), dtype=np.uint8)) == 0
@@ -192,11 +193,11 @@ class EvidenceGrid:
         result[result] = through[rows[result], cols[result]]
         return result
 
-    def _probabilities(self, hits: int, passes: int) -> CellArray:
-        """Tabulate the probability in percent for each number of hits (rows) and passes (columns): it is quicker."""
+    def _probabilities(self, hits: int, misses: int) -> CellArray:
+        """Tabulate the probability in percent for each number of hits (rows) and misses (columns): it is quicker."""
         config = self._config
         odds = np.arange(hits)[:, None] * np.float32(config.log_odds_hit)
-        odds = odds - np.arange(passes) * np.float32(config.log_odds_pass)
+        odds = odds - np.arange(misses) * np.float32(config.log_odds_miss)
         # Rounded to a tenth: the table below is exact on every machine, an exponential per cell is not.
         odds = np.rint(odds * np.float32(10.0))
         limit = round(10 * config.log_odds_limit)
@@ -212,6 +213,6 @@ def _box(outline: FloatArray, points: FloatArray) -> tuple[tuple[float, float], 
     return (float(x.min()), float(y.min())), (float(x.max()), float(y.max()))
 
 
-def _union(a: Window, b: Window) -> Window:
+def _union(a: LatticeWindow, b: LatticeWindow) -> LatticeWindow:
     row, col = min(a[0], b[0]), min(a[1], b[1])
     return (row, col, max(a[0] + a[2], b[0] + b[2]) - row, max(a[1] + a[3], b[1] + b[3]) - col)

@@ -90,7 +90,7 @@ class Mapper:
 
     @property
     def events(self) -> tuple[Remark, ...]:
-        """What befell the mapper so far (failed odometry, gaps, lost scans, submaps), counted, with times."""
+        """Events so far (failed odometry, gaps, lost scans, submaps), counted, with times."""
         return self._events.remarks()
 
     def process(
@@ -294,7 +294,7 @@ class Mapper:
         if self._lost:
             # A map should not be given up while the next scan may still find back.
             far = self._travelled - self.keyframes[-1].travelled > recovery.lost_distance
-            return far or self._lost >= recovery.lost_scans
+            return far or self._lost >= recovery.submap_after
         return self._far(self._pose, 1.0 if self._trusted else self._config.poor_spacing)
 
     def _insert(self, keyframe: Keyframe) -> None:
@@ -371,12 +371,12 @@ class Mapper:
 
     @property
     def loops(self) -> FloatArray:
-        """Positions of the two ends of each loop that was closed, shape (n, 2, 2), map frame [m]."""
+        """Positions of the two ends of each loop closure, shape (n, 2, 2), map frame [m]."""
         ends = [(self.keyframes[loop.source].pose, self.keyframes[loop.target].pose) for loop in self._graph.loops]
         return np.array([((a.x, a.y), (b.x, b.y)) for a, b in ends], dtype=np.float64).reshape(-1, 2, 2)
 
     def finish(self) -> None:
-        """Optimise once more over everything."""
+        """Run the final pose-graph optimisation, over all keyframes."""
         if self._graph.optimise():
             self._poses_moved()
 

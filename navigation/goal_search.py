@@ -11,7 +11,7 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.navigation.config import RobotNavigation
 from closedrooms.navigation.driving.costmap import Costmap, NavigationMap, pooled, traversable
-from closedrooms.navigation.driving.planner import Path, PathSearch, reachable_cells, start_cell
+from closedrooms.navigation.driving.planner import PathSearch, PlannedPath, reachable_cells, start_cell
 from closedrooms.navigation.frontiers import Frontiers, find_frontiers, seen_from
 
 
@@ -27,7 +27,7 @@ class Goal:
 
     place: Point
     frontier: FloatArray
-    path: Path
+    path: PlannedPath
 
 
 class GoalSearch:
@@ -146,7 +146,7 @@ class GoalSearch:
             small &= _goal_cells(found.within(distance, ~is_large & ~refused[found.labels]), costmap)
         return None if nearest is None else self._goal(search.path(nearest), found)
 
-    def _goal(self, path: Path, found: Frontiers) -> Goal | None:
+    def _goal(self, path: PlannedPath, found: Frontiers) -> Goal | None:
         """Find the part of the frontiers that the end of a path looks at."""
         place = (float(path.points[-1, 0]), float(path.points[-1, 1]))
         points = seen_from(self.map, place, found.points, self.config.farthest_approach + 0.2)

@@ -19,8 +19,8 @@ from closedrooms.worlds.truth import truth_bounds
 OUTSIDE_MARGIN = 2.0
 
 
-class Outline:
-    """The outline of a building with a margin around it; courtyards are inside."""
+class BuildingBounds:
+    """Watchdog over a robot: a building's outline with a margin around it; courtyards are inside."""
 
     def __init__(self, plan: FloorPlan) -> None:
         floor = areal(shapely.union_all([*(room.polygon for room in plan.rooms), wall_area(plan)]))

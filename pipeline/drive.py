@@ -14,7 +14,7 @@ from closedrooms.navigation.config import RobotNavigation
 from closedrooms.navigation.control_loop import LoopLog, Step, run_loop
 from closedrooms.navigation.tour.opened_doors import ReopenedMap
 from closedrooms.navigation.tour.tour_follower import DOOR_WAIT, TourFollower, TourOutcome, TourPlan
-from closedrooms.pipeline.bounds import Outline
+from closedrooms.pipeline.bounds import BuildingBounds
 from closedrooms.pipeline.reporting.live_recording import DriveRecording
 from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.predictor.revision import Predict
@@ -98,7 +98,7 @@ def drive_tour(
     doors = [door for door in plan.doors if door.id in closed]
     reopened = ReopenedMap(mapper, doors, settings.mapper, waiting=closed)
     follower = TourFollower(plan, settings.navigation, settings.predictor, settings.coverage)
-    outline, porter = Outline(log.sim.plan), Porter(log, reopened, follower, closed, recorder)
+    outline, porter = BuildingBounds(log.sim.plan), Porter(log, reopened, follower, closed, recorder)
     porter.open_next(log.sim.time)
     record = DriveRecording(recorder, log, reopened, follower, porter.is_opening)
 

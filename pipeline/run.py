@@ -24,20 +24,20 @@ from closedrooms.navigation.tour.tour_follower import TourPlan
 from closedrooms.pipeline.bounds import check_size, check_width, too_narrow
 from closedrooms.pipeline.config import RunConfig
 from closedrooms.pipeline.drive import DriveSettings, drive_tour
-from closedrooms.pipeline.reporting.live_recording import GrowingPrediction
+from closedrooms.pipeline.reporting.live_recording import InterimPrediction
 from closedrooms.pipeline.reporting.manifest import resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
 from closedrooms.pipeline.reporting.report import markdown, run_report
 from closedrooms.pipeline.reporting.run_directory import Finding, run_figures, stopped_stages, write_run_files
 from closedrooms.pipeline.reporting.run_log import RunLog
-from closedrooms.pipeline.reporting.scores import room_iou
+from closedrooms.pipeline.reporting.run_scores import room_iou
 from closedrooms.pipeline.reporting.stopwatch import Stopwatch
 from closedrooms.pipeline.reporting.story import describe_robot, summarise_run
 from closedrooms.pipeline.survey import Survey, survey_building, true_building
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.sim.simulation import Simulation
-from closedrooms.visualization.rerun.opening import open_recording
+from closedrooms.visualization.rerun.optional_recording import open_recording
 from closedrooms.worlds.closing import check_closed, closable_rooms, draw_closed
 from closedrooms.worlds.library import load_world, world_source
 from closedrooms.worlds.plan import FloorPlan
@@ -149,12 +149,12 @@ def _find_out(
 ) -> Finding:
     """Explore, predict, plan tours and, on demand, drive the predicted one."""
     plan, map_T_world = log.sim.plan, log.sim.world_T_map.inverse()
-    growth = None
+    interim = None
     if config.record:
         method = partial(predict, method=config.method, config=config.predictor, trace=True)
-        growth = GrowingPrediction(recorder, method, true_rooms(plan, closed, map_T_world))
+        interim = InterimPrediction(recorder, method, true_rooms(plan, closed, map_T_world))
     survey = survey_building(
-        log, mapper, config.navigation, recorder=recorder, growth=growth, progress=progress, watch=watch
+        log, mapper, config.navigation, recorder=recorder, interim=interim, progress=progress, watch=watch
     )
     with watch.stage("predict"):
         progress.stage("predict")
@@ -180,7 +180,7 @@ def _find_out(
             navigation=config.navigation.for_robot(config.sim.robot),
             mapper=config.mapper,
             predictor=partial(predict, method=config.method, config=config.predictor),
-            coverage=_coverage(config),
+            coverage=_coverage_for_robot(config),
         )
         return replace(found, driven=drive_tour(log, mapper, tour, closed, settings, recorder))
 
@@ -211,7 +211,7 @@ def plan_tours(
     tours: dict[str, CoverageTour] = {}
     missing: dict[str, str] = {}
     notes: list[str] = []
-    coverage = _coverage(config)
+    coverage = _coverage_for_robot(config)
     for name, grid, doors in (
         ("closed", survey.grid, survey.doors),
         ("predicted", prediction.grid, ()),
@@ -242,7 +242,7 @@ def _spread(
         survey.doors,
         prediction.rooms,
         prediction.probability,
-        _coverage(config),
+        _coverage_for_robot(config),
         count=config.completions,
         seed=config.seed,
     )
@@ -251,6 +251,6 @@ def _spread(
     return spread
 
 
-def _coverage(config: RunConfig) -> CoverageConfig:
+def _coverage_for_robot(config: RunConfig) -> CoverageConfig:
     """Set the tours for the robot that is simulated."""
     return replace(config.coverage, graph=replace(config.coverage.graph, robot_radius=config.sim.robot.radius))

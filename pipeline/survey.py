@@ -14,8 +14,8 @@ from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.control_loop import LoopLog, run_loop
 from closedrooms.navigation.explorer import Explorer
-from closedrooms.pipeline.bounds import Outline
-from closedrooms.pipeline.reporting.live_recording import ExplorationRecording, GrowingPrediction
+from closedrooms.pipeline.bounds import BuildingBounds
+from closedrooms.pipeline.reporting.live_recording import ExplorationRecording, InterimPrediction
 from closedrooms.pipeline.reporting.progress import Progress, Silent
 from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.pipeline.reporting.stopwatch import Stopwatch
@@ -39,7 +39,7 @@ class Survey:
         searches: Searches for a goal.
         stamps: Times of the scans [s], shape (n,).
         estimate: Poses as estimated after the last optimisation, shape (n, 3), metres and radians, map frame.
-        truth: True poses, shape (n, 3), map frame.
+        true_poses: True poses, shape (n, 3), map frame.
     """
 
     grid: OccupancyGrid
@@ -48,7 +48,7 @@ class Survey:
     searches: int
     stamps: FloatArray
     estimate: FloatArray
-    truth: FloatArray
+    true_poses: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +65,7 @@ def survey_building(
     navigation: NavigationConfig,
     *,
     recorder: "Recorder | None" = None,
-    growth: GrowingPrediction | None = None,
+    interim: InterimPrediction | None = None,
     progress: Progress | None = None,
     watch: Stopwatch | None = None,
 ) -> Survey:
@@ -76,17 +76,17 @@ def survey_building(
         mapper: A fresh mapper; it keeps its keyframes.
         navigation: Exploration.
         recorder: Told of every step.
-        growth: Told whenever a closed door is first seen.
+        interim: Told whenever a closed door is first seen.
         progress: Told of the stages.
         watch: Given the wall-clock time of each stage.
     """
     recorder, progress, watch = recorder or no_recording(), progress or Silent(), watch or Stopwatch()
     progress.stage("explore")
     config = navigation.for_robot(log.sim.config.robot)
-    explorer, outline = Explorer(config), Outline(log.sim.plan)
+    explorer, outline = Explorer(config), BuildingBounds(log.sim.plan)
     exploration = run_loop(
         log, mapper, explorer, config,
-        on_step=ExplorationRecording(recorder, log, mapper, explorer, growth),
+        on_step=ExplorationRecording(recorder, log, mapper, explorer, interim),
         stop=lambda _: outline.check(log.sim.world_T_robot),
     )  # fmt: skip
     end = float(exploration.stamps[-1])
@@ -107,7 +107,7 @@ def survey_building(
         recorder.note(f"map finished: {known}, {counted(len(doors), 'closed door')} seen")
         for remark in mapper.events:
             recorder.note(str(remark))
-    return Survey(grid, doors, exploration, explorer.searches, stamps, poses, log.truth)
+    return Survey(grid, doors, exploration, explorer.searches, stamps, poses, log.true_poses)
 
 
 def true_building(plan: FloorPlan, closed: Sequence[str], frame: GridFrame, map_T_world: Pose2) -> Truth:

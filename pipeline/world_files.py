@@ -78,11 +78,12 @@ def describe_world(plan: "FloorPlan") -> list[str]:
     for door in plan.doors:
         for room in door.rooms:
             by_room.setdefault(str(room), []).append(door.id)
-    lines = [shown(plan.name), *_details(plan), "", f"{'room':<16} {'kind':<12} {'area':>9}  doors"]
+    wide = max((len(shown(place.label)) for place in plan.rooms), default=0) + 1
+    lines = [shown(plan.name), *_details(plan), "", f"{'room':<16} {'kind':<{wide}} {'area':>9}  doors"]
     for place in plan.rooms:
         can = "  (closable)" if place.id in closable else ""
-        doors = ", ".join(map(shown, by_room.get(place.id, [])))
-        lines.append(f"{shown(place.id):<16} {shown(place.label):<12} {place.polygon.area:6.1f} m2  {doors}{can}")
+        doors = ", ".join(map(shown, by_room.get(place.id, []))) or "none"
+        lines.append(f"{shown(place.id):<16} {shown(place.label):<{wide}} {place.polygon.area:6.1f} m2  {doors}{can}")
     lines += ["", f"{'door':<16} {'x [m]':>8} {'y [m]':>8} {'width':>7}  between"]
     for door in plan.doors:
         x, y = door.midpoint

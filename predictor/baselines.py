@@ -14,7 +14,7 @@ from closedrooms.core.shapes import Shape
 from closedrooms.predictor.config import FacesConfig
 from closedrooms.predictor.inpainting import complete_map
 from closedrooms.predictor.paper.arrangement import unite_faces
-from closedrooms.predictor.paper.initial_layouts import Start, Started, start_rooms
+from closedrooms.predictor.paper.initial_layouts import FacesFound, InitialFaces, find_initial_faces
 from closedrooms.predictor.prediction import Prediction
 
 # Rays a baseline casts around a door: half a degree, 0.17 m apart at 20 m.
@@ -24,7 +24,7 @@ STRETCH = 64
 
 
 def line_of_sight(
-    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesConfig, *, started: Started | None = None
+    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesConfig, *, started: FacesFound | None = None
 ) -> Prediction:
     """Predict what can be seen from each door through unknown cells, up to known ones or the map's bounding box.
 
@@ -32,7 +32,7 @@ def line_of_sight(
         grid: The map.
         doors: Closed doors in its frame.
         config: Faces (the door's direction is that of its edge) and passages.
-        started: What ``start_rooms`` gave for the same, where it is at hand.
+        started: What ``find_initial_faces`` gave for the same, where it is at hand.
 
     Returns:
         Rooms that may overlap each other, and the map completed with them.
@@ -41,7 +41,7 @@ def line_of_sight(
 
 
 def geometric(
-    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesConfig, *, started: Started | None = None
+    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesConfig, *, started: FacesFound | None = None
 ) -> Prediction:
     """Predict all unknown faces in line of sight of each door, until faces on the border are met.
 
@@ -52,7 +52,7 @@ def geometric(
         grid: The map.
         doors: Closed doors in its frame.
         config: Faces and passages.
-        started: What ``start_rooms`` gave for the same, where it is at hand.
+        started: What ``find_initial_faces`` gave for the same, where it is at hand.
 
     Returns:
         Rooms that may overlap each other, and the map completed with them.
@@ -64,11 +64,11 @@ def _each(
     grid: OccupancyGrid,
     doors: Sequence[ClosedDoor],
     config: FacesConfig,
-    shape_of: Callable[[Start, int], Shape],
-    started: Started | None,
+    shape_of: Callable[[InitialFaces, int], Shape],
+    started: FacesFound | None,
 ) -> Prediction:
     """Predict each room for itself with ``shape_of``."""
-    start, reasons = started or start_rooms(grid, doors, config)
+    start, reasons = started or find_initial_faces(grid, doors, config)
     failures = dict(reasons)
     if start is None:
         return Prediction(grid, (), failures)
@@ -83,7 +83,7 @@ def _each(
     return Prediction(completed, tuple(rooms), failures)
 
 
-def _seen(start: Start, room: int) -> Shape:
+def _seen(start: InitialFaces, room: int) -> Shape:
     """Trace the star of rays from just behind the door, each ended by a known cell or the map's bounding box."""
     grid = start.grid
     resolution = grid.frame.resolution
@@ -124,7 +124,7 @@ def _reach(grid: OccupancyGrid, open_: BoolArray, eye: FloatArray, rays: FloatAr
     return reached
 
 
-def _behind_wall(start: Start, room: int) -> FloatArray:
+def _behind_wall(start: InitialFaces, room: int) -> FloatArray:
     """Find the first unknown place behind a door [m], shape (2,): past walls and leaf, at most a metre."""
     grid = start.grid
     door, inward = start.entrances[room].facing.middle, start.entrances[room].facing.inward
@@ -137,7 +137,7 @@ def _behind_wall(start: Start, room: int) -> FloatArray:
     return np.asarray(door + step * inward)
 
 
-def _faces_in_sight(start: Start, room: int) -> Shape:
+def _faces_in_sight(start: InitialFaces, room: int) -> Shape:
     """Find unknown faces whose centre is in sight of the door through unknown faces, without border faces."""
     arrangement, entrance = start.arrangement, start.entrances[room]
     inner: BoolArray = start.unknown & ~arrangement.border

@@ -44,8 +44,8 @@ class Method:
         function: The predictor, or ``module:name`` of it, imported when it is first used.
         disjoint: Rooms of one prediction never overlap, so that a tour can be planned on the completed map (the
             baselines predict each room for itself; paper, section 5.2).
-        shares_faces: The function takes ``started=`` from ``paper.initial_layouts.start_rooms``, which several methods
-            can share.
+        shares_faces: The function takes ``started=`` from ``paper.initial_layouts.find_initial_faces``, which several
+            methods can share.
     """
 
     name: str
@@ -56,8 +56,8 @@ class Method:
     shares_faces: bool = False
 
     @property
-    def predict(self) -> Any:
-        """The function itself."""
+    def resolved_function(self) -> Any:
+        """The function, imported where it is only named; its rooms have no confidence yet, see :meth:`run`."""
         if not isinstance(self.function, str):
             return self.function
         module, name = self.function.split(":")
@@ -67,7 +67,7 @@ class Method:
         """Predict, and say how sure every room and cell is, whatever the function itself says of that."""
         from closedrooms.predictor.confidence.judge import judge
 
-        return judge(self.name, grid, doors, self.predict(grid, doors, config, **shared))
+        return judge(self.name, grid, doors, self.resolved_function(grid, doors, config, **shared))
 
     def checked(self, config: Any | None) -> Any:
         """Check settings for this method: its defaults for ``None``.

@@ -89,7 +89,7 @@ class Floor:
         x, y = self.origin + (np.array([cell[1], cell[0]]) + 0.5) * CELL
         return (float(x), float(y))
 
-    def draw(self, rng: np.random.Generator) -> tuple[int, int]:
+    def sample(self, rng: np.random.Generator) -> tuple[int, int]:
         """Draw a free cell."""
         row, col = self.cells[int(rng.integers(len(self.cells)))]
         return (int(row), int(col))
@@ -147,7 +147,7 @@ class _Bystander:
             self._begin()
 
     def _begin(self) -> None:
-        self._cell = self._floor.draw(self._rng)
+        self._cell = self._floor.sample(self._rng)
         self._body.put(*self._floor.point(self._cell))
 
 
@@ -169,7 +169,7 @@ class Person(_Bystander):
             self._rest -= duration
             return
         if not self._path:
-            self._path = self._floor.path(self._cell, self._floor.draw(self._rng))[1:]
+            self._path = self._floor.path(self._cell, self._floor.sample(self._rng))[1:]
             if not self._path:
                 self._rest = float(self._rng.uniform(*REST))
                 return
@@ -207,7 +207,7 @@ class MovedBox(_Bystander):
         self._stays -= duration
         if self._stays > 0.0:
             return
-        other = self._floor.point(self._floor.draw(self._rng))
+        other = self._floor.point(self._floor.sample(self._rng))
         if min(math.dist(self._body.place, (x, y)), math.dist(other, (x, y))) >= AWAY:
             self._body.put(*other)
             self._stays = float(self._rng.exponential(MOVED_EVERY))

@@ -22,9 +22,9 @@ def hung(doors: Sequence[PlanDoor], openings: Sequence[Opening], rooms: Sequence
     passages = Counter(room for pair in sides for room in pair if room is not None)
     by_id = {room.id: room for room in rooms}
 
-    def closes(room: str) -> tuple[bool, int, bool, float, str]:
+    def closes(room: str) -> tuple[int, bool, float, str]:
         label, area = by_id[room].label, by_id[room].polygon.area
-        return (passages[room] > 1, passages[room], is_circulation(label), area, room)
+        return (passages[room], is_circulation(label), area, room)
 
     result = []
     for door in doors:

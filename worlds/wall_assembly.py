@@ -171,7 +171,7 @@ def _coordinates(edge: RoomEdge, points: FloatArray) -> tuple[FloatArray, FloatA
     return offset @ direction, aside
 
 
-def coverage(polygons: Sequence[Polygon], *, gap: float = 0.0, snap: float = -1.0) -> list[Polygon]:
+def clean_coverage(polygons: Sequence[Polygon], *, gap: float = 0.0, snap: float = -1.0) -> list[Polygon]:
     """Make room outlines share their edges exactly: cut overlaps, fill gaps up to ``gap`` metres.
 
     Args:

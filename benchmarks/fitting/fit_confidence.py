@@ -170,7 +170,7 @@ def predictions(
             sys.exit(f"{sample.world} is not of the use fit")
         config = chosen.config()
         shared = {"started": Starts(sample).of(config)[0]} if chosen.shares_faces else {}
-        yield sample, chosen.predict(sample.observed, sample.doors, config, **shared)
+        yield sample, chosen.resolved_function(sample.observed, sample.doors, config, **shared)
 
 
 def collect(

@@ -32,7 +32,7 @@ from typing import Any
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
 from closedrooms.core.files.geojson import read_rooms
 from closedrooms.pipeline.reporting.report import figure
-from closedrooms.pipeline.reporting.scores import mean, room_iou
+from closedrooms.pipeline.reporting.run_scores import mean, room_iou
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.geometry import wall_area
 from closedrooms.worlds.library import load_world

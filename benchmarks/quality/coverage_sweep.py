@@ -26,7 +26,7 @@ from closedrooms.experiments.dataset.erase import Eraser
 from closedrooms.experiments.dataset.open_survey import survey_open
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.pipeline.reporting.scores import mean, room_iou, rooms_seen
+from closedrooms.pipeline.reporting.run_scores import mean, room_iou, rooms_seen
 from closedrooms.predictor.methods import predict
 from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.worlds.closing import closable_rooms

@@ -22,7 +22,7 @@ from closedrooms.experiments.dataset.sample import Task, TaskResult, make
 from closedrooms.experiments.dataset.variants import Variant, find_variants, find_worlds
 from closedrooms.experiments.evaluation.scoring.scores import iou
 from closedrooms.experiments.workers import Crew
-from closedrooms.pipeline.reporting.scores import room_iou
+from closedrooms.pipeline.reporting.run_scores import room_iou
 from closedrooms.predictor.methods import predict
 
 WORLDS = (

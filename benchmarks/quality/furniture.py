@@ -17,7 +17,7 @@ from closedrooms.experiments.dataset.erase import Eraser
 from closedrooms.experiments.robustness.drives import furnished, map_drive, record_drive
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.pipeline.reporting.scores import room_iou
+from closedrooms.pipeline.reporting.run_scores import room_iou
 from closedrooms.pipeline.survey import true_building
 from closedrooms.predictor.methods import METHODS as ALL
 from closedrooms.predictor.methods import predict

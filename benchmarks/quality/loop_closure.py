@@ -27,7 +27,7 @@ from closedrooms.mapping.trajectory import ate
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.pipeline.reporting.progress import Silent
 from closedrooms.pipeline.reporting.run_log import RunLog
-from closedrooms.pipeline.reporting.scores import area_mapped
+from closedrooms.pipeline.reporting.run_scores import area_mapped
 from closedrooms.pipeline.survey import survey_building
 from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.simulation import Simulation

@@ -24,7 +24,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
 from closedrooms.core.room import Room
 from closedrooms.experiments.robustness.door_noise import true_doors
-from closedrooms.pipeline.reporting.scores import room_iou
+from closedrooms.pipeline.reporting.run_scores import room_iou
 from closedrooms.predictor.best import shared_rooms as shared
 from closedrooms.predictor.methods import predict
 from closedrooms.worlds.closing import closable_rooms, draw_closed

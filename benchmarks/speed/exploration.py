@@ -15,7 +15,7 @@ from closedrooms.mapping.trajectory import ate
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.pipeline.reporting.progress import Silent
 from closedrooms.pipeline.reporting.run_log import RunLog
-from closedrooms.pipeline.reporting.scores import area_mapped
+from closedrooms.pipeline.reporting.run_scores import area_mapped
 from closedrooms.pipeline.survey import survey_building
 from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.simulation import Simulation
@@ -37,7 +37,7 @@ def measure(world: str, *, noise: str, close: int, seed: int) -> str:
     grid = mapper.grid()
     grid = grid.on(grid.frame.covering(x_min, y_min, x_max, y_max))
     cells = reachable(plan, closed, grid.frame, map_T_world, (start.x, start.y))
-    error, _ = ate(mapper.trajectory()[1], log.truth)
+    error, _ = ate(mapper.trajectory()[1], log.true_poses)
     each = {step: 1e3 * seconds / result.scans for step, seconds in result.wall_seconds.items()}
     return (
         f"{plan.name[:24]:<24} {x_max - x_min:4.0f} x {y_max - y_min:3.0f} m  {result.status:<9}"

@@ -2,6 +2,8 @@
 
 A folder is replaced only when every file in it, at every depth, is one that the same command wrote and that has not
 changed since: its ``run.json`` holds the checksums. Two processes never write one folder: a lock beside it says so.
+Folders that fill bit by bit over hours (``evaluate``, ``robustness``, ``train``) are claimed otherwise, by
+``experiments.claimed_folder.claim_folder``.
 """
 
 import contextlib
@@ -30,7 +32,7 @@ SUMS = "sha256"
 MAX_MANIFEST = 50_000_000
 
 
-def _find_strange(folder: Path, command: object) -> str:
+def _find_foreign_file(folder: Path, command: object) -> str:
     """Find something in a folder that the same command did not write, or was changed since; empty for nothing."""
     try:
         manifest = read_json(folder / MANIFEST, what="a manifest", max_bytes=MAX_MANIFEST)
@@ -99,6 +101,18 @@ def check_output_folder(folder: Path, command: object = None, *, sources: Iterab
         pass
 
 
+def real_path(path: Path) -> Path:
+    """Follow an output to the whole path that it leads to, for processes that stand in other folders.
+
+    Raises:
+        OutputError: A circle of symbolic links.
+    """
+    try:
+        return path.resolve()
+    except RuntimeError as error:
+        raise OutputError(f"cannot write (a circle of symbolic links): {path}") from error
+
+
 def _holds(folder: Path, source: Path) -> bool:
     """Check whether an output folder holds something that is read."""
     try:
@@ -112,11 +126,11 @@ def _check_replaceable(folder: Path, command: object) -> None:
     if os.path.lexists(folder) and not folder.is_dir():
         raise OutputError(f"the output is a file; expected a folder: {folder}")
     if folder.is_dir() and any(folder.iterdir()):
-        strange = _find_strange(folder, command)
-        if strange:
+        foreign = _find_foreign_file(folder, command)
+        if foreign:
             by = f"closedrooms {command}" if command else "closedrooms"
             raise OutputError(
-                f"the output folder holds something that {by} did not write, or that was changed since ({strange}); "
+                f"the output folder holds something that {by} did not write, or that was changed since ({foreign}); "
                 f"expected an empty or new one: {folder}"
             )
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import MAX_DEPTH, MAX_DIGITS, read_text, reading
+from closedrooms.core.names import shown
 
 MAX_BYTES = 20_000_000
 """Longest YAML that is read [bytes]: the largest public RMF building has under 2 MB."""
@@ -27,7 +28,7 @@ def parse_yaml(path: Path, *, what: str, max_bytes: int = MAX_BYTES, plain: bool
 
     Raises:
         InvalidInputError: Missing, too large, broken, or no mapping; nested too deeply, too many values or aliases,
-            merge keys, a number of thousands of digits.
+            merge keys, a key twice (readers disagree on which one counts), a number of thousands of digits.
     """
     import yaml
 
@@ -51,12 +52,16 @@ def parse_yaml(path: Path, *, what: str, max_bytes: int = MAX_BYTES, plain: bool
 
 @dataclass(slots=True)
 class _Open:
-    """A list or mapping that is not closed yet: how many values it holds, aliases as often as what they stand for."""
+    """A list or mapping that is not closed yet.
+
+    How many values it holds, aliases as often as what they stand for, and the keys of a mapping.
+    """
 
     anchor: str | None
     mapping: bool
     children: int = 0
     size: int = 1
+    keys: set[str] = field(default_factory=set)
 
 
 @dataclass(slots=True)
@@ -127,7 +132,11 @@ def _check_events(events: Any, path: Path, what: str) -> None:
 def _check_scalar(event: Any, scan: _Scan) -> None:
     """Refuse a merge key, and numbers of too many digits."""
     text = event.value
-    if text == "<<" and event.implicit[0] and scan.at_key():
-        raise scan.refuse("a YAML with a merge key (<<)")
+    if scan.at_key():
+        if text == "<<" and event.implicit[0]:
+            raise scan.refuse("a YAML with a merge key (<<)")
+        if text in scan.open[-1].keys:
+            raise scan.refuse(f"a YAML with the key {shown(text, longest=80)!r} twice")
+        scan.open[-1].keys.add(text)
     if len(text) > MAX_DIGITS and text.lstrip("+-").replace("_", "").isdigit() and event.implicit[0]:
         raise scan.refuse(f"a number of {len(text)} digits")

@@ -58,7 +58,7 @@ def clean_free_space(grid: OccupancyGrid, config: GraphConfig) -> FreeSpace:
     """
     filtered = _without_clutter(grid) if config.clutter_filter else grid
     # Door leaves stand in the wall around what is free: they belong to the window.
-    margin = math.ceil(config.wall_thickness / grid.frame.resolution) + 1
+    margin = math.ceil(config.leaf_reach / grid.frame.resolution) + 1
     free, occupied, frame = _cropped(filtered, margin)
     resolution, given = frame.resolution, grid.on(frame)
     outside = find_outside(given.free, given.occupied, resolution)

@@ -172,7 +172,7 @@ def add_doors(draft: GraphDraft, doors: Sequence[ClosedDoor], voronoi: VoronoiGr
 def _beside_leaf(space: FreeSpace, door: ClosedDoor, config: GraphConfig) -> BoolArray:
     """Mark what the edge of ``door`` may cross: the robot's space, the door's leaf and wall, what is free before."""
     frame = space.frame
-    before = config.wall_thickness + config.robot_radius + frame.resolution
+    before = config.leaf_reach + config.robot_radius + frame.resolution
     reach = before + (door.width or config.doorway)
     low = frame.to_cells(np.array(door.midpoint) - reach)
     high = frame.to_cells(np.array(door.midpoint) + reach) + 1
@@ -190,7 +190,7 @@ def _beside_leaf(space: FreeSpace, door: ClosedDoor, config: GraphConfig) -> Boo
         length = float(np.hypot(leaf[0], leaf[1]))
         across = np.abs(offset @ np.array([-leaf[1], leaf[0]])) / length
         beside = np.abs(offset @ leaf) / length > length / 2.0
-    own = ~beside & (across <= config.wall_thickness + slack)
+    own = ~beside & (across <= config.leaf_reach + slack)
     in_front = ~beside & (across <= before + slack) & space.clean[r0:r1, c0:c1]
     passable = space.reachable.copy()
     passable[r0:r1, c0:c1] |= own | in_front

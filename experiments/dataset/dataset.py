@@ -10,7 +10,7 @@ from typing import Any, TextIO
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files.incoming import read_json
 from closedrooms.core.files.outgoing import write_bytes
-from closedrooms.core.files.output_folders import MANIFEST
+from closedrooms.core.files.output_folders import MANIFEST, real_path
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.dataset.checksums import check
@@ -61,7 +61,7 @@ def dataset(config: DatasetConfig, *, progress: Progress | None = None) -> Repor
     progress = progress or Silent()
     require("pyarrow", by="closedrooms dataset")
     if isinstance(config.out, Path):
-        config = replace(config, out=config.out.resolve())
+        config = replace(config, out=real_path(config.out))
     _check_reach(config)
     progress.stage("worlds")
     worlds = find_worlds(config)

@@ -92,7 +92,7 @@ class Eraser:
             door.id: door_leaves(plan, door, solids, config.swing) for door in plan.doors if None not in door.rooms
         }
         sensor = Pose2(*config.lidar.mount)
-        world = [survey.world_T_map @ Pose2(*pose) @ sensor for pose in survey.true_poses]
+        world = [survey.world_T_map @ Pose2(*pose) @ sensor for pose in survey.keyframe_true_poses]
         self._places = np.array([(pose.x, pose.y) for pose in world])
         angles = config.lidar.angle_min + config.lidar.angle_increment * np.arange(config.lidar.beams)
         self._angles = np.array([pose.theta for pose in world])[:, None] + angles
@@ -122,7 +122,7 @@ class Eraser:
             InvalidInputError: Doors that do not exist or close no room.
         """
         closed = check_closed(self.survey.plan, closed)
-        kept = self._outside(closed, self.survey.true_poses)
+        kept = self._outside(closed, self.survey.keyframe_true_poses)
         ranges, owner = self._cut(closed)
         self._draw(kept, ranges, owner, closed)
         drawn = [entry for entry in self._drawn if entry is not None]
@@ -145,9 +145,9 @@ class Eraser:
                 continue
             self._drawn[number] = after
             if before is not None and before.imprint is not None:
-                self._grid.stamp(before.imprint, sign=-1)
+                self._grid.count_imprint(before.imprint, sign=-1)
             if after is not None and after.imprint is not None:
-                self._grid.stamp(after.imprint)
+                self._grid.count_imprint(after.imprint)
 
     def _keyframe(self, number: int, ranges: FloatArray, doors: tuple[str, ...]) -> _Drawn:
         """Make a keyframe of the survey with other ranges that sees ``doors``; keep it, as few doors show in one."""
@@ -272,7 +272,7 @@ class Eraser:
     def _sighting(self, name: str, number: int) -> DoorSighting:
         """Simulate how a closed door is seen from the true pose of a keyframe, robot frame."""
         door = next(door for door in self.survey.plan.doors if door.id == name)
-        robot_T_world = (self.survey.world_T_map @ Pose2(*self.survey.true_poses[number])).inverse()
+        robot_T_world = (self.survey.world_T_map @ Pose2(*self.survey.keyframe_true_poses[number])).inverse()
         (ax, ay), (bx, by) = robot_T_world.transform(np.array(door.segment))
         stamp = float(self.survey.keyframes.scans[number].stamp)
         return DoorSighting(name, ((float(ax), float(ay)), (float(bx), float(by))), stamp)

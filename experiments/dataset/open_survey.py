@@ -36,7 +36,7 @@ class OpenSurvey:
         poses: ``map_T_robot`` of the keyframes after the last optimisation, shape (k, 3).
         stamps: Times of all scans [s], shape (n,).
         estimate: Estimated poses of all scans, shape (n, 3), map frame.
-        truth: True poses of all scans, shape (n, 3), map frame.
+        true_poses: True poses of all scans, shape (n, 3), map frame.
     """
 
     plan: FloorPlan
@@ -50,10 +50,10 @@ class OpenSurvey:
     poses: FloatArray
     stamps: FloatArray
     estimate: FloatArray
-    truth: FloatArray
+    true_poses: FloatArray
 
     @property
-    def true_poses(self) -> FloatArray:
+    def keyframe_true_poses(self) -> FloatArray:
         """True poses of the keyframes, shape (k, 3), map frame."""
         assert self.keyframes.reference is not None, "a survey keeps true poses"
         return self.keyframes.reference
@@ -82,10 +82,10 @@ def survey_open(
         raise InvalidInputError("an exploration without a scan", expected="a map", where=plan.name)
     stamps = np.array([keyframe.stamp for keyframe in slam.keyframes])
     rows = np.searchsorted(survey.stamps, stamps)
-    keyframes = RecordedRun(tuple(recorded.scans[i] for i in rows), recorded.odometry[rows], survey.truth[rows])
+    keyframes = RecordedRun(tuple(recorded.scans[i] for i in rows), recorded.odometry[rows], survey.true_poses[rows])
     poses = np.array([keyframe.pose.as_tuple() for keyframe in slam.keyframes])
     exploration = survey.exploration
     return OpenSurvey(
         plan, sim, mapper, seed, world_T_map, exploration.status, exploration.seconds, keyframes, poses,
-        survey.stamps, survey.estimate, survey.truth,
+        survey.stamps, survey.estimate, survey.true_poses,
     )  # fmt: skip

@@ -31,10 +31,10 @@ from closedrooms.mapping.trajectory import ate
 from closedrooms.pipeline.reporting.manifest import resolved, versions
 from closedrooms.pipeline.reporting.progress import Silent
 from closedrooms.pipeline.reporting.run_log import RunLog
-from closedrooms.pipeline.reporting.scores import area_mapped, count_seen, room_points, rounded
+from closedrooms.pipeline.reporting.run_scores import area_mapped, count_seen, room_points, rounded
 from closedrooms.pipeline.survey import Truth, survey_building
 from closedrooms.sim.simulation import Simulation
-from closedrooms.visualization.rerun.opening import open_recording
+from closedrooms.visualization.rerun.optional_recording import open_recording
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.truth import rasterise, reachable, true_rooms, truth_bounds
@@ -92,7 +92,7 @@ class Observed:
     doors: Sequence[ClosedDoor]
     stamps: FloatArray
     estimate: FloatArray
-    truth: FloatArray
+    true_poses: FloatArray
     scans: RecordedRun | None
     about: dict[str, Any]
 
@@ -180,7 +180,7 @@ def _make_sample(task: Task, variant: Variant, plan: FloorPlan, folder: Path) ->
         write_doors(staging / "doors.geojson", observed.doors)
         write_rooms(staging / "truth_rooms.geojson", truth.rooms)
         write_trajectory(staging / "trajectory.tum", observed.stamps, observed.estimate)
-        write_trajectory(staging / "trajectory_truth.tum", observed.stamps, observed.truth)
+        write_trajectory(staging / "trajectory_truth.tum", observed.stamps, observed.true_poses)
         if config.keep_scans and observed.scans is not None:
             write_scans(staging / "scans.npz", observed.scans, estimate=observed.estimate)
         manifest["exploration"] = observed.about
@@ -195,7 +195,7 @@ def _metrics(
 ) -> dict[str, Any]:
     """Measure what a run's ``run.json`` says of the map, under the same names."""
     plan, map_T_world = _plan(source), start.inverse()
-    position, heading = ate(observed.estimate, observed.truth)
+    position, heading = ate(observed.estimate, observed.true_poses)
     cells = reachable(plan, closed, truth.frame, map_T_world, (start.x, start.y))
     return {
         "area_mapped": rounded(area_mapped(observed.grid.on(truth.frame), cells)),
@@ -213,10 +213,12 @@ def _erased(config: DatasetConfig, world: World, closed: Sequence[str]) -> Obser
     eraser = _eraser(config, world)
     survey, result = eraser.survey, eraser.erase(closed)
     kept = result.keyframes
-    scans = RecordedRun(result.scans, survey.keyframes.odometry[kept], survey.true_poses[kept])
+    scans = RecordedRun(result.scans, survey.keyframes.odometry[kept], survey.keyframe_true_poses[kept])
     stamps = np.array([scan.stamp for scan in result.scans])
     about = {"status": survey.status, "simulated_s": round(survey.seconds, 3), "scans": len(kept)}
-    return Observed(result.grid, result.doors, stamps, survey.poses[kept], survey.true_poses[kept], scans, about)
+    return Observed(
+        result.grid, result.doors, stamps, survey.poses[kept], survey.keyframe_true_poses[kept], scans, about
+    )
 
 
 @functools.lru_cache(maxsize=1)
@@ -257,7 +259,7 @@ def _simulated(
         "scans": survey.exploration.scans,
     }
     about |= {} if survey.exploration.status == "complete" else {"reason": survey.exploration.reason}
-    return Observed(survey.grid, survey.doors, survey.stamps, survey.estimate, survey.truth, scans, about)
+    return Observed(survey.grid, survey.doors, survey.stamps, survey.estimate, survey.true_poses, scans, about)
 
 
 def _show(recorder: "Recorder", observed: Observed) -> None:

@@ -24,7 +24,7 @@ from closedrooms.experiments.dataset.sample import Task, TaskResult, guarded, ma
 from closedrooms.experiments.dataset.shard import Shard, note_name, part_name, shard_name
 from closedrooms.experiments.dataset.survey_store import survey_name
 from closedrooms.experiments.dataset.variants import Split
-from closedrooms.experiments.stores import Store, Summed, open_store, write_file
+from closedrooms.experiments.stores import HashingWriter, Store, open_store, write_file
 
 # Samples that are read and written at a time, 1.5 MB: who wants one of them reads no more than these.
 ROW_GROUP = 16
@@ -111,7 +111,7 @@ def fill_shard(job: Filling) -> TaskResult:
     stopped: dict[str, str] = {}
     if parts:
         with store.new(name) as file:
-            sink = Summed(file)
+            sink = HashingWriter(file)
             schema = sample_schema(scans=job.config.keep_scans)
             with pq.ParquetWriter(sink, schema, compression="zstd", use_dictionary=["world"]) as writer:
                 for at in range(0, len(parts), ROW_GROUP):

@@ -44,7 +44,7 @@ def write_survey(folder: Path, survey: OpenSurvey, about: dict[str, Any]) -> Non
     with output_folder(folder, manifest) as staging:
         write_scans(staging / "scans.npz", survey.keyframes, estimate=survey.poses)
         write_trajectory(staging / "trajectory.tum", survey.stamps, survey.estimate)
-        write_trajectory(staging / "trajectory_truth.tum", survey.stamps, survey.truth)
+        write_trajectory(staging / "trajectory_truth.tum", survey.stamps, survey.true_poses)
         manifest["checksums"] = checksums(staging)
 
 
@@ -68,7 +68,7 @@ def read_survey(folder: Path, plan: FloorPlan, config: DatasetConfig, seed: int)
     scans = tuple(replace(scan, range_min=lidar.range_min) for scan in recorded.scans)
     keyframes = RecordedRun(scans, recorded.odometry, recorded.reference)
     stamps, estimate = read_trajectory(folder / "trajectory.tum")
-    _, truth = read_trajectory(folder / "trajectory_truth.tum")
+    _, true_poses = read_trajectory(folder / "trajectory_truth.tum")
     about = read_json(folder / MANIFEST, what="a survey's run.json")
     try:
         status, seconds = about["exploration"]["status"], float(about["exploration"]["simulated_s"])
@@ -76,7 +76,7 @@ def read_survey(folder: Path, plan: FloorPlan, config: DatasetConfig, seed: int)
         raise InvalidInputError("no exploration", expected="a survey's run.json", where=folder / MANIFEST) from error
     start = Simulation(plan, (), config.sim, seed).world_T_map
     return OpenSurvey(
-        plan, config.sim, config.mapper, seed, start, status, seconds, keyframes, poses, stamps, estimate, truth
+        plan, config.sim, config.mapper, seed, start, status, seconds, keyframes, poses, stamps, estimate, true_poses
     )
 
 

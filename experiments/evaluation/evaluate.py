@@ -8,7 +8,7 @@ from statistics import median
 from typing import Any
 
 from closedrooms.core.files.outgoing import write_json
-from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer
+from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer, real_path
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.claimed_folder import claim_folder
@@ -112,7 +112,7 @@ def _work(samples: Sequence[SamplePath], config: EvaluateConfig) -> Iterator[Sam
     job = partial(
         evaluate_sample,
         methods=config.methods,
-        out=config.out.resolve(),
+        out=real_path(config.out),
         tours=config.tours,
         probability=config.probability,
         completions=config.completions,

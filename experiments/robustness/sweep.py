@@ -12,7 +12,7 @@ from pathlib import Path
 from closedrooms.core.errors import InvalidInputError, OutputError, reason
 from closedrooms.core.files.incoming import read_json
 from closedrooms.core.files.outgoing import write_json
-from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer
+from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer, real_path
 from closedrooms.core.names import file_name
 from closedrooms.core.remarks import Remark
 from closedrooms.core.report import Report
@@ -158,7 +158,7 @@ def _work(worlds: dict[str, str], config: RobustnessConfig, progress: Progress, 
     workers = min(config.workers, len(worlds))
     crew: Crew[tuple[str, str], str] = Crew(workers, config.scheduler, needs, "closedrooms robustness")
     problems: dict[str, str] = {}
-    job = partial(sweep_world, config=replace(config, out=config.out.resolve()))
+    job = partial(sweep_world, config=replace(config, out=real_path(config.out)))
     with _watch(done, total, progress):
         for (_, world), outcome in crew.do(job, given.items()):
             if outcome:

@@ -28,7 +28,7 @@ from closedrooms.experiments.robustness.levels import Setting, first_setting
 from closedrooms.experiments.statistics import mean_figure, round_figure
 from closedrooms.experiments.tables import Row
 from closedrooms.mapping.trajectory import ate
-from closedrooms.pipeline.reporting.scores import room_iou, rooms_seen
+from closedrooms.pipeline.reporting.run_scores import room_iou, rooms_seen
 from closedrooms.pipeline.survey import Truth, true_building
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction
@@ -107,7 +107,7 @@ class BuildingTrials:
         known = {door.id for door in doors}
         doors += phantoms
         prediction = self._predict(mapped.grid, doors)
-        position, heading = ate(survey.estimate, survey.truth)
+        position, heading = ate(survey.estimate, survey.true_poses)
         figures = room_iou(prediction.rooms, closing.truth.rooms)
         seen = [door.id for door in doors]
         right = {door.id: np.array(door.midpoint) for door in true_doors(self._plan, closing.closed, map_T_world)}
@@ -216,7 +216,7 @@ class BuildingTrials:
         key = (replace(setting, missed=0.0, shift=0.0, turn=0.0, phantoms=0.0), true_poses)
         if key not in self._erasers:
             survey = self._survey(setting)
-            self._erasers[key] = Eraser(replace(survey, poses=survey.true_poses) if true_poses else survey)
+            self._erasers[key] = Eraser(replace(survey, poses=survey.keyframe_true_poses) if true_poses else survey)
         return self._erasers[key]
 
     def forget(self, setting: Setting) -> None:

@@ -9,12 +9,15 @@ import numpy.typing as npt
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.random import stream
 from closedrooms.experiments.training.examples import WHOLE, Bytes, Examples, unpack_patches
-from closedrooms.predictor.learned.patches import CELL
+from closedrooms.predictor.learned.patches import BEHIND, CELL, SIZE
 from closedrooms.predictor.learned.sides import AHEAD_CELLS, ASIDE_CELLS
 
 Floats = npt.NDArray[np.float32]
 # A side is taken to be where it is with this standard deviation [m]: a cell of the patch.
 BLUR = 0.25
+# Walls are drawn up to so many times as thick or thin, up to this share of their cells is lost, and lines run askew by
+# this standard deviation [rad]: what lidars and mappers do to them.
+THICKER, LOST, ASKEW = 2.2, 0.3, 0.02
 # Up to so many pieces of known space a patch are hidden, of up to so many cells a side: furniture, leaves of open
 # doors.
 POCKETS, POCKET = 6, 6
@@ -36,7 +39,7 @@ class Batch:
 
 
 def draw_batches(examples: Examples, of: IntArray, size: int, seed: int, epoch: int) -> Iterator[Batch]:
-    """Draw batches in random order, each example as it is or mirrored, with pockets in known space.
+    """Draw batches in random order, each example as it is or mirrored, with pockets in known space and worse walls.
 
     Args:
         examples: All.
@@ -49,9 +52,11 @@ def draw_batches(examples: Examples, of: IntArray, size: int, seed: int, epoch: 
     order = rng.permutation(of)
     for first in range(0, max(len(order) - size, 0) + 1, size):
         chosen = order[first : first + size]
-        shown, masks = examples.shown[chosen].copy(), examples.masks[chosen]
+        shown, masks = examples.shown[chosen].copy(), examples.masks[chosen].copy()
         for one, mask in zip(shown, masks, strict=True):
             hide_pockets(one, mask, rng)
+            wear_walls(one, rng)
+            skew(one, mask, rng)
         mirrored = rng.random(len(chosen)) < 0.5
         shown[mirrored], masks[mirrored] = shown[mirrored][..., ::-1], masks[mirrored][..., ::-1]
         sides = examples.sides[chosen]
@@ -104,6 +109,36 @@ def hide_pockets(shown: Bytes, mask: Bytes, rng: np.random.Generator) -> None:
         edge = np.ones(part.shape[1:], dtype=np.bool_)
         edge[1:-1, 1:-1] = False
         part[1] = np.where(edge, FACE, 0)
+
+
+def wear_walls(shown: Bytes, rng: np.random.Generator) -> None:
+    """Draw walls thicker or thinner, and lose some of their cells, as lidars and mappers do.
+
+    Args:
+        shown: Of one example, shape (3, SIZE, SIZE); changed.
+        rng: Draws how.
+    """
+    factor = THICKER ** rng.uniform(-1.0, 1.0)
+    kept = rng.random(shown.shape[1:]) >= rng.uniform(0.0, LOST)
+    occupied = np.minimum(np.rint(shown[1] * factor * kept), WHOLE).astype(np.uint8)
+    shown[0] = np.minimum(shown[0], WHOLE - occupied)
+    shown[1] = occupied
+
+
+def skew(shown: Bytes, mask: Bytes, rng: np.random.Generator) -> None:
+    """Lay lines askew around the door, those along its wall and those across it each by an angle of their own.
+
+    Args:
+        shown: Of one example, shape (3, SIZE, SIZE); changed.
+        mask: Its room, shape (SIZE, SIZE); changed.
+        rng: Draws the angles.
+    """
+    along, across = rng.normal(0.0, ASKEW, size=2)
+    rows, cols = np.indices(mask.shape)
+    door = round(BEHIND / CELL), SIZE // 2
+    from_rows = np.clip(rows + np.rint(along * (cols - door[1])).astype(int), 0, SIZE - 1)
+    from_cols = np.clip(cols + np.rint(across * (rows - door[0])).astype(int), 0, SIZE - 1)
+    shown[:], mask[:] = shown[:, from_rows, from_cols], mask[from_rows, from_cols]
 
 
 # Occupied cells of the map in a cell of a patch that a wall's face runs through.

@@ -17,7 +17,7 @@ from closedrooms.mapping.motion import UncertainMotion
 
 
 class KeyframeGraph:
-    """The keyframes of a run, the pose graph over them, and the loops that were closed.
+    """The keyframes of a run, the pose graph over them, and the loop closures.
 
     Attributes:
         keyframes: Oldest first.

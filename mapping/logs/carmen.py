@@ -12,8 +12,8 @@ from closedrooms.core.files.archives import TruncatedError, log_lines
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.logs.carmen_lines import WITH_POSES, CarmenLog, ScanLine, flaser_sector
-from closedrooms.mapping.logs.carmen_odometry import CarmenOdometry, motion_of
+from closedrooms.mapping.logs.carmen_lines import WITH_POSES, CarmenLog, ScanLine, flaser_field_of_view
+from closedrooms.mapping.logs.carmen_odometry import LocatedScans, motion_of
 from closedrooms.mapping.logs.clocks import forward
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 
@@ -75,15 +75,15 @@ def _kind(log: CarmenLog) -> str | None:
 
 
 def _with_sector(scans: list[ScanLine], settings: dict[str, float]) -> tuple[list[ScanLine], list[Remark]]:
-    """Give scans that do not say their sector the one of the log's parameters or of a SICK LMS."""
+    """Give scans that do not say their field of view the one of the log's parameters or of a SICK LMS."""
     resolved, guessed = [], 0
     for scan in scans:
         if scan.angle_min is not None:
             resolved.append(scan)
             continue
-        sector, guess = flaser_sector(scan.ranges.size, settings)
+        fov, guess = flaser_field_of_view(scan.ranges.size, settings)
         guessed += guess
-        resolved.append(replace(scan, angle_min=sector.angle_min, increment=sector.increment))
+        resolved.append(replace(scan, angle_min=fov.angle_min, increment=fov.increment))
     why = "the log has no laser_front_laser_fov; taken to be half a turn"
     return resolved, [Remark(action="guessed", what="fields of view", why=why, count=guessed)] if guessed else []
 
@@ -103,7 +103,7 @@ def _reading_remarks(log: CarmenLog) -> list[Remark]:
     return remarks
 
 
-def _run(motion: CarmenOdometry, settings: dict[str, float], remarks: list[Remark]) -> RecordedRun:
+def _run(motion: LocatedScans, settings: dict[str, float], remarks: list[Remark]) -> RecordedRun:
     """Make a run of the scans with their odometry."""
     scans = motion.scans
     remarks = [*remarks, *motion.remarks]

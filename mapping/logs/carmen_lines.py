@@ -14,7 +14,7 @@ HALF_TURN = math.pi
 STEP_OFF = 0.02
 """Share by which a stated step may miss field of view over beams: headers are rounded."""
 START_OFF = 0.03
-"""Difference [rad] up to which a sector counts as centred ahead."""
+"""Difference [rad] up to which a field of view counts as centred ahead."""
 LARGEST_ANGLE = 2.0 * math.pi + 0.1
 """No angle of a header is larger [rad]: it is in degrees."""
 USUAL_BEAMS = (90, 91, 180, 181, 360, 361)
@@ -113,22 +113,20 @@ class CarmenLog:
         n = _count(words[8])
         ranges = _numbers(words[9 : 9 + n], n)
         tail = words[10 + n + int(words[9 + n]) :]
-        sector = resolve_sector(start, view, step, n)
+        fov = resolve_field_of_view(start, view, step, n)
         laser_pose, robot_pose = (_pose(tail[0:3]), _pose(tail[3:6])) if robot else (None, None)
         stamp = _stamp(tail[-3], tail[-1])
-        if sector.repair:
-            self.repaired[sector.repair] += 1
-        if sector.increment < 0.0:
-            last = sector.angle_min + sector.increment * (n - 1)
-            sector, ranges = Sector(last, -sector.increment), ranges[::-1]
+        if fov.repair:
+            self.repaired[fov.repair] += 1
+        if fov.increment < 0.0:
+            last = fov.angle_min + fov.increment * (n - 1)
+            fov, ranges = FieldOfView(last, -fov.increment), ranges[::-1]
         range_max = longest if math.isfinite(longest) and longest > 0.0 else None
-        return ScanLine(
-            ranges, sector.angle_min, sector.increment, range_max, laser_pose, robot_pose, stamp, len(self.moves)
-        )
+        return ScanLine(ranges, fov.angle_min, fov.increment, range_max, laser_pose, robot_pose, stamp, len(self.moves))
 
 
 @dataclass(frozen=True, slots=True)
-class Sector:
+class FieldOfView:
     """Angle of the first beam, angle to the next [rad], and what had to be mended in the header."""
 
     angle_min: float
@@ -136,8 +134,8 @@ class Sector:
     repair: str = ""
 
 
-def resolve_sector(start: float, view: float, step: float, beams: int) -> Sector:
-    """Resolve the sector of a scan from a header whose parts need not agree.
+def resolve_field_of_view(start: float, view: float, step: float, beams: int) -> FieldOfView:
+    """Resolve the field of view of a scan from a header whose parts need not agree.
 
     Public writers put degrees, the number of steps, or nothing where the step belongs.
 
@@ -148,7 +146,7 @@ def resolve_sector(start: float, view: float, step: float, beams: int) -> Sector
         beams: Number of ranges.
 
     Raises:
-        ValueError: Nothing to tell the sector by.
+        ValueError: Nothing to tell the field of view by.
     """
     if not (math.isfinite(start) and math.isfinite(view) and math.isfinite(step)):
         raise ValueError("angles that are not finite")
@@ -163,41 +161,43 @@ def resolve_sector(start: float, view: float, step: float, beams: int) -> Sector
     if view == 0.0 and step == 0.0:
         if not 0.0 < -start <= math.pi:
             raise ValueError("a scan without angles")
-        return Sector(start, _even_step(-2.0 * start, beams), "no field of view; taken to be centred ahead")
+        return FieldOfView(start, _even_step(-2.0 * start, beams), "no field of view; taken to be centred ahead")
     units = (math.radians(step), step) if degrees else (step,)
     for stated in units:
         if stated != 0.0 and _agrees(abs(stated), view, beams):
-            return Sector(start, stated, "angles in degrees" if degrees else "")
+            return FieldOfView(start, stated, "angles in degrees" if degrees else "")
     centred = _centred(start, units[0], beams)
     if units[0] != 0.0 and centred and not abs(abs(start) - view / 2.0) < START_OFF:
-        return Sector(start, units[0], "field of view disagrees; step and start agree" if view else "")
+        return FieldOfView(start, units[0], "field of view disagrees; step and start agree" if view else "")
     if view == 0.0:
         if abs(step) * (beams - 1) > LARGEST_ANGLE:
             raise ValueError("a step that leads around more than once")
-        return Sector(start, units[0])
+        return FieldOfView(start, units[0])
     increment = _even_step(view, beams, hint=abs(step))
     # From the left end rightwards, where the start lies there.
     backwards = step < 0.0 or (start > 0.0 and abs(start - view / 2.0) < START_OFF)
-    return Sector(start, -increment if backwards else increment, "step disagrees; taken from field of view and beams")
+    return FieldOfView(
+        start, -increment if backwards else increment, "step disagrees; taken from field of view and beams"
+    )
 
 
-def flaser_sector(beams: int, settings: dict[str, float]) -> tuple[Sector, bool]:
-    """Resolve the sector of FLASER lines: by parameters of the log, else half a turn.
+def flaser_field_of_view(beams: int, settings: dict[str, float]) -> tuple[FieldOfView, bool]:
+    """Resolve the field of view of FLASER lines: by parameters of the log, else half a turn.
 
     Returns:
-        The sector, and whether the half turn is a guess.
+        The field of view, and whether the half turn is a guess.
     """
     view = settings.get("laser_front_laser_fov", 0.0)
     if math.isfinite(view) and view > 0.0:
         view = view if view <= LARGEST_ANGLE else math.radians(view)
         if view <= LARGEST_ANGLE:
-            return Sector(-view / 2.0, _even_step(view, beams)), False
-    half = Sector(-HALF_TURN / 2.0, _even_step(HALF_TURN, beams))
+            return FieldOfView(-view / 2.0, _even_step(view, beams)), False
+    half = FieldOfView(-HALF_TURN / 2.0, _even_step(HALF_TURN, beams))
     step = math.radians(settings.get("laser_front_laser_resolution", 0.0))
     if math.isfinite(step) and 0.0 < step * (beams - 1) <= LARGEST_ANGLE:
         if _agrees(step, HALF_TURN, beams):
             return half, False
-        return Sector(-step * (beams - 1) / 2.0, step), False
+        return FieldOfView(-step * (beams - 1) / 2.0, step), False
     return half, beams not in USUAL_BEAMS
 
 

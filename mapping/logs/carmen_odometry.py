@@ -31,7 +31,7 @@ LEAST_DISTANCE = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CarmenOdometry:
+class LocatedScans:
     """Scans of a CARMEN log with their odometry: still lines, of which :mod:`~.carmen` makes a ``RecordedRun``.
 
     Attributes:
@@ -51,7 +51,7 @@ class CarmenOdometry:
     remarks: tuple[Remark, ...] = ()
 
 
-def motion_of(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[str, float]) -> CarmenOdometry:
+def motion_of(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[str, float]) -> LocatedScans:
     """Find the odometry of the scans.
 
     As recorded, a scan carries its own, or has the ODOM lines around it. In logs that a mapping program corrected, the
@@ -74,17 +74,17 @@ def motion_of(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[s
     strays = [robot.distance(moves[s.since - 1].pose) for s, robot in zip(scans, robots, strict=True) if s.since > 0]
     if not echoes and not (strays and max(strays) > STRAY and not corrected):
         if corrected:
-            return CarmenOdometry(scans, poses, _array([laser for laser, _ in own]))
-        return CarmenOdometry(scans, poses, None, robots[0].inverse() @ own[0][0])
+            return LocatedScans(scans, poses, _array([laser for laser, _ in own]))
+        return LocatedScans(scans, poses, None, robots[0].inverse() @ own[0][0])
     raw = _raw_odometry(moves, echoes)
     known = np.array([scan.since > 0 for scan in scans])
     if echoes and _travelled(_array(raw)) < STANDING * _travelled(poses):
         why = "the ODOM lines only repeat the poses of the scans; found by matching scans alone"
         remark = Remark(action="guessed", what="motion", why=why)
-        return CarmenOdometry(scans, np.zeros((len(scans), 3)), poses, has_odometry=False, remarks=(remark,))
+        return LocatedScans(scans, np.zeros((len(scans), 3)), poses, has_odometry=False, remarks=(remark,))
     kept = [scan for scan in scans if scan.since > 0]
     odometry = _array([raw[scan.since - 1] for scan in kept])
-    return CarmenOdometry(kept, odometry, poses[known], remarks=tuple(lost_remarks(known)))
+    return LocatedScans(kept, odometry, poses[known], remarks=tuple(lost_remarks(known)))
 
 
 def _stuck(robots: Sequence[Pose2], moves: list[OdometryLine]) -> bool:
@@ -92,27 +92,27 @@ def _stuck(robots: Sequence[Pose2], moves: list[OdometryLine]) -> bool:
     return _travelled(_array(robots)) == 0.0 and _travelled(_array([move.pose for move in moves])) > LEAST_DISTANCE
 
 
-def _paired(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[str, float]) -> CarmenOdometry:
+def _paired(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[str, float]) -> LocatedScans:
     """Pair scans without poses with the ODOM lines around them."""
     mount, remarks = _stated_mount(settings)
     if not moves:
         why = "no ODOM lines and no poses in the scans; found by matching scans alone"
         remark = Remark(action="guessed", what="motion", why=why)
         odometry = np.zeros((len(scans), 3))
-        return CarmenOdometry(scans, odometry, None, mount, has_odometry=False, remarks=(*remarks, remark))
+        return LocatedScans(scans, odometry, None, mount, has_odometry=False, remarks=(*remarks, remark))
     clocks = np.array([move.clock for move in moves])
     poses = _array([move.pose for move in moves])
     if (clocks > 0.0).all() and (np.diff(clocks) >= 0.0).all():
         odometry, known, lost = odometry_at(np.column_stack((clocks, poses)), np.array([s.stamp for s in scans]))
         if 2 * len(odometry) >= len(scans):
             kept = [scan for scan, has in zip(scans, known, strict=True) if has]
-            return CarmenOdometry(kept, odometry, None, mount, remarks=(*remarks, *lost))
+            return LocatedScans(kept, odometry, None, mount, remarks=(*remarks, *lost))
     known = np.array([scan.since > 0 for scan in scans])
     why = "clocks of ODOM lines and scans differ; each scan takes the ODOM line before it"
     guessed = Remark(action="guessed", what="scans' odometry", why=why, count=max(int(known.sum()), 1))
     kept = [scan for scan in scans if scan.since > 0]
     odometry = poses[[scan.since - 1 for scan in kept]].reshape(-1, 3)
-    return CarmenOdometry(kept, odometry, None, mount, remarks=(*remarks, guessed, *lost_remarks(known)))
+    return LocatedScans(kept, odometry, None, mount, remarks=(*remarks, guessed, *lost_remarks(known)))
 
 
 def _stated_mount(settings: dict[str, float]) -> tuple[Pose2, tuple[Remark, ...]]:

@@ -20,6 +20,8 @@ Field = npt.NDArray[np.float32]
 class Costmap:
     """The planning grid: coarse cells, each as good as the best map cell inside it.
 
+    It holds clearances; ``planner.cell_costs`` makes the costs of them.
+
     A coarse cell takes the largest clearance of its map cells, so that a door is as wide as on the map itself. Walls
     cannot leak: the band closer to a wall than ``required_clearance`` is wider than a coarse cell's diagonal.
 

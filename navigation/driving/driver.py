@@ -11,8 +11,8 @@ from closedrooms.core.pose import Pose2, wrap_angle
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import RobotNavigation
 from closedrooms.navigation.driving.path_follower import (
+    FollowedPath,
     Steering,
-    Track,
     free_distance,
     limit_speed,
     near_points,
@@ -51,7 +51,7 @@ class Driver:
         self.state: DriveState = "idle"
         self.remaining = 0.0
         self.recoveries = 0
-        self._track: Track | None = None
+        self._track: FollowedPath | None = None
         self._progress = 0.0
         self._best = math.inf
         self._moved_at = 0.0
@@ -60,7 +60,7 @@ class Driver:
 
     def follow(self, points: FloatArray, stamp: float) -> None:
         """Take a path, shape (n, 2), map frame [m], at time ``stamp`` [s]; it replaces the one before."""
-        self._track = Track.of(points)
+        self._track = FollowedPath.of(points)
         self._progress = 0.0
         self.remaining = self._track.length
         if self.state != "driving":

@@ -40,7 +40,7 @@ class Steering:
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class FollowedPath:
     """A path prepared for following.
 
     Attributes:
@@ -54,7 +54,7 @@ class Track:
     along: tuple[float, ...]
 
     @classmethod
-    def of(cls, points: FloatArray) -> "Track":
+    def of(cls, points: FloatArray) -> "FollowedPath":
         """Prepare path corners, shape (n, 2) [m], for following."""
         along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
         return cls(tuple(points[:, 0].tolist()), tuple(points[:, 1].tolist()), tuple(along.tolist()))
@@ -92,7 +92,7 @@ class Track:
         return best
 
 
-def steer(track: Track, pose: Pose2, progress: float, config: RobotNavigation) -> Steering:
+def steer(track: FollowedPath, pose: Pose2, progress: float, config: RobotNavigation) -> Steering:
     """Steer by pure pursuit (Coulter, CMU-RI-TR-92-01), turning in place where the path leaves the heading.
 
     Args:

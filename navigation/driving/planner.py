@@ -18,7 +18,7 @@ FIRST_WINDOW = 6.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Path:
+class PlannedPath:
     """A path through free space.
 
     Attributes:
@@ -63,7 +63,7 @@ def start_cell(costmap: Costmap, fits: BoolArray, start: Point) -> tuple[int, in
     return (int(cells[best, 0]), int(cells[best, 1]))
 
 
-def plan_path(costmap: Costmap, start: Point, goals: BoolArray, config: RobotNavigation) -> Path | None:
+def plan_path(costmap: Costmap, start: Point, goals: BoolArray, config: RobotNavigation) -> PlannedPath | None:
     """Plan the cheapest path from ``start`` to the nearest of several goals.
 
     Args:
@@ -103,7 +103,10 @@ class PathSearch:
         return None if first is None else cls(costmap, start, first, config)
 
     def run(self, goals: BoolArray, *, limit: float = math.inf) -> None:
-        """Spread out until the nearest of ``goals`` (coarse cells) is found or everything within ``limit`` [m]."""
+        """Spread out until the nearest of ``goals`` (coarse cells) is found or everything at a cost below ``limit`` is.
+
+        A cost is in metres of open floor; beside obstacles a metre costs more.
+        """
         rows, cols = self._costmap.frame.shape
         reach = FIRST_WINDOW
         # No path is shorter than the straight line: smaller windows cannot settle which goal is nearest.
@@ -122,7 +125,7 @@ class PathSearch:
             reach *= 2.0
 
     def _flood(self) -> None:
-        """Search the costs from the start to every cell of the window [m]."""
+        """Find the least cost from the start to every cell of the window, in metres of open floor (Dijkstra)."""
         from skimage.graph import MCP_Geometric
 
         clearance = self._costmap.clearance[self._window]
@@ -141,13 +144,13 @@ class PathSearch:
         best = int(np.argmin(costs))
         return cells[best] + self._corner, float(costs[best])
 
-    def path(self, cell: IntArray) -> Path:
+    def path(self, cell: IntArray) -> PlannedPath:
         """Trace the path to a coarse cell that the search has reached."""
         row, col = (int(v) for v in cell - self._corner)
         cells = np.array(self._search.traceback((row, col)), dtype=np.int64) + self._corner
         points = np.vstack((np.array(self._start), self._costmap.anchors(cells)))
         points = straighten(points, self._costmap, self._config)
-        return Path(points, float(self._costs[row, col]))
+        return PlannedPath(points, float(self._costs[row, col]))
 
     @property
     def _corner(self) -> IntArray:

@@ -11,7 +11,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.pipeline.drive import DriveResult
-from closedrooms.pipeline.reporting.scores import area_mapped, mean, room_iou, rounded
+from closedrooms.pipeline.reporting.run_scores import area_mapped, mean, room_iou, rounded
 from closedrooms.pipeline.survey import Truth
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.truth import reachable

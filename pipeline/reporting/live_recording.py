@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room
@@ -13,7 +15,7 @@ from closedrooms.navigation.tour.opened_doors import ReopenedMap
 from closedrooms.navigation.tour.revised_prediction import Revision
 from closedrooms.navigation.tour.tour_follower import TourFollower
 from closedrooms.pipeline.reporting.run_log import RunLog
-from closedrooms.pipeline.reporting.scores import room_iou
+from closedrooms.pipeline.reporting.run_scores import room_iou, room_points
 from closedrooms.pipeline.reporting.story import Story
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.predictor.revision import Predict
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
 GROWN = 1.5
 
 
-class GrowingPrediction:
+class InterimPrediction:
     """Prediction made anew whenever a closed door is first seen, so that a recording shows how it changes.
 
     With a door known, it also does when what is known has grown by half: else it would stand still for minutes.
@@ -61,7 +63,7 @@ class GrowingPrediction:
         prediction = self._predict(grid, doors)
         iou = room_iou(prediction.rooms, self._truth)
         iou = {door: iou[door] for door in iou if door in self._seen}
-        self._recorder.growth(grid, doors, prediction, stamp, iou=iou)
+        self._recorder.interim_prediction(grid, doors, prediction, stamp, iou=iou)
         return prediction, iou
 
 
@@ -74,15 +76,11 @@ class ExplorationRecording:
         log: RunLog,
         mapper: Mapper,
         explorer: Explorer,
-        growth: GrowingPrediction | None = None,
+        interim: InterimPrediction | None = None,
     ) -> None:
         self._recorder, self._log, self._mapper, self._explorer = recorder, log, mapper, explorer
-        self._growth = growth
-        self._story = Story(
-            recorder,
-            floor=sum(room.polygon.area for room in log.sim.plan.rooms),
-            closed=sum(not opening for opening in log.sim.door_states().values()),
-        )
+        self._interim = interim
+        self._story: Story | None = None
         self._told = 0
 
     def __call__(self, step: Step) -> None:
@@ -102,11 +100,25 @@ class ExplorationRecording:
 
     def _tell(self, grid: OccupancyGrid, doors: Sequence[ClosedDoor], stamp: float) -> None:
         """Write into the log what is new since the last map."""
-        self._story.known(grid, stamp)
-        predicted = None if self._growth is None else self._growth(grid, doors, stamp)
-        self._story.doors(doors, stamp, *(predicted or ()))
-        self._story.loops(len(self._mapper.loops), stamp)
-        self._story.events(self._mapper.events, stamp)
+        if self._story is None:  # not before: nothing may be recorded at all
+            self._story = begin_story(self._recorder, self._log)
+        story = self._story
+        story.known(grid, stamp)
+        predicted = None if self._interim is None else self._interim(grid, doors, stamp)
+        story.doors(doors, stamp, *(predicted or ()))
+        story.loops(len(self._mapper.loops), stamp)
+        story.events(self._mapper.events, stamp)
+
+
+def begin_story(recorder: "Recorder", log: RunLog) -> Story:
+    """Begin the story of a robot in a building, by its floor and its closed doors."""
+    sim = log.sim
+    rooms = room_points(sim.plan)
+    return Story(
+        recorder,
+        floor=sim.world_T_map.inverse().transform(np.concatenate(rooms)) if rooms else None,
+        closed=sum(not opening for opening in sim.door_states().values()),
+    )
 
 
 class DriveRecording:

@@ -90,7 +90,7 @@ def write_run_files(folder: Path, found: Finding, metrics: Mapping[str, Any]) ->
     write_raw_map(folder / "probability", free_probability(prediction, survey.grid))
     write_rooms(folder / "truth_rooms.geojson", truth.rooms)
     write_trajectory(folder / "trajectory.tum", survey.stamps, survey.estimate)
-    write_trajectory(folder / "trajectory_truth.tum", survey.stamps, survey.truth)
+    write_trajectory(folder / "trajectory_truth.tum", survey.stamps, survey.true_poses)
     features = [f for name, tour in found.tours.items() for f in make_tour_features(tour, name)]
     write_features(folder / "tour.geojson", features + ([] if driven is None else drive_features(driven)))
     if driven is not None:

@@ -27,7 +27,7 @@ class RunLog:
         self._progress = progress
         self._keep_scans = keep_scans
         self._stamps: list[float] = []
-        self._truth: list[tuple[float, float, float]] = []
+        self._true_poses: list[tuple[float, float, float]] = []
         self._odometry: list[tuple[float, float, float]] = []
         self._scans: list[LaserScan] = []
 
@@ -41,7 +41,7 @@ class RunLog:
         observation = self.sim.observe()
         self.map_T_robot = self.sim.map_T_robot
         self._stamps.append(observation.stamp)
-        self._truth.append(self.map_T_robot.as_tuple())
+        self._true_poses.append(self.map_T_robot.as_tuple())
         self._odometry.append(observation.odometry.as_tuple())
         if self._keep_scans:
             self._scans.append(observation.scan)
@@ -49,14 +49,14 @@ class RunLog:
         return observation
 
     def step(self, v: float, w: float, duration: float) -> None:
-        """Let time pass under a velocity command."""
+        """Apply a velocity command ``v`` [m/s], ``w`` [rad/s] for ``duration`` [s]."""
         self.sim.step(v, w, duration)
 
     @property
-    def truth(self) -> FloatArray:
+    def true_poses(self) -> FloatArray:
         """True poses ``(x, y, theta)`` in the map frame, shape (n, 3)."""
-        return np.array(self._truth).reshape(-1, 3)
+        return np.array(self._true_poses).reshape(-1, 3)
 
     def recorded(self) -> RecordedRun:
         """Collect every scan with odometry and true pose, for ``scans.npz``; needs ``keep_scans``."""
-        return RecordedRun(tuple(self._scans), np.array(self._odometry), self.truth)
+        return RecordedRun(tuple(self._scans), np.array(self._odometry), self.true_poses)

@@ -7,7 +7,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.coverage.estimates import compare_tours
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.mapping.trajectory import ate
-from closedrooms.pipeline.reporting.scores import area_mapped, mean, room_iou, rooms_seen, rounded
+from closedrooms.pipeline.reporting.run_scores import area_mapped, mean, room_iou, rooms_seen, rounded
 from closedrooms.pipeline.survey import Survey, Truth
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.worlds.plan import FloorPlan
@@ -34,7 +34,7 @@ def run_metrics(
         truth: Map and closed rooms.
         tours: By the map that they were planned on.
     """
-    position, heading = ate(survey.estimate, survey.truth)
+    position, heading = ate(survey.estimate, survey.true_poses)
     start = map_T_world.inverse()
     cells = reachable(plan, closed, truth.grid.frame, map_T_world, (start.x, start.y))
     figures = room_iou(prediction.rooms, truth.rooms)

@@ -3,6 +3,9 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.remarks import Remark
@@ -22,12 +25,13 @@ QUARTERS = (0.25, 0.5, 0.75)
 class Story:
     """Source of the lines in the recording's log; what happens often is told once, then when it has doubled."""
 
-    def __init__(self, recorder: "Recorder", *, floor: float | None = None, closed: int | None = None) -> None:
+    def __init__(self, recorder: "Recorder", *, floor: FloatArray | None = None, closed: int | None = None) -> None:
         """Begin.
 
         Args:
             recorder: Takes the lines.
-            floor: Area of all rooms [m²], where it is known.
+            floor: Points spread evenly over all rooms, map frame, shape (n, 2) [m], where they are known. What is
+                known outside, through glass, does not count.
             closed: How many doors are closed, where it is known.
         """
         self._recorder, self._floor, self._closed = recorder, floor, closed
@@ -40,11 +44,15 @@ class Story:
 
     def known(self, grid: OccupancyGrid, stamp: float) -> None:
         """Tell when another quarter of the floor is known."""
-        area = known_area(grid)
-        quarters = 0 if not self._floor else sum(area >= share * self._floor for share in QUARTERS)
+        if self._floor is None or not len(self._floor):
+            return
+        cells = grid.frame.to_cells(self._floor)
+        cells = cells[grid.frame.contains(cells)]
+        share = np.count_nonzero(grid.known[cells[:, 0], cells[:, 1]]) / len(self._floor)
+        quarters = sum(share >= quarter for quarter in QUARTERS)
         if quarters > self._quarters:
             self._quarters = quarters
-            self._recorder.note(f"{100 * QUARTERS[quarters - 1]:.0f} % of the floor is known, {area:.0f} m²", stamp)
+            self._recorder.note(f"{100 * QUARTERS[quarters - 1]:.0f} % of the floor is known", stamp)
 
     def loops(self, count: int, stamp: float) -> None:
         """Tell of the first loop that was closed, then when there are twice as many."""

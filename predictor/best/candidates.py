@@ -6,7 +6,7 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.predictor.best.door_frame import DoorFrame, SummedAreaTable, Window
-from closedrooms.predictor.best.door_pose import DoorsSeen, Entry
+from closedrooms.predictor.best.door_pose import DoorsSeen, FramedDoor
 from closedrooms.predictor.best.evidence import REACH, SLACK, Evidence
 from closedrooms.predictor.best.resolution import in_cells
 
@@ -32,7 +32,7 @@ BACKS = tuple(in_cells(depth) for depth in (2.5, 3.5, 4.5, 5.5, 6.5, 8.0, 10.0))
 NONE = np.zeros(0, dtype=np.int64)
 
 
-def window_around(frame: DoorFrame, entry: Entry, largest: int) -> Window:
+def window_around(frame: DoorFrame, entry: FramedDoor, largest: int) -> Window:
     """Find where the rectangles of a door may lie.
 
     Args:
@@ -51,7 +51,7 @@ def window_around(frame: DoorFrame, entry: Entry, largest: int) -> Window:
 
 
 def propose(
-    frame: DoorFrame, evidence: Evidence, entry: Entry, doors: DoorsSeen, smallest: int, largest: int
+    frame: DoorFrame, evidence: Evidence, entry: FramedDoor, doors: DoorsSeen, smallest: int, largest: int
 ) -> tuple[IntArray, BoolArray]:
     """Propose all rectangles between plausible sides: where another door leads is another room, or the same one.
 
@@ -99,7 +99,7 @@ def propose(
 
 def _find_positions(
     evidence: Evidence,
-    entry: Entry,
+    entry: FramedDoor,
     thickness: int,
     side: str,
     reach: int,

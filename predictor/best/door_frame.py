@@ -21,7 +21,7 @@ STRIP = 512
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Window of cells ``[v0, v1) x [u0, u1)`` of a frame."""
+    """Rectangle of cells ``[v0, v1) x [u0, u1)`` of a frame."""
 
     v0: int
     u0: int

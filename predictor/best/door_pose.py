@@ -51,8 +51,8 @@ class DoorPose:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
-    """A door in its frame: where the room behind it begins.
+class FramedDoor:
+    """A door in the coordinates of its frame, and where the room behind it begins.
 
     Attributes:
         u: Door along the wall [cells].
@@ -95,7 +95,7 @@ class DoorsSeen:
         rest = np.arange(len(self.columns)) != door
         return DoorsSeen(self.behind[rest], self.leaves[rest], self.columns[rest])
 
-    def enter_with(self, entry: Entry, doors: BoolArray) -> Entry:
+    def enter_with(self, entry: FramedDoor, doors: BoolArray) -> FramedDoor:
         """Make the entry of a room that some of these doors lead to as well as the one of ``entry``."""
         in_wall = (self.columns == 1) & (np.abs(self.leaves[:, 1] - entry.v0) < SAME_WALL)
         own = np.append(self.leaves[doors & in_wall, 0], entry.u)
@@ -167,7 +167,7 @@ def _sample(mask: BoolArray, at: FloatArray, quarter: int, low: int, high: int) 
     return np.asarray(mask[row, col], dtype=np.bool_)
 
 
-def enter(frame: DoorFrame, pose: DoorPose, poses: Sequence[DoorPose]) -> Entry:
+def enter(frame: DoorFrame, pose: DoorPose, poses: Sequence[DoorPose]) -> FramedDoor:
     """Find where the room behind a door begins and what its neighbours leave it.
 
     Args:
@@ -195,10 +195,12 @@ def enter(frame: DoorFrame, pose: DoorPose, poses: Sequence[DoorPose]) -> Entry:
             row += 1
             left = ou if ou < u and (left is None or ou > left) else left
             right = ou if ou > u and (right is None or ou < right) else right
-    return Entry(u, v, v0, left, right, row, _find_front(frame.free, u, v), (u, u))
+    return FramedDoor(u, v, v0, left, right, row, _find_front(frame.free, u, v), (u, u))
 
 
-def see_doors(frame: DoorFrame, poses: Sequence[DoorPose], entries: Sequence[tuple[DoorFrame, Entry]]) -> DoorsSeen:
+def see_doors(
+    frame: DoorFrame, poses: Sequence[DoorPose], entries: Sequence[tuple[DoorFrame, FramedDoor]]
+) -> DoorsSeen:
     """Find where the rooms behind all doors of a map begin, as seen from one frame.
 
     Args:

@@ -14,7 +14,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.best.candidates import FRONT
 from closedrooms.predictor.best.door_frame import DoorFrame
-from closedrooms.predictor.best.door_pose import Entry
+from closedrooms.predictor.best.door_pose import FramedDoor
 from closedrooms.predictor.best.evidence import NEAR_FACE, SLACK, Evidence
 from closedrooms.predictor.best.feature import Feature
 from closedrooms.predictor.best.rectangles import SURE, Rectangles
@@ -209,7 +209,7 @@ WEIGHTS = np.array([feature.weight for feature in FEATURES])
 
 
 def score_rectangles(
-    frame: DoorFrame, evidence: Evidence, entry: Entry, boxes: IntArray
+    frame: DoorFrame, evidence: Evidence, entry: FramedDoor, boxes: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Score rectangles by their evidence.
 

@@ -8,7 +8,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.best.candidates import propose, window_around
 from closedrooms.predictor.best.door_frame import DoorFrame, TurnedMap, Window, door_frame
-from closedrooms.predictor.best.door_pose import DoorsSeen, Entry, enter, see_doors
+from closedrooms.predictor.best.door_pose import DoorsSeen, FramedDoor, enter, see_doors
 from closedrooms.predictor.best.evidence import gather, rate_sizes, widen_in_line
 from closedrooms.predictor.best.features import score_rectangles
 from closedrooms.predictor.best.resolution import in_cells
@@ -107,7 +107,7 @@ def propose_rectangles(scene: Scene) -> Proposals:
 
 
 def _propose_all(
-    frame: DoorFrame, entries: dict[int, Entry], seen: DoorsSeen, config: BestConfig
+    frame: DoorFrame, entries: dict[int, FramedDoor], seen: DoorsSeen, config: BestConfig
 ) -> dict[tuple[int, Doors], Scored]:
     """Propose the rectangles of every door in a frame with scores and features: one window's tables at a time.
 
@@ -134,7 +134,7 @@ def _propose_all(
     return found
 
 
-def _share_windows(frame: DoorFrame, entries: dict[int, Entry], largest: int) -> list[tuple[Window, list[int]]]:
+def _share_windows(frame: DoorFrame, entries: dict[int, FramedDoor], largest: int) -> list[tuple[Window, list[int]]]:
     """Find windows that hold the rectangles of each door; near doors share one."""
     groups: list[tuple[Window, list[int]]] = []
     for door in sorted(entries, key=lambda door: (entries[door].v0, entries[door].u)):
@@ -153,7 +153,7 @@ def _place(
     boxes: IntArray,
     scores: FloatArray,
     measured: FloatArray,
-    entry: Entry,
+    entry: FramedDoor,
     frame: DoorFrame,
     turned: TurnedMap,
     quarter: int,

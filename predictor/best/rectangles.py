@@ -6,7 +6,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.best.door_frame import DoorFrame
-from closedrooms.predictor.best.door_pose import Entry
+from closedrooms.predictor.best.door_pose import FramedDoor
 from closedrooms.predictor.best.evidence import REACH, Evidence
 from closedrooms.predictor.best.resolution import in_cells
 
@@ -93,7 +93,7 @@ class Rectangles:
         boxes: ``u0, v0, u1, v1`` [cells], shape (n, 4).
     """
 
-    def __init__(self, frame: DoorFrame, evidence: Evidence, entry: Entry, boxes: IntArray) -> None:
+    def __init__(self, frame: DoorFrame, evidence: Evidence, entry: FramedDoor, boxes: IntArray) -> None:
         self.frame, self.evidence, self.entry = frame, evidence, entry
         self.u0, self.v0, self.u1, self.v1 = boxes.T
         self.width, self.depth = (self.u1 - self.u0).astype(float), (self.v1 - self.v0).astype(float)

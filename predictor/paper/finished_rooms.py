@@ -9,12 +9,12 @@ from closedrooms.predictor.disjoint_rooms import NO_ROOM, part_rooms
 from closedrooms.predictor.paper.arrangement import unite_faces
 from closedrooms.predictor.paper.border import BorderRoom, border_rooms
 from closedrooms.predictor.paper.expansion import Growth
-from closedrooms.predictor.paper.initial_layouts import Start
+from closedrooms.predictor.paper.initial_layouts import InitialFaces
 from closedrooms.predictor.structure.doorways import find_doorways
 from closedrooms.predictor.structure.wall_thickness import free_interior, measure_taken
 
 
-def finish_rooms(start: Start, growth: Growth, config: PaperConfig) -> tuple[list[Room], dict[str, str]]:
+def finish_rooms(start: InitialFaces, growth: Growth, config: PaperConfig) -> tuple[list[Room], dict[str, str]]:
     """Make rooms of the grown layouts and of the border rooms: without their walls, up to the leaves of their doors.
 
     Args:
@@ -47,7 +47,7 @@ def finish_rooms(start: Start, growth: Growth, config: PaperConfig) -> tuple[lis
     return apart, failures | without
 
 
-def _gather_shapes(start: Start, growth: Growth, border: dict[int, BorderRoom]) -> dict[int, Polygon]:
+def _gather_shapes(start: InitialFaces, growth: Growth, border: dict[int, BorderRoom]) -> dict[int, Polygon]:
     """Unite the faces of each layout; border rooms take what is left beside them, the shallowest first (3.6)."""
     shapes = {room: unite(growth, room) for room in range(len(start.entrances)) if room not in border}
     for room in sorted(border, key=lambda r: (border[r].depth, start.entrances[r].door.midpoint)):

@@ -22,7 +22,7 @@ FARTHEST = 1e9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Start:
+class InitialFaces:
     """Faces and initial faces that ``paper``, ``rose`` and the two baselines begin with (``best`` does not).
 
     Attributes:
@@ -41,10 +41,10 @@ class Start:
 
 
 # A start, ``None`` where the map shows no structure at all, and why doors have no room, by door id.
-Started = tuple[Start | None, dict[str, str]]
+FacesFound = tuple[InitialFaces | None, dict[str, str]]
 
 
-def start_rooms(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesConfig) -> Started:
+def find_initial_faces(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesConfig) -> FacesFound:
     """Find structure, faces and initial faces of a map: the same for every method with the same structure.
 
     Args:
@@ -80,7 +80,7 @@ def start_rooms(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: FacesC
         if other is not entrance:
             failures[entrance.door.id] = f"behind the same piece of wall as door {other.door.id}"
     kept = tuple(entrance for entrance in entrances if taken[entrance.face] is entrance)
-    return Start(working, structure, arrangement, unknown, kept), failures
+    return InitialFaces(working, structure, arrangement, unknown, kept), failures
 
 
 def _split_until_apart(

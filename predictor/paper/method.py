@@ -9,13 +9,13 @@ from closedrooms.predictor.inpainting import complete_map
 from closedrooms.predictor.paper.expansion import Growth, expand
 from closedrooms.predictor.paper.face_swaps import swap_faces
 from closedrooms.predictor.paper.finished_rooms import finish_rooms
-from closedrooms.predictor.paper.initial_layouts import Started, start_rooms
+from closedrooms.predictor.paper.initial_layouts import FacesFound, find_initial_faces
 from closedrooms.predictor.paper.trace import level_of, trace_of
 from closedrooms.predictor.prediction import Level, Prediction
 
 
 def predict_paper(
-    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PaperConfig, *, started: Started | None = None
+    grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: PaperConfig, *, started: FacesFound | None = None
 ) -> Prediction:
     """Predict the rooms behind closed doors as the authors describe and ran it.
 
@@ -28,7 +28,7 @@ def predict_paper(
         grid: The map, of any resolution and size.
         doors: Closed doors in the frame of the map.
         config: Settings.
-        started: What ``start_rooms`` gave for this map, these doors and these settings, where it is at hand.
+        started: What ``find_initial_faces`` gave for this map, these doors and these settings, where it is at hand.
 
     Returns:
         The completed map on the lattice of the input, the rooms in the order of the doors, failures by door id.
@@ -38,7 +38,7 @@ def predict_paper(
             in; a completed map of too many cells, where those of the input are tiny.
     """
     # 3.1, 3.2: lines, faces, and the face behind each door.
-    start, reasons = started or start_rooms(grid, doors, config)
+    start, reasons = started or find_initial_faces(grid, doors, config)
     failures = dict(reasons)
     if start is None:
         return Prediction(grid, (), failures)

@@ -6,7 +6,7 @@ import shapely
 from closedrooms.predictor.paper.arrangement import draw_line
 from closedrooms.predictor.paper.expansion import Growth
 from closedrooms.predictor.paper.finished_rooms import unite
-from closedrooms.predictor.paper.initial_layouts import Start
+from closedrooms.predictor.paper.initial_layouts import InitialFaces
 from closedrooms.predictor.prediction import Level, PredictionTrace
 
 
@@ -17,7 +17,7 @@ def level_of(k: int, growth: Growth) -> Level:
     return Level(k, shapes, dict(zip(names, growth.scores, strict=True)))
 
 
-def trace_of(start: Start, levels: list[Level]) -> PredictionTrace:
+def trace_of(start: InitialFaces, levels: list[Level]) -> PredictionTrace:
     """Collect every stage of a prediction, for recordings and pictures.
 
     Args:

@@ -42,7 +42,7 @@ def check_description(path: Path) -> None:
         name = item.get("filename", "")
         mesh = (folder / name).resolve()
         if "://" in name or not mesh.is_relative_to(folder):
-            raise InvalidInputError(f"a mesh {name!r}", expected=f"a file in the folder of that description", where=path)
+            raise InvalidInputError(f"a mesh {name!r}", expected="a file in the folder of that description", where=path)
         if not is_file(mesh):
             raise InvalidInputError(f"a mesh {name!r} that is not there", expected="a file", where=path)
         read_bytes(mesh, what="a mesh", max_bytes=LARGEST_MESH)

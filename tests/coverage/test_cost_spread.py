@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shapely.geometry import box
@@ -5,7 +7,9 @@ from shapely.geometry import box
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.room import Alternative, Room
+from closedrooms.coverage import cost_spread
 from closedrooms.coverage.cost_spread import HELD, measure_excursion, spread_cost, summarise
+from closedrooms.coverage.graph.graph_builder import build_graph
 from closedrooms.coverage.tour.tour_planner import plan_coverage
 
 FRAME = GridFrame(0.05, 0.0, 0.0, 200, 400)
@@ -127,3 +131,24 @@ def test_figures_tell_every_draw_and_the_truth_only_where_it_is_known():
         "count": 3, "mean_m": 2.0, "interval": 0.5, "low_m": 1.0, "high_m": 3.0, "lengths_m": [3.0, 1.0, 2.0],
     }  # fmt: skip
     assert spread.figures(3.5)["true_within"] is False
+
+
+def test_a_door_without_a_vertex_of_its_own_is_walked_to_and_back(plain, monkeypatch):
+    graphs = []
+
+    def without_door(*words, **named):
+        built = build_graph(*words, **named)
+        door = built.graph.door_vertices.pop("d0")
+        # The walk begins at the vertex that is farthest from the door.
+        apart = np.linalg.norm(built.graph.vertices - built.graph.vertices[door], axis=1)
+        graphs.append(replace(built, start=int(apart.argmax())))
+        return graphs[-1]
+
+    room, door = box(1.0, 3.2, 5.0, 7.2), DOORS[0]
+    usual = measure_excursion(room, door, FRAME, plain)
+    monkeypatch.setattr(cost_spread, "build_graph", without_door)
+    length = measure_excursion(room, door, FRAME, plain)
+    (built,) = graphs
+    away = np.hypot(*(built.graph.vertices[built.start] - np.array(door.midpoint)))
+    assert away > 1.0
+    assert 2.0 * away - 1e-9 <= length <= 2.0 * away + usual + 1e-9

@@ -55,7 +55,7 @@ def test_every_ray_ends_where_it_does_when_the_doors_are_really_closed(closed: t
     changed = 0
     with Simulation(survey.plan, closed, survey.sim, 0) as sim:
         for index, scan in zip(erased.keyframes, erased.scans, strict=True):
-            true = sim.true_ranges(sim.world_T_map @ Pose2(*survey.true_poses[index]))
+            true = sim.true_ranges(sim.world_T_map @ Pose2(*survey.keyframe_true_poses[index]))
             true = np.where(true < QUICK.range_min, np.nan, np.where(true >= QUICK.range_max, np.inf, true))
             np.testing.assert_allclose(scan.ranges, true, atol=1e-3)
             changed += int((scan.ranges != survey.keyframes.scans[index].ranges).sum())
@@ -101,7 +101,7 @@ def test_cut_rays_carry_the_noise_of_the_sensor() -> None:
         with Simulation(survey.plan, (door,), survey.sim, 0) as sim:
             for index, scan in zip(erased.keyframes, erased.scans, strict=True):
                 cut = (scan.ranges != survey.keyframes.scans[index].ranges) & np.isfinite(scan.ranges)
-                true = sim.true_ranges(sim.world_T_map @ Pose2(*survey.true_poses[index]))
+                true = sim.true_ranges(sim.world_T_map @ Pose2(*survey.keyframe_true_poses[index]))
                 errors += list((scan.ranges - true)[cut])
     assert len(errors) > 300
     assert np.std(errors) == pytest.approx(survey.sim.noise.range_sd, rel=0.15)

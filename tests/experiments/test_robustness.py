@@ -152,14 +152,14 @@ def room_drive(steps: int = 40) -> RecordedDrive:
 def test_ideal_sensors_map_a_drive_where_it_was_and_worse_ones_less_well() -> None:
     drive, mapper = room_drive(), MapperConfig()
     ideal = map_drive(drive, NOISE_LEVELS["none"], mapper, 0)
-    assert np.abs(ideal.estimate - ideal.truth)[:, :2].max() < mapper.resolution
+    assert np.abs(ideal.estimate - ideal.true_poses)[:, :2].max() < mapper.resolution
     noise = replace(odometry_noise(4.0), range_sd=0.1, dropouts=0.3)
     worse, again = (map_drive(drive, noise, mapper, 0) for _ in range(2))
     ranges = np.concatenate([scan.ranges for scan in worse.keyframes.scans])
     assert 0.25 < np.isnan(ranges).mean() < 0.35
-    assert np.abs(worse.keyframes.odometry - worse.true_poses).max() > 0.02
+    assert np.abs(worse.keyframes.odometry - worse.keyframe_true_poses).max() > 0.02
     assert np.array_equal(worse.estimate, again.estimate)
-    assert np.array_equal(worse.truth, ideal.truth)
+    assert np.array_equal(worse.true_poses, ideal.true_poses)
 
 
 def test_furniture_of_a_share_stands_there_at_every_larger_one_too() -> None:

@@ -3,6 +3,7 @@
 Any exception that is not ours fails. ``cases.py`` beside this runs folders of such cases as processes.
 """
 
+import io
 import json
 import signal
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import inputs
 import pytest
+from PIL import Image
 
 from closedrooms.cli.commands import main
 from closedrooms.core.errors import ClosedroomsError
@@ -245,6 +247,56 @@ def test_an_evaluation_tells_a_spoilt_sample_and_goes_on(
     assert new <= {"out"}
     assert status != 0 or mutation == "exponents"
     assert status == 0 or "data" in complaints[0]
+
+
+def circle(folder: Path) -> None:
+    (folder / "out").symlink_to("out")
+
+
+def palette(folder: Path) -> None:
+    """Transparent colours, of which Pillow warns."""
+    picture = Image.open(io.BytesIO(FORMATS["picture"].content)).convert("P")
+    picture.save(folder / "map.png", transparency=bytes([0, 128, 255]))
+
+
+def twice(folder: Path) -> None:
+    (folder / "map.yaml").write_bytes(FORMATS["map"].content + b"resolution: 0.10\n")
+
+
+PREDICT = COMMANDS["predict"][1]
+OVER = ["doors", "map.yaml", "--out", "out.geojson", "--picture", "map.png", "--force"]
+LEARN = [*PREDICT, "--method", "x" * 5000]
+# What was badly answered when it was invented: how the folder is prepared, the command, what the line says.
+INVENTED = {
+    "a circle of links as output": (circle, PREDICT, "out"),
+    "a circle of links above it": (circle, [*PREDICT[:-1], "out/below"], "out/below"),
+    "a circle of links for a dataset": (circle, ["dataset", "plan.json", "--out", "out"], "out"),
+    "a circle of links for an evaluation": (circle, EVALUATE, "out"),
+    "a circle of links for a sweep": (circle, ["robustness", "plan.json", "--out", "out"], "out"),
+    "a circle of links that is read": (circle, ["predict", "out", "--doors", "doors.geojson", "--out", "o"], "out"),
+    "the picture of the map as output": (lambda _: None, OVER, "a file that was read"),
+    "a key that stands twice": (twice, PREDICT, "the key 'resolution' twice"),
+    "a name of 5000 letters": (lambda _: None, LEARN, "expected one of"),
+    "transparent colours of a palette": (palette, PREDICT, ""),
+}
+
+
+@pytest.mark.parametrize("case", INVENTED)
+def test_what_was_invented_is_answered_in_one_line(
+    tmp_path: Path, case: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    prepare, words, wanted = INVENTED[case]
+    honest(tmp_path)
+    sample(tmp_path)
+    prepare(tmp_path)
+    status, complaints, new = answered(words, tmp_path, monkeypatch, capfd)
+    if wanted:
+        assert (status, len(complaints), new) == (2 if words is LEARN else 1, 1, set())
+        assert wanted in complaints[0]
+        assert len(complaints[0]) < 400
+    else:
+        assert status in {0, 3}
+        assert not any("warn" in line.lower() for line in complaints)
 
 
 NAMES = [

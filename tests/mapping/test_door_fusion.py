@@ -62,3 +62,14 @@ def test_a_keyframe_keeps_its_nearest_sighting() -> None:
 
 def test_no_sighting_is_no_door() -> None:
     assert fuse_doors([keyframe(0, Pose2())]) == []
+
+
+@pytest.mark.parametrize("swapped", [set(), {0}, {1, 2}, {0, 1, 2}, {3, 4}, {0, 2, 4}])
+def test_from_which_end_a_door_is_seen_makes_no_difference(swapped: set[int]) -> None:
+    frames = [keyframe(i, Pose2(0.2 * i, 0.1, 0.05 * i)) for i in range(5)]
+    for i, frame in enumerate(frames):
+        sighted(frame, shift=0.01 * i, swap=i in swapped)
+    (door,) = fuse_doors(frames)
+    assert door.width == pytest.approx(0.9)
+    assert door.segment is not None
+    assert sorted(y for _, y in door.segment) == pytest.approx([1.0, 1.9])

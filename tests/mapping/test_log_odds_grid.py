@@ -92,13 +92,13 @@ def test_percentages_follow_from_the_counts_of_hits_and_passes() -> None:
     evidence, config = EvidenceGrid(MapperConfig()), MapperConfig()
     wall, beyond = np.array([[1.02, 0.02]]), np.array([[2.02, 0.02]])
     outline = np.array([[0.0, -0.3], [3.0, -0.3], [3.0, 0.3], [0.0, 0.3]])
-    hits, passes = 0, 0
+    hits, misses = 0, 0
     for hit in (False, True, True, False, False, False, False, True) * 6:
         evidence.add(Beams(wall if hit else beyond, outline, np.zeros(2)), Pose2())
-        hits, passes = hits + hit, passes + (not hit)
+        hits, misses = hits + hit, misses + (not hit)
         grid = evidence.grid()
         row, col = grid.frame.to_cells(wall[0])
-        odds = min(max(hits * config.log_odds_hit - passes * config.log_odds_pass, -12.0), 12.0)
+        odds = min(max(hits * config.log_odds_hit - misses * config.log_odds_miss, -12.0), 12.0)
         # Odds are rounded to a tenth, which is up to 1.25 percent, and percent to whole ones.
         assert abs(int(grid.cells[row, col]) - 100.0 / (1.0 + np.exp(-odds))) <= 1.8
 

@@ -164,3 +164,17 @@ def test_the_end_of_sight_does_not_hold_the_robot_back_in_a_long_hall(segment_wo
     travelled = np.hypot(*np.diff(mapper.trajectory()[1][[0, -1], :2], axis=0)[0])
     assert travelled == pytest.approx(59.0, abs=0.9)
     assert error(mapper, drive)[0] < 0.4
+
+
+def test_a_robot_that_stands_still_and_sees_what_it_saw_keeps_its_pose_to_the_bit(office: Any) -> None:
+    drive = office.drive(TOUR[:3], seed=3, **MEDIUM)
+    mapper = Mapper()
+    for scan, odometry in zip(drive.scans, drive.odometry, strict=True):
+        pose = mapper.process(scan, Pose2(*odometry))
+    rng = np.random.default_rng(0)
+    at = Pose2(*TOUR[0], 0.0) @ Pose2(*drive.truth[-1])
+    for number in range(15):
+        scan = office.scan(at, beams=360, noise=0.03, rng=rng, stamp=drive.scans[-1].stamp + 0.1 * (number + 1))
+        stood, pose = pose, mapper.process(scan, Pose2(*drive.odometry[-1]))
+        # For a while after it moved the odometry may read zero by chance.
+        assert number < 10 or pose == stood

@@ -38,7 +38,7 @@ def test_a_building_with_a_gap_in_its_outline_ends_the_survey_as_outside(flat: F
 def test_a_whole_building_is_surveyed_to_the_end(flat: FloorPlan) -> None:
     survey = survey_of(flat)
     assert (survey.exploration.status, survey.exploration.reason) == ("complete", "")
-    assert len(survey.truth) == survey.exploration.scans == len(survey.stamps)
+    assert len(survey.true_poses) == survey.exploration.scans == len(survey.stamps)
 
 
 def test_the_limit_of_time_ends_a_survey_with_the_map_so_far(flat: FloorPlan) -> None:
@@ -66,7 +66,7 @@ def test_the_radius_that_is_simulated_is_planned_with(flat: FloorPlan) -> None:
         log = Bumps(sim, Silent(), keep_scans=False)
         assert survey_building(log, Mapper(), NavigationConfig()).exploration.status == "complete"
     assert log.count < 20
-    assert not ((log.truth[:, 1] > 1.2) & (log.truth[:, 0] < 4.5)).any()
+    assert not ((log.true_poses[:, 1] > 1.2) & (log.true_poses[:, 0] < 4.5)).any()
 
 
 def test_the_log_hands_out_observations_and_keeps_the_truth(flat: FloorPlan) -> None:
@@ -77,5 +77,5 @@ def test_the_log_hands_out_observations_and_keeps_the_truth(flat: FloorPlan) -> 
         log.observe()
         assert isinstance(seen, Observation)
         assert log.map_T_robot == sim.map_T_robot != Pose2()
-        assert log.truth.tolist() == [list(Pose2().as_tuple()), list(sim.map_T_robot.as_tuple())]
+        assert log.true_poses.tolist() == [list(Pose2().as_tuple()), list(sim.map_T_robot.as_tuple())]
         assert len(log.recorded().scans) == 2

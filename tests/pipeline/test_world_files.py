@@ -111,5 +111,7 @@ def test_a_plan_in_words_has_every_room_and_door() -> None:
     lines = describe_world(plan)
     for thing in (*plan.rooms, *plan.doors):
         assert sum(line.startswith(f"{thing.id} ") for line in lines) == 1
+    # Columns stand below each other, whatever the longest label.
+    assert len({line.index(" m2  ") for line in lines if " m2  " in line}) == 1
     assert not next(line for line in lines if line.startswith("d09 ")).endswith("(closable)")
     assert next(line for line in lines if line.startswith("d10 ")).endswith("(closable)")

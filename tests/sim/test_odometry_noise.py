@@ -126,3 +126,11 @@ def test_standing_still_drifts_nowhere() -> None:
     for _ in range(100):
         odometry.add(Motion(0.0, 0.0, 0.0))
     assert odometry.pose == Pose2()
+
+
+def test_errors_of_the_travelled_distance_lie_along_the_motion_whatever_its_direction() -> None:
+    noise = NoiseConfig(distance=0.1, turn_per_metre=0.0, turn=0.0)
+    poses = errors(noise, Motion(0.6, -0.8, 0.0), 1)
+    across = poses[:, 0] * 0.8 + poses[:, 1] * 0.6
+    assert np.abs(across).max() < 1e-12
+    assert_sd(poses[:, 0] * 0.6 - poses[:, 1] * 0.8, 0.1)

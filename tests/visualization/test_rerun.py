@@ -25,9 +25,9 @@ from closedrooms.sim.simulation import Simulation
 from closedrooms.visualization import colours
 from closedrooms.visualization.no_recording import no_recording
 from closedrooms.visualization.rerun import drawables
+from closedrooms.visualization.rerun.drawn_sureness import NOTHING_YET, probability_map
 from closedrooms.visualization.rerun.recorder import Recorder
 from closedrooms.visualization.rerun.stream import Stage
-from closedrooms.visualization.rerun.sureness import NOTHING_YET, probability_map
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom, Wall
 
 FRAME = GridFrame(0.1, -1.0, -1.0, 80, 120)

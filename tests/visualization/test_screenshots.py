@@ -50,6 +50,15 @@ def test_grey_axes_alone_are_an_empty_plot() -> None:
     assert not screenshots.is_empty(pixels, plot=True)
 
 
+def test_what_is_still_being_loaded_is_empty_and_so_is_a_plot_with_a_legend_alone() -> None:
+    pixels = np.full((300, 400, 3), 222)
+    pixels[4:10, 360:396] = 255
+    assert screenshots.is_empty(pixels, plot=False)
+    plot = np.full((300, 400, 3), 13)
+    plot[10:20, 12:22] = (0, 114, 178)
+    assert screenshots.is_empty(plot, plot=True)
+
+
 @pytest.mark.skipif(
     "CLOSEDROOMS_SCREENSHOTS" not in os.environ, reason="a hundred pictures of a viewer: set CLOSEDROOMS_SCREENSHOTS=1"
 )

@@ -23,10 +23,11 @@ from closedrooms.visualization.rerun import drawables
 from closedrooms.visualization.rerun.blueprint import make_blueprint
 from closedrooms.visualization.rerun.curves import Curves
 from closedrooms.visualization.rerun.documents import LEGEND, configuration_text, room_line, rooms_table, text_document
-from closedrooms.visualization.rerun.drawn_prediction import draw_doors, draw_input, draw_rooms, draw_tours, draw_trace
+from closedrooms.visualization.rerun.drawn_prediction import draw_doors, draw_input, draw_rooms, draw_trace
+from closedrooms.visualization.rerun.drawn_sureness import draw_nothing_yet, draw_sureness
+from closedrooms.visualization.rerun.drawn_tours import draw_tours
 from closedrooms.visualization.rerun.recorded_robot import RecordedRobot
 from closedrooms.visualization.rerun.stream import RecordingStream, Stage
-from closedrooms.visualization.rerun.sureness import draw_nothing_yet, draw_sureness
 from closedrooms.visualization.rerun.tabs import Contents
 from closedrooms.visualization.rerun.views import Bounds
 from closedrooms.visualization.rerun.weighed import draw_weighed, room_name
@@ -280,7 +281,7 @@ class Recorder:
         self.table(rooms_table(prediction))
         self._hold(active="Rooms")
 
-    def growth(
+    def interim_prediction(
         self,
         observed: OccupancyGrid,
         doors: Sequence[ClosedDoor],

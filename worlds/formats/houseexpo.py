@@ -18,7 +18,7 @@ from closedrooms.worlds.formats.room_outlines import repaired
 from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom
-from closedrooms.worlds.wall_assembly import RoomEdge, coverage, shared_edges, walls_along
+from closedrooms.worlds.wall_assembly import RoomEdge, clean_coverage, shared_edges, walls_along
 
 WHAT = "a HouseExpo home (JSON)"
 # The outline is the edge of free space: walls take half of this from it [m].
@@ -143,7 +143,7 @@ def _rooms(outline: Polygon, boxes: list[tuple[str, Polygon]]) -> tuple[list[str
             grown = areal(polygons[best].union(part))
             if isinstance(grown, Polygon):
                 polygons[best] = grown
-    return labels, coverage(polygons, snap=0.005), hidden
+    return labels, clean_coverage(polygons, snap=0.005), hidden
 
 
 def _parts(area: BaseGeometry, smallest: float) -> list[Polygon]:

@@ -19,7 +19,7 @@ from closedrooms.worlds.formats.hallways import Hallway, JoinedRooms, extend_int
 from closedrooms.worlds.formats.portals import plan_of_portals
 from closedrooms.worlds.formats.settlement import Source, settle
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
-from closedrooms.worlds.wall_assembly import coverage
+from closedrooms.worlds.wall_assembly import clean_coverage
 
 WHAT = "a pyrobosim world (YAML)"
 # pyrobosim's own default [m].
@@ -66,7 +66,7 @@ def read_pyrobosim(path: str | Path) -> FloorPlan:
     for hallway in hallways:
         fewer = ends[hallway.start] < ends[hallway.end]
         building.add(hallway, door_at_start=fewer)
-    polygons = coverage(building.polygons, snap=0.01)
+    polygons = clean_coverage(building.polygons, snap=0.01)
     rooms = tuple(
         PlanRoom(f"r{i:02d}", label, p) for i, (label, p) in enumerate(zip(building.labels, polygons, strict=True))
     )

@@ -10,7 +10,7 @@ from shapely.strtree import STRtree
 from closedrooms.core.door import Point
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.geometry import areal, largest_part
-from closedrooms.worlds.wall_assembly import coverage, without_gaps
+from closedrooms.worlds.wall_assembly import clean_coverage, without_gaps
 
 # Gaps between rooms narrower than this are drawing inaccuracies or walls, not space [m].
 GAP = 0.6
@@ -54,8 +54,8 @@ def clean_outlines(
     if not given:
         return list(outlines)
     overlap = sum(outline.area for outline in given) - shapely.union_all(given).area
-    polygons, gaps = without_gaps(coverage(given, snap=JOG / 2), GAP, touching=GRID)
-    polygons = coverage(polygons, gap=GAP, snap=JOG / 2)
+    polygons, gaps = without_gaps(clean_coverage(given, snap=JOG / 2), GAP, touching=GRID)
+    polygons = clean_coverage(polygons, gap=GAP, snap=JOG / 2)
     simple = iter([largest_part(part) for part in shapely.coverage_simplify(polygons, JOG)])
     if overlap > 0.01:
         why = f"{overlap:.2f} square metres given to one room each"

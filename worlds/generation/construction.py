@@ -10,7 +10,14 @@ from closedrooms.core.door import Segment
 from closedrooms.worlds.door_hinges import hung
 from closedrooms.worlds.generation.sketch import CORRIDOR, Sketch, SketchPassage
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom
-from closedrooms.worlds.wall_assembly import RoomEdge, coverage, free_spans, shared_edges, walls_along, without_gaps
+from closedrooms.worlds.wall_assembly import (
+    RoomEdge,
+    clean_coverage,
+    free_spans,
+    shared_edges,
+    walls_along,
+    without_gaps,
+)
 
 # Slits and notches between rooms up to this width are given to a neighbour [m].
 SLIT = 2.0
@@ -21,7 +28,7 @@ DOOR_MARGIN = 0.3
 def turned_sketch(sketch: Sketch, angle: float) -> Sketch:
     """Turn a sketch, with edges shared and the lower left corner at the origin, on a grid of 0.1 mm."""
     polygons, _ = without_gaps(sketch.polygons, SLIT, fixed=1, branches=False)
-    polygons = coverage(polygons, gap=SLIT, snap=0.01)
+    polygons = clean_coverage(polygons, gap=SLIT, snap=0.01)
     c, s = math.cos(angle), math.sin(angle)
     turned = shapely.transform(np.array(polygons, dtype=object), lambda p: p @ np.array([[c, s], [-s, c]]))
     low = shapely.get_coordinates(turned).min(axis=0)

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from closedrooms.experiments.evaluation.config import EvaluateConfig, sort_methods
-from closedrooms.experiments.evaluation.reporting.cases import draw_extremes, draw_worst, extreme_cases
 from closedrooms.experiments.evaluation.reporting.figures import draw_costs, draw_errors, draw_iou, draw_reliability
 from closedrooms.experiments.evaluation.reporting.paper_numbers import number_rows
+from closedrooms.experiments.evaluation.reporting.sample_pictures import draw_extremes, draw_worst, extreme_cases
 from closedrooms.experiments.evaluation.reporting.score_summary import (
     WITHOUT_PREDICTION,
     coverage_rows,

@@ -40,10 +40,10 @@ from closedrooms.experiments.evaluation.scoring.tours import (
     tour_figures,
 )
 from closedrooms.pipeline.reporting.manifest import versions
-from closedrooms.pipeline.reporting.scores import room_iou
+from closedrooms.pipeline.reporting.run_scores import room_iou
 from closedrooms.predictor.config import FacesConfig
 from closedrooms.predictor.methods import find_method
-from closedrooms.predictor.paper.initial_layouts import Started
+from closedrooms.predictor.paper.initial_layouts import FacesFound
 from closedrooms.predictor.prediction import Prediction, free_probability
 
 AUTHORS = "authors"
@@ -193,7 +193,7 @@ def _code() -> str:
         *(root / "predictor").rglob("*.json"),
         *(root / "predictor").rglob("*.onnx"),
         *(root / "core").rglob("*.py"),
-        root / "pipeline" / "reporting" / "scores.py",
+        root / "pipeline" / "reporting" / "run_scores.py",
         here.parent / "samples" / "sample_reader.py",
         *(here / name for name in ("sample_evaluation.py", "scores.py", "sureness.py", "cost.py")),
     ]
@@ -214,16 +214,16 @@ class Starts:
 
     def __init__(self, sample: Sample) -> None:
         self._sample = sample
-        self._found: dict[FacesConfig, tuple[Started, float]] = {}
+        self._found: dict[FacesConfig, tuple[FacesFound, float]] = {}
 
-    def of(self, config: FacesConfig) -> tuple[Started, float]:
+    def of(self, config: FacesConfig) -> tuple[FacesFound, float]:
         """Find lines, faces and initial faces under these settings, once; returns them and the seconds it took then."""
-        from closedrooms.predictor.paper.initial_layouts import start_rooms
+        from closedrooms.predictor.paper.initial_layouts import find_initial_faces
 
         faces = FacesConfig(**{item.name: getattr(config, item.name) for item in fields(FacesConfig)})
         if faces not in self._found:
             begin = time.perf_counter()
-            started = start_rooms(self._sample.observed, self._sample.doors, faces)
+            started = find_initial_faces(self._sample.observed, self._sample.doors, faces)
             self._found[faces] = started, time.perf_counter() - begin
         return self._found[faces]
 

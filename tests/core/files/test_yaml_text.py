@@ -74,3 +74,15 @@ def test_yaml_that_would_take_stack_memory_or_time_is_refused(
 def test_values_that_the_loader_cannot_make_are_broken(tmp_path: Path, text: str) -> None:
     with pytest.raises(InvalidInputError, match=r"broken.*x\.yaml$"):
         parsed(tmp_path, text)
+
+
+@pytest.mark.parametrize("text", ["a: 1\nb: 2\na: 3\n", "x: {a: 1, 'a': 1}\n", "- x\n- {b: {c: 1, d: 2, c: 3}}\n"])
+def test_a_key_that_stands_twice_is_refused(tmp_path: Path, text: str) -> None:
+    # The last one counts here, the first one for map_server (yaml-cpp).
+    with pytest.raises(InvalidInputError, match=r"the key '[ac]' twice; expected a world: .*x\.yaml"):
+        parsed(tmp_path, text)
+
+
+def test_the_same_key_in_two_mappings_and_a_value_like_a_key_are_honest(tmp_path: Path) -> None:
+    text = "a: a\nb: [a, a, {a: a}]\nc: {a: {a: b}, b: a}\n"
+    assert parsed(tmp_path, text) == {"a": "a", "b": ["a", "a", {"a": "a"}], "c": {"a": {"a": "b"}, "b": "a"}}

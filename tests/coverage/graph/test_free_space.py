@@ -17,7 +17,7 @@ def test_the_window_holds_what_is_free_and_the_walls_around_it(thickness: float,
     cells[39:101, 29:131] = OCCUPIED
     cells[40:100, 30:130] = FREE
     grid = OccupancyGrid(GridFrame(resolution, -1.0, 2.0, *cells.shape), cells)
-    config = GraphConfig(wall_thickness=thickness, clutter_filter=False)
+    config = GraphConfig(leaf_reach=thickness, clutter_filter=False)
     found = clean_free_space(grid, config)
     margin = math.ceil(thickness / resolution) + 1
     assert found.frame.shape == (60 + 2 * margin, 100 + 2 * margin)

@@ -219,7 +219,7 @@ def test_the_window_leaves_room_for_the_leaves_of_doors_and_one_cell_more():
     cells[30:90, 40:130] = FREE
     grid = OccupancyGrid(GridFrame(CELL, 1.0, -2.0, 120, 160), cells)
     for thickness, margin in ((0.35, 8), (0.32, 8), (0.0, 1)):
-        config = GraphConfig(clutter_filter=False, wall_thickness=thickness)
+        config = GraphConfig(clutter_filter=False, leaf_reach=thickness)
         space = clean_free_space(grid, config)
         assert space.frame.shape == (60 + 2 * margin, 90 + 2 * margin)
         assert space.frame.origin_x == pytest.approx(1.0 + (40 - margin) * CELL)

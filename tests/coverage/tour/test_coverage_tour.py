@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import pairwise, permutations
 
 import networkx as nx
@@ -269,3 +270,11 @@ def test_unconnected_parts_have_a_tour_each_and_a_gap_between():
 def test_senseless_bounds_are_refused(field, value):
     with pytest.raises(InvalidInputError, match=field):
         TourConfig(**{field: value})
+
+
+@pytest.mark.parametrize(
+    ("length", "bound", "gap"), [(11.0, 10.0, 0.1), (3.0, 0.5, 5.0), (10.0, 10.0 + 1e-9, 0.0), (5.0, 0.0, 0.0)]
+)
+def test_the_gap_is_what_a_tour_is_longer_than_the_bound_as_a_share_of_it(length, bound, gap):
+    tour = replace(solve_tour(_random_graph(1, 5, 2)), length=length, lower_bound=bound)
+    assert tour.gap == pytest.approx(gap)

@@ -8,7 +8,7 @@ import shapely
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.random import stream
 from closedrooms.experiments.evaluation.samples.listing import find_samples
-from closedrooms.experiments.training.batches import blur, draw_batches, hide_pockets, make_batch
+from closedrooms.experiments.training.batches import blur, draw_batches, hide_pockets, make_batch, skew, wear_walls
 from closedrooms.experiments.training.buildings import group_of, may_train
 from closedrooms.experiments.training.config import TrainConfig
 from closedrooms.experiments.training.examples import (
@@ -138,7 +138,8 @@ def test_an_epoch_depends_on_seed_and_number_alone(gathered) -> None:
     assert not all(np.array_equal(a, b) for a, b in zip(first, draw(1, 1), strict=True))
 
 
-def test_a_mirrored_example_has_left_and_right_exchanged(gathered) -> None:
+def test_a_mirrored_example_has_left_and_right_exchanged(gathered, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("closedrooms.experiments.training.batches.ASKEW", 0.0)
     examples = gathered.examples
     plain = make_batch(examples.shown, examples.masks, examples.sides)
     seen = {True: 0, False: 0}
@@ -169,6 +170,37 @@ def test_pockets_hide_known_space_and_leave_room_and_doors_alone(gathered) -> No
         assert (shown[0] <= examples.shown[number][0]).all()
         hidden += int(changed.any())
     assert hidden > len(examples) / 2
+
+
+def test_worn_walls_stand_where_walls_were_and_cells_stay_whole(gathered) -> None:
+    thicker = thinner = lost = 0
+    for number, before in enumerate(gathered.examples.shown):
+        shown = before.copy()
+        wear_walls(shown, stream(number, "test"))
+        assert not (shown[1][before[1] == 0]).any()
+        assert (shown[:2].sum(axis=0) <= WHOLE).all()
+        assert (shown[2] == before[2]).all()
+        thicker += int((shown[1] > before[1]).any())
+        thinner += int((shown[1] < before[1]).any())
+        lost += int(((shown[1] == 0) & (before[1] > 2)).any())
+    assert min(thicker, thinner, lost) > 0
+
+
+def test_a_map_and_its_room_are_skewed_together_around_the_door(monkeypatch: pytest.MonkeyPatch) -> None:
+    door, moved = (round(BEHIND / CELL), SIZE // 2), 0
+    for number in range(6):
+        shown = np.zeros((3, SIZE, SIZE), dtype=np.uint8)
+        shown[0, door[0] : door[0] + 30, door[1] - 12 : door[1] + 20] = WHOLE
+        before, mask = shown.copy(), shown[0].copy()
+        skew(shown, mask, stream(number, "test"))
+        assert (shown[0] == mask).all()
+        assert shown[0][door] == WHOLE
+        moved += int((shown != before).any())
+    assert moved >= 3
+    monkeypatch.setattr("closedrooms.experiments.training.batches.ASKEW", 0.0)
+    still = shown.copy()
+    skew(shown, mask, stream(0, "test"))
+    assert (shown == still).all()
 
 
 def test_a_blurred_distance_is_a_distribution_around_it() -> None:

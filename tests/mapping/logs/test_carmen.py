@@ -374,3 +374,16 @@ def test_real_robots_are_mapped_without_their_odometry(name: str, limit: float) 
     result = build_map(replace(run, odometry=np.zeros_like(run.odometry), has_odometry=False))
     assert result.errors["final"][0] < limit
     assert not any(remark.loss for remark in result.remarks)
+
+
+@pytest.mark.parametrize(("clock", "stamp"), [(7.5, 7.5), (0, 9.25)])
+def test_the_clock_of_a_line_counts_and_the_loggers_where_it_is_zero(
+    tmp_path: Path, clock: float, stamp: float
+) -> None:
+    ranges = " ".join(["4.0"] * 181)
+    pose = "1.2 0.5 0.1 1.1 0.5 0.1"
+    for line in (
+        f"FLASER 181 {ranges} {pose} {clock} host 9.25",
+        f"ROBOTLASER1 0 -1.5708 3.14159 0.0174533 30.0 0.01 0 181 {ranges} 0 {pose} 0 0 0 0 0 {clock} host 9.25",
+    ):
+        assert read_run(write(tmp_path, line)).scans[0].stamp == stamp

@@ -9,7 +9,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.driving.path_follower import Track, free_distance, limit_speed, near_points, steer
+from closedrooms.navigation.driving.path_follower import FollowedPath, free_distance, limit_speed, near_points, steer
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
 
@@ -18,7 +18,7 @@ def drive(points: np.ndarray, pose: Pose2, seconds: float) -> tuple[Pose2, np.nd
     """An ideal robot that follows the path; its end and its track, shape (n, 2)."""
     progress, track = 0.0, []
     for _ in range(int(seconds / 0.1)):
-        command = steer(Track.of(points), pose, progress, CONFIG)
+        command = steer(FollowedPath.of(points), pose, progress, CONFIG)
         progress = command.progress
         pose = pose @ Pose2(command.v * 0.1, 0.0, command.w * 0.1)
         track.append((pose.x, pose.y))
@@ -42,19 +42,21 @@ def test_a_path_with_a_corner_is_driven_to_its_end(heading: float, angle: float)
 
 @given(x=st.floats(-1, 1), y=st.floats(-1, 1), heading=st.floats(-math.pi, math.pi), progress=st.floats(0.0, 3.0))
 def test_commands_stay_within_the_limits(x: float, y: float, heading: float, progress: float) -> None:
-    command = steer(Track.of(np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)])), Pose2(x, y, heading), progress, CONFIG)
+    command = steer(
+        FollowedPath.of(np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)])), Pose2(x, y, heading), progress, CONFIG
+    )
     assert 0.0 <= command.v <= CONFIG.robot.max_speed
     assert abs(command.w) <= CONFIG.robot.max_turn_rate + 1e-9
 
 
 def test_progress_never_runs_backwards() -> None:
     points = np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 0.5), (0.0, 0.5)])
-    command = steer(Track.of(points), Pose2(0.5, 0.5, 0.0), 6.0, CONFIG)
+    command = steer(FollowedPath.of(points), Pose2(0.5, 0.5, 0.0), 6.0, CONFIG)
     assert command.progress >= 6.0
 
 
 def test_a_robot_that_looks_the_other_way_turns_first() -> None:
-    command = steer(Track.of(np.array([(0.0, 0.0), (4.0, 0.0)])), Pose2(0.0, 0.0, math.pi), 0.0, CONFIG)
+    command = steer(FollowedPath.of(np.array([(0.0, 0.0), (4.0, 0.0)])), Pose2(0.0, 0.0, math.pi), 0.0, CONFIG)
     assert command.v == 0.0
     assert abs(command.w) == pytest.approx(CONFIG.robot.max_turn_rate)
 
@@ -78,7 +80,7 @@ def test_the_robot_may_drive_away_from_what_it_touches() -> None:
 
 def test_speed_drops_before_an_obstacle_and_the_arc_stays() -> None:
     wall = np.array([(0.4, y) for y in np.arange(-1.0, 1.0, 0.02)])
-    command = steer(Track.of(np.array([(0.0, 0.0), (0.5, 0.1), (4.0, 0.8)])), Pose2(), 0.0, CONFIG)
+    command = steer(FollowedPath.of(np.array([(0.0, 0.0), (0.5, 0.1), (4.0, 0.8)])), Pose2(), 0.0, CONFIG)
     slow = limit_speed(command, wall, CONFIG)
     assert 0.0 < slow.v < command.v
     assert slow.w / slow.v == pytest.approx(command.w / command.v)

@@ -7,7 +7,7 @@ from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.driving.costmap import Costmap, NavigationMap
-from closedrooms.navigation.driving.planner import Path, plan_path, reachable_cells
+from closedrooms.navigation.driving.planner import PlannedPath, plan_path, reachable_cells
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
 
@@ -28,7 +28,7 @@ def costmap_of(cells: np.ndarray) -> Costmap:
     return navigation.costmap
 
 
-def path_between(cells: np.ndarray, start: tuple[float, float], goal: tuple[float, float]) -> Path | None:
+def path_between(cells: np.ndarray, start: tuple[float, float], goal: tuple[float, float]) -> PlannedPath | None:
     costmap = costmap_of(cells)
     goals = np.zeros(costmap.frame.shape, dtype=np.bool_)
     row, col = costmap.frame.to_cells(np.array(goal))

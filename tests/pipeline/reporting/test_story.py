@@ -63,10 +63,19 @@ def doors(*ids: str) -> list[ClosedDoor]:
 
 
 def test_every_quarter_of_the_floor_is_told_once_and_a_jump_over_two_of_them_is_one_line(told: Told) -> None:
-    story = a_story(told, floor=100.0)
-    for stamp, cells in ((1.0, 99), (2.0, 100), (3.0, 150), (4.0, 310), (5.0, 400)):
+    floor = FRAME.to_points(np.argwhere(np.arange(400).reshape(FRAME.shape) < 100))
+    story = a_story(told, floor=floor)
+    for stamp, cells in ((1.0, 24), (2.0, 25), (3.0, 40), (4.0, 80), (5.0, 400)):
         story.known(known(cells), stamp)
-    assert told.notes == [("25 % of the floor is known, 25 m²", 2.0), ("75 % of the floor is known, 78 m²", 4.0)]
+    assert told.notes == [("25 % of the floor is known", 2.0), ("75 % of the floor is known", 4.0)]
+
+
+def test_what_is_known_outside_does_not_count_and_floor_beyond_the_map_does(told: Told) -> None:
+    inside = FRAME.to_points(np.argwhere(np.arange(400).reshape(FRAME.shape) >= 300))
+    a_story(told, floor=inside).known(known(300), 1.0)
+    assert told.notes == []
+    a_story(told, floor=np.concatenate((inside, inside + 100.0))).known(known(400), 2.0)
+    assert told.notes == [("50 % of the floor is known", 2.0)]
 
 
 def test_loops_are_told_when_their_number_has_doubled(told: Told) -> None:

@@ -10,7 +10,7 @@ from shapely.geometry import Polygon, box
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.predictor.best import shared_rooms
-from closedrooms.predictor.best.door_pose import DoorsSeen, Entry
+from closedrooms.predictor.best.door_pose import DoorsSeen, FramedDoor
 from closedrooms.predictor.best.hypotheses import Hypotheses, Proposals
 from closedrooms.predictor.best.method import predict_best
 from closedrooms.predictor.best.selection import find_rivals
@@ -174,7 +174,7 @@ def test_a_room_of_two_doors_in_a_wall_spans_both_and_ends_at_the_next() -> None
         leaves=np.array([[140.0, 0.0], [220.0, 0.0], [20.0, 0.0]]),
         columns=np.array([1, 1, 1]),
     )
-    entry = Entry(u=80.0, v=-2.0, v0=0, left=20.0, right=140.0, row=4, front=(0, 400), span=(80.0, 80.0))
+    entry = FramedDoor(u=80.0, v=-2.0, v0=0, left=20.0, right=140.0, row=4, front=(0, 400), span=(80.0, 80.0))
     both = seen.enter_with(entry, np.array([True, False, False]))
     assert (both.span, both.left, both.right) == ((80.0, 140.0), 20.0, 220.0)
     rest = seen.enter_with(entry, np.array([True, True, True]))

@@ -22,7 +22,7 @@ from closedrooms.sim.physics_world import PhysicsWorld
 from closedrooms.sim.robot.differential_drive import Drive
 from closedrooms.sim.solids import upright
 from closedrooms.worlds.extrusion import extrude
-from closedrooms.worlds.formats.rosmap import read_raster
+from closedrooms.worlds.formats.rosmap import _differences, read_raster
 from closedrooms.worlds.geometry import room_interior
 from closedrooms.worlds.outline import leaks
 from closedrooms.worlds.plan import FloorPlan
@@ -187,6 +187,21 @@ def test_a_wall_taken_away_from_the_plan_is_noticed(tmp_path: Path) -> None:
     thin = min(plan.walls, key=lambda wall: abs(wall.segment[0][0] - centre(grid.frame, 3, 30)[0]))
     with pytest.raises(AssertionError):
         check_cells(replace(plan, walls=tuple(wall for wall in plan.walls if wall is not thin)), grid)
+
+
+def test_cells_that_the_plan_shows_otherwise_are_told_with_the_side_that_lost(tmp_path: Path) -> None:
+    plan, grid = plan_of(hall(), tmp_path)
+    assert _differences(plan, grid) == []
+    row, col = np.argwhere(grid.free)[grid.free.sum() // 2]
+    cells = grid.cells.copy()
+    cells[row, col] = OCCUPIED
+    (more,) = _differences(plan, OccupancyGrid(grid.frame, cells))
+    assert (more.what, more.why, more.count, more.loss) == ("occupied cells", "free in the plan", 1, True)
+    cells = grid.cells.copy()
+    cells[grid.occupied] = FREE
+    (less,) = _differences(plan, OccupancyGrid(grid.frame, cells))
+    assert (less.what, less.count, less.loss) == ("free cells", grid.occupied.sum(), False)
+    assert less.why.startswith("wall in the plan")
 
 
 @pytest.mark.parametrize("wide", [14, 15, 18, 19])

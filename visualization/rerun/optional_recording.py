@@ -1,4 +1,4 @@
-"""Opens the recording of a run, or nothing where none is wanted."""
+"""The recording of a run where one is wanted, else a recorder that does nothing."""
 
 import contextlib
 from collections.abc import Iterator
