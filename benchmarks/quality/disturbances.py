@@ -1,6 +1,6 @@
 """Run the bundled worlds plain, with people who walk and with walls of glass: docs/results/disturbances.csv.
 
-    python benchmarks/disturbances.py --out DIR [WORLD ...] [--conditions plain people glass] [--csv CSV]
+    python benchmarks/quality/disturbances.py --out DIR [WORLD ...] [--conditions plain people glass] [--csv CSV]
 
 One run after the other; a run whose directory is already in DIR is not repeated, so that several processes share the
 work when each takes other worlds or conditions, and a call that finds all of them there only writes the table. Nothing
