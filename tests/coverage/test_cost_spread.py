@@ -136,11 +136,10 @@ def test_figures_tell_every_draw_and_the_truth_only_where_it_is_known():
 def test_a_door_without_a_vertex_of_its_own_is_walked_to_and_back(plain, monkeypatch):
     graphs = []
 
-    def without_door(*words, **named):
-        built = build_graph(*words, **named)
-        door = built.graph.door_vertices.pop("d0")
+    def without_door(grid, doors, *words, **named):
+        built = build_graph(grid, [replace(door, id="another") for door in doors], *words, **named)
         # The walk begins at the vertex that is farthest from the door.
-        apart = np.linalg.norm(built.graph.vertices - built.graph.vertices[door], axis=1)
+        apart = np.linalg.norm(built.graph.vertices - np.array(doors[0].midpoint), axis=1)
         graphs.append(replace(built, start=int(apart.argmax())))
         return graphs[-1]
 
