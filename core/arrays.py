@@ -9,6 +9,8 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 CellArray: TypeAlias = npt.NDArray[np.int8]
+Mask: TypeAlias = npt.NDArray[np.uint8]
+"""As OpenCV takes it: anything but 0 is marked."""
 
 
 def handed_over(cells: CellArray) -> CellArray:

@@ -13,6 +13,10 @@ UNKNOWN, FREE, OCCUPIED = -1, 0, 100
 OCCUPIED_ABOVE, FREE_BELOW = 65, 19.6
 
 
+Bounds = tuple[float, float, float, float]
+"""``x_min, y_min, x_max, y_max`` [m]."""
+
+
 @dataclass(frozen=True, slots=True)
 class GridFrame:
     """Frame of a grid: the only place where metres and cells are converted.

@@ -18,7 +18,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
-from closedrooms.mapping.view import View, faces
+from closedrooms.mapping.scan_view import View, faces
 
 NEAR, OBLIQUE = math.radians(9.0), math.radians(22.0)
 """Incidence up to which a pane returns every beam, and from which on it returns none [rad]."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from closedrooms.core.arrays import BoolArray, CellArray, FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, CellArray, FloatArray, IntArray, Mask
 from closedrooms.core.grid import UNKNOWN, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
@@ -20,7 +20,6 @@ CROSSED, CROSSED_SHARE = 3, 0.25
 """Scans that went through a surface, and how many more for each that saw it, from which on it counts as crossed."""
 LatticeWindow = tuple[int, int, int, int]
 """First row and column in the arrays, and number of rows and columns."""
-Mask = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,7 +14,7 @@ from closedrooms.sim.doors import Door, HungDoor, PlacedDoor
 from closedrooms.sim.glass import glass_area
 from closedrooms.sim.physics_world import PhysicsWorld
 from closedrooms.sim.robot.differential_drive import Drive
-from closedrooms.sim.solids import FURNITURE, PANE, WALLS, Colour, upright
+from closedrooms.sim.solids import FURNITURE, PANE, RGBA, WALLS, upright
 from closedrooms.worlds.extrusion import extrude
 from closedrooms.worlds.geometry import areal, door_gap, wall_area
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
@@ -88,7 +88,7 @@ class Building:
             door.advance(duration, x, y, radius)
         self._opening = [door for door in self._opening if door.opens]
 
-    def _add_static(self, area: Polygon | shapely.MultiPolygon, height: float | None, colour: Colour) -> list[int]:
+    def _add_static(self, area: Polygon | shapely.MultiPolygon, height: float | None, colour: RGBA) -> list[int]:
         """Extrude an area, building frame [m], to a height [m] or that of the walls; returns its bodies."""
         vertices, triangles = extrude(area) if height is None else extrude(area, height=height)
         return self._physics.add_static(vertices, upright(vertices, triangles), colour)

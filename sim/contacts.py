@@ -20,7 +20,7 @@ CELL = 0.5
 # Slides along a corner settle within a few turns; what is left of the motion after so many is given up.
 MAX_TURNS = 12
 
-Edge = tuple[float, float, float, float]
+SolidEdge = tuple[float, float, float, float]
 LeafName = tuple[str, int]
 
 
@@ -38,7 +38,7 @@ def edges_of(area: BaseGeometry) -> FloatArray:
     return np.concatenate([np.zeros((0, 4)), *(np.hstack((c[:-1], c[1:])) for c in pieces)])
 
 
-def leaf_edges(corners: FloatArray) -> list[Edge]:
+def leaf_edges(corners: FloatArray) -> list[SolidEdge]:
     """List the four edges of a leaf with ``corners`` of shape (4, 2) [m]."""
     points = corners.tolist()
     return [(*a, *b) for a, b in zip(points, points[1:] + points[:1], strict=True)]
@@ -59,9 +59,9 @@ class Obstacles:
             reach: Everything within this of a point in a cell is found from that cell [m].
         """
         self.reach = reach
-        self._cells: defaultdict[tuple[int, int], list[Edge]] = defaultdict(list)
+        self._cells: defaultdict[tuple[int, int], list[SolidEdge]] = defaultdict(list)
         self._leaf_cells: defaultdict[tuple[int, int], list[LeafName]] = defaultdict(list)
-        self._leaves: dict[LeafName, list[Edge]] = {}
+        self._leaves: dict[LeafName, list[SolidEdge]] = {}
         for edge in static.tolist():
             for cell in self._cells_near(edge):
                 self._cells[cell].append(tuple(edge))
@@ -73,11 +73,11 @@ class Obstacles:
             for j in range(y0, y1 + 1):
                 self._leaf_cells[i, j].append(name)
 
-    def move_leaf(self, name: LeafName, edges: list[Edge]) -> None:
+    def move_leaf(self, name: LeafName, edges: list[SolidEdge]) -> None:
         """Replace the edges of a leaf by those where it is now."""
         self._leaves[name] = edges
 
-    def near(self, x: float, y: float) -> Sequence[Edge]:
+    def near(self, x: float, y: float) -> Sequence[SolidEdge]:
         """Look up every edge within ``reach`` of a place [m], and a few more."""
         cell = (math.floor(x / CELL), math.floor(y / CELL))
         fixed = self._cells.get(cell, ())
@@ -104,12 +104,12 @@ def _grown(box: Sequence[float], margin: float) -> tuple[float, float, float, fl
     return (box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin)
 
 
-def distance(x: float, y: float, edges: Sequence[Edge]) -> float:
+def distance(x: float, y: float, edges: Sequence[SolidEdge]) -> float:
     """Compute the distance of a point from the nearest edge [m], infinity where there is none."""
     return min((math.hypot(*offset(x, y, edge)) for edge in edges), default=math.inf)
 
 
-def offset(x: float, y: float, edge: Edge) -> tuple[float, float]:
+def offset(x: float, y: float, edge: SolidEdge) -> tuple[float, float]:
     """Compute the vector from the nearest point of an edge to ``(x, y)`` [m]."""
     ax, ay, bx, by = edge
     dx, dy = bx - ax, by - ay
@@ -119,7 +119,7 @@ def offset(x: float, y: float, edge: Edge) -> tuple[float, float]:
     return (x - ax - t * dx, y - ay - t * dy)
 
 
-def move_disc(x: float, y: float, dx: float, dy: float, radius: float, edges: Sequence[Edge]) -> Moved:
+def move_disc(x: float, y: float, dx: float, dy: float, radius: float, edges: Sequence[SolidEdge]) -> Moved:
     """Move a disc by ``(dx, dy)``; where it meets an edge it slides along.
 
     Exact: the distance to an edge is a convex function along a straight line, so Newton's step from outside never
@@ -154,7 +154,7 @@ def move_disc(x: float, y: float, dx: float, dy: float, radius: float, edges: Se
 
 
 def _free_share(
-    x: float, y: float, dx: float, dy: float, limit: float, edges: Sequence[Edge]
+    x: float, y: float, dx: float, dy: float, limit: float, edges: Sequence[SolidEdge]
 ) -> tuple[float, tuple[float, float] | None]:
     """Find the share of the motion that is surely free, and the normal of an edge that stops it right here."""
     share = 1.0

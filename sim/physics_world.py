@@ -11,7 +11,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.sim.config import STEPS
 from closedrooms.sim.pybullet_process import check_display, import_pybullet, quiet
-from closedrooms.sim.solids import LEAF, WALLS, Colour, MovingPart, volume
+from closedrooms.sim.solids import LEAF, RGBA, WALLS, MovingPart, volume
 
 # PyBullet returns nothing at exactly 16384 rays and raises above (MAX_RAY_INTERSECTION_BATCH_SIZE).
 MAX_RAYS = 16_383
@@ -111,7 +111,7 @@ class PhysicsWorld:
         """Whether the client is there."""
         return self._client >= 0
 
-    def add_static(self, vertices: FloatArray, triangles: IntArray, colour: Colour = WALLS) -> list[int]:
+    def add_static(self, vertices: FloatArray, triangles: IntArray, colour: RGBA = WALLS) -> list[int]:
         """Add a solid that never moves; returns its bodies (several only beyond PyBullet's limit on vertices).
 
         Args:
@@ -282,7 +282,7 @@ class PhysicsWorld:
                 found[part] = [hit[4] for hit in hits]
         return fractions, bodies, found
 
-    def _visual(self, vertices: FloatArray, triangles: IntArray, colour: Colour) -> int:
+    def _visual(self, vertices: FloatArray, triangles: IntArray, colour: RGBA) -> int:
         """Make what is drawn of a mesh, flat faces from both sides; -1, nothing, where nobody looks."""
         if not self.visible:
             return -1

@@ -9,7 +9,7 @@ from closedrooms.core.arrays import FloatArray, IntArray
 # A face whose normal is steeper than this against the floor is floor or ceiling.
 UPRIGHT = 0.5
 
-Colour = tuple[float, float, float, float]
+RGBA = tuple[float, float, float, float]
 WALLS, FURNITURE, LEAF, PANE, PERSON = (
     (0.75, 0.76, 0.8, 1.0), (0.62, 0.5, 0.38, 1.0), (0.75, 0.4, 0.2, 1.0), (0.5, 0.8, 0.95, 0.4), (0.95, 0.6, 0.1, 1.0),
 )  # fmt: skip

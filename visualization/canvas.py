@@ -13,14 +13,13 @@ from PIL import Image, ImageDraw, ImageFont
 from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.arrays import FloatArray
-from closedrooms.core.grid import GridFrame, OccupancyGrid
+from closedrooms.core.grid import Bounds, GridFrame, OccupancyGrid
 from closedrooms.core.names import shown
 from closedrooms.visualization import colours
 from closedrooms.visualization.colours import Colour
 from closedrooms.visualization.dashes import cut_dashes
 
 Pixels = npt.NDArray[np.uint8]
-Bounds = tuple[float, float, float, float]
 # A path starts in the first colour and ends in the last: the eye can follow it.
 COURSE_START, COURSE_END = np.array([48, 18, 140]), np.array([250, 150, 20])
 # Pieces of one colour in which a path is drawn.

@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.files.outgoing import write_bytes
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.grid import Bounds, OccupancyGrid
 from closedrooms.core.names import shown
 from closedrooms.core.room import Room
 from closedrooms.visualization import colours
@@ -21,7 +21,7 @@ from closedrooms.visualization import colours
 if TYPE_CHECKING:
     from closedrooms.coverage.tour.coverage_tour import CoverageTour
     from closedrooms.predictor.prediction import Prediction
-    from closedrooms.visualization.canvas import Bounds, Canvas, Pixels
+    from closedrooms.visualization.canvas import Canvas, Pixels
 
 # Size of one panel, of the strip with its title, and of the gap between panels [pixels].
 PANEL, TITLE, GAP = 900, 40, 14
@@ -108,7 +108,7 @@ def draw_map(path: Path, grid: OccupancyGrid, doors: Sequence[ClosedDoor], traje
 
 
 def _map_panel(
-    bounds: "Bounds", grid: OccupancyGrid, doors: Sequence[ClosedDoor], trajectory: FloatArray | None
+    bounds: Bounds, grid: OccupancyGrid, doors: Sequence[ClosedDoor], trajectory: FloatArray | None
 ) -> Panel:
     """Draw the map with its doors and the estimated path."""
     canvas = _canvas(bounds)
@@ -123,7 +123,7 @@ def _map_panel(
 
 
 def _prediction_panel(
-    bounds: "Bounds",
+    bounds: Bounds,
     prediction: "Prediction",
     doors: Sequence[ClosedDoor],
     room_iou: Mapping[str, float],
@@ -143,7 +143,7 @@ def _prediction_panel(
 
 
 def _truth_panel(
-    bounds: "Bounds",
+    bounds: Bounds,
     truth: OccupancyGrid,
     rooms: Sequence[Room],
     prediction: "Prediction",
@@ -159,7 +159,7 @@ def _truth_panel(
 
 
 def _tour_panel(
-    bounds: "Bounds", grid: OccupancyGrid, tour: "CoverageTour", title: str, *, doors: Sequence[ClosedDoor] = ()
+    bounds: Bounds, grid: OccupancyGrid, tour: "CoverageTour", title: str, *, doors: Sequence[ClosedDoor] = ()
 ) -> Panel:
     """Draw a tour over the graph and the map that it was planned on."""
     canvas = _canvas(bounds)
@@ -207,7 +207,7 @@ def _draw_rooms(
         canvas.text(place, label)
 
 
-def _bounds(grids: Sequence[OccupancyGrid], shapes: Sequence[BaseGeometry] = ()) -> "Bounds":
+def _bounds(grids: Sequence[OccupancyGrid], shapes: Sequence[BaseGeometry] = ()) -> Bounds:
     """Find the bounds of what is known in any of the grids, and of some shapes, with a margin [m]."""
     boxes = [shape.bounds for shape in shapes if not shape.is_empty]
     for grid in grids:
@@ -221,7 +221,7 @@ def _bounds(grids: Sequence[OccupancyGrid], shapes: Sequence[BaseGeometry] = ())
     return (float(x_min), float(y_min), float(x_max), float(y_max))
 
 
-def _canvas(bounds: "Bounds") -> "Canvas":
+def _canvas(bounds: Bounds) -> "Canvas":
     """Make an empty panel that shows ``bounds`` [m]."""
     from closedrooms.visualization.canvas import Canvas
 

@@ -5,12 +5,11 @@ import base64
 import cv2
 import numpy as np
 
-from closedrooms.core.grid import OccupancyGrid, is_free, is_occupied
+from closedrooms.core.grid import Bounds, OccupancyGrid, is_free, is_occupied
 from closedrooms.visualization.colours import FREE, OCCUPIED, UNKNOWN
 
 # Longest side of a picture [pixels]: what every browser draws.
 LONGEST = 4096
-Bounds = tuple[float, float, float, float]
 
 
 def paint_map(grid: OccupancyGrid) -> tuple[str, Bounds]:

@@ -3,10 +3,9 @@
 import cv2
 import numpy as np
 
-from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.arrays import FloatArray, IntArray, Mask
 from closedrooms.mapping.matching.likelihood_field import Float32Array
 
-Mask = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 FEW_BLOCKS = 5
 """Blocks along an axis up to which they are looked up one by one; more are read side by side."""
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from closedrooms.core.robot import RobotConfig
-from closedrooms.sim.contacts import SKIN, Edge, Obstacles, distance, move_disc, offset
+from closedrooms.sim.contacts import SKIN, Obstacles, SolidEdge, distance, move_disc, offset
 from closedrooms.sim.robot.driven_robot import DrivenRobot, Motion
 
 # While velocities change, an arc is driven with the mean of so much time [s]: at the default limits this leaves the
@@ -76,7 +76,7 @@ class Drive(DrivenRobot):
             return motion
         return self._arc_beside(length, turn, edges)
 
-    def _arc_beside(self, length: float, turn: float, edges: Sequence[Edge]) -> Motion:
+    def _arc_beside(self, length: float, turn: float, edges: Sequence[SolidEdge]) -> Motion:
         """Drive an arc that may meet something, chord by chord."""
         x0, y0, theta0 = self.x, self.y, self.theta
         chords = max(math.ceil(abs(length) / CHORD_LENGTH), math.ceil(abs(turn) / CHORD_TURN), 1)
@@ -97,7 +97,7 @@ class Drive(DrivenRobot):
                 self.v = 0.0
         return motion
 
-    def _feel(self, edges: Sequence[Edge]) -> None:
+    def _feel(self, edges: Sequence[SolidEdge]) -> None:
         """Note from which direction the nearest thing touches, in the robot frame [rad]."""
         away = min((offset(self.x, self.y, edge) for edge in edges), key=lambda v: math.hypot(*v))
         bearing = math.remainder(math.atan2(-away[1], -away[0]) - self.theta, 2.0 * math.pi)

@@ -9,7 +9,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import clean
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.mapping.view import View, faces
+from closedrooms.mapping.scan_view import View, faces
 from tests.conftest import SegmentWorld
 
 SEEN = math.radians(15.0)

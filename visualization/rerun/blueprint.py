@@ -2,6 +2,7 @@
 
 import rerun.blueprint as rrb
 
+from closedrooms.core.grid import Bounds
 from closedrooms.visualization.rerun.tabs import (
     Contents,
     Layout,
@@ -17,7 +18,7 @@ from closedrooms.visualization.rerun.tabs import (
     sureness_tab,
     weighing_tab,
 )
-from closedrooms.visualization.rerun.views import Bounds, show_log
+from closedrooms.visualization.rerun.views import show_log
 
 # Where nothing is known yet [m].
 DEFAULT_BOUNDS: Bounds = (-20.0, -20.0, 20.0, 20.0)

@@ -12,7 +12,7 @@ import rerun as rr
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor, Point
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.grid import Bounds, OccupancyGrid
 from closedrooms.core.names import markdown_text
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
@@ -29,7 +29,6 @@ from closedrooms.visualization.rerun.drawn_tours import draw_tours
 from closedrooms.visualization.rerun.recorded_robot import RecordedRobot
 from closedrooms.visualization.rerun.stream import RecordingStream, Stage
 from closedrooms.visualization.rerun.tabs import Contents
-from closedrooms.visualization.rerun.views import Bounds
 from closedrooms.visualization.rerun.weighed import draw_weighed, room_name
 
 if TYPE_CHECKING:

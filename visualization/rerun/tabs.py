@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import rerun.blueprint as rrb
 
-from closedrooms.visualization.rerun.views import BACKGROUND, Bounds, is_wide, plot_curves, show_from_above, show_log
+from closedrooms.core.grid import Bounds
+from closedrooms.visualization.rerun.views import BACKGROUND, is_wide, plot_curves, show_from_above, show_log
 
 # Bar charts on one page of the tab Weighing.
 CHARTS = 4

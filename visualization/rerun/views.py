@@ -7,10 +7,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.encodings import TextLogColumnKind
 
+from closedrooms.core.grid import Bounds
 from closedrooms.visualization import colours
 
-Bounds = tuple[float, float, float, float]
-"""``x_min, y_min, x_max, y_max`` [m] in the map frame."""
 BACKGROUND = [colours.UNKNOWN] * 3
 # The viewer's default vertical field of view is 55 degrees.
 HALF_VIEW = math.radians(55.0) / 2
