@@ -50,7 +50,7 @@ CHANGED = 0.10
 HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE = 1, 2, 3, 4
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Said:
     """What a keyframe says about the places in doubt.
 
@@ -63,7 +63,7 @@ class _Said:
     codes: np.ndarray[tuple[int], np.dtype[np.int8]]
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Glimpse:
     """Surfaces that a scan met near their normal, in the frame of the keyframe before it.
 
