@@ -2,8 +2,8 @@
 
 import math
 
+import cv2
 import numpy as np
-from scipy.ndimage import minimum_filter1d
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.mapping.beams import Beams
@@ -37,8 +37,12 @@ class View:
 
     def _lowest(self, level: int) -> FloatArray:
         """Shortest range within 2 ** level directions to either side."""
+        if not self._ranges.size:
+            return self._ranges
         if level not in self._levels:
-            self._levels[level] = minimum_filter1d(self._ranges, 2 * (1 << level) + 1, mode="nearest")
+            window = np.ones((1, 2 * (1 << level) + 1), dtype=np.uint8)
+            shortest = cv2.erode(self._ranges[None], window, borderType=cv2.BORDER_REPLICATE)
+            self._levels[level] = np.asarray(shortest[0], dtype=np.float64)
         return self._levels[level]
 
     def beyond(self, points: FloatArray, lateral: float = LATERAL) -> FloatArray:
