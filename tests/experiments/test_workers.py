@@ -1,19 +1,22 @@
 """Work that is handed out, and workers that die of it."""
 
+import _thread
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.runtime.packages import MissingPackageError
-from closedrooms.experiments.workers import AHEAD, TRIES, Crew, Lost
+from closedrooms.experiments.workers import AHEAD, TRIES, Crew, Lost, _Pool
 
 DEADLY = "__import__('os')._exit(1)"
 # `eval` is a function that any worker can find by name.
@@ -205,3 +208,23 @@ def test_a_scheduler_that_dies_is_one_line(tmp_path: Path) -> None:
     assert said.splitlines() == [
         "the Dask scheduler was lost; the same command goes on where it stopped once there is one again"
     ]
+
+
+def test_a_signal_that_another_thread_takes_waits_until_a_worker_has_begun(monkeypatch: pytest.MonkeyPatch) -> None:
+    steps = 0
+
+    def submit(_: ProcessPoolExecutor, *work: object) -> Future[object]:
+        nonlocal steps
+        _thread.interrupt_main(signal.SIGINT)
+        while steps < 1000:  # the interpreter looks for signals here
+            steps += len(work)
+        return Future()
+
+    monkeypatch.setattr(ProcessPoolExecutor, "submit", submit)
+    pool = _Pool(1)
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        pool.submit(print)
+    assert steps == 1000
+    assert signal.getsignal(signal.SIGINT) is before
+    pool.shutdown()
