@@ -16,6 +16,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain, count, islice
+from multiprocessing import spawn
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
@@ -140,6 +141,7 @@ def hire(workers: int) -> Iterator[ProcessPoolExecutor]:
     before = os.environ.get(SAFE_PATH)
     # A worker begins as `python -c`, which looks for modules in the current directory.
     os.environ[SAFE_PATH] = "1"
+    spawn.get_command_line = _command_line
     pool = _Pool(workers, multiprocessing.get_context("spawn"), _begin, (os.getpid(),))
     try:
         yield pool
@@ -149,10 +151,30 @@ def hire(workers: int) -> Iterator[ProcessPoolExecutor]:
         _dismiss()
         raise
     finally:
+        spawn.get_command_line = _SPAWNED
         if before is None:
             del os.environ[SAFE_PATH]
         else:
             os.environ[SAFE_PATH] = before
+
+
+_SPAWNED = spawn.get_command_line
+# A worker whose parent is gone before it has said what to do ends; Python's own words for that are a traceback.
+_QUIETLY = """\
+import pickle, sys
+try:
+    {program}
+except (EOFError, pickle.UnpicklingError):
+    sys.exit(1)
+"""
+
+
+def _command_line(**named: Any) -> list[str]:
+    """Make the command that a worker begins with, as the standard library does, but quiet where its parent is gone."""
+    words = list(_SPAWNED(**named))
+    at = words.index("-c") + 1
+    words[at] = _QUIETLY.format(program=words[at])
+    return words
 
 
 class _Pool(ProcessPoolExecutor):
@@ -184,8 +206,8 @@ def _signals_late() -> Iterator[None]:
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)
-        for number in came[:1]:
-            signal.raise_signal(number)
+        if came:
+            signal.raise_signal(came[0])
 
 
 def _dismiss() -> None:

@@ -16,7 +16,7 @@ import pytest
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.runtime.packages import MissingPackageError
-from closedrooms.experiments.workers import AHEAD, TRIES, Crew, Lost, _Pool
+from closedrooms.experiments.workers import AHEAD, TRIES, Crew, Lost, _command_line, _Pool
 
 DEADLY = "__import__('os')._exit(1)"
 # `eval` is a function that any worker can find by name.
@@ -228,3 +228,12 @@ def test_a_signal_that_another_thread_takes_waits_until_a_worker_has_begun(monke
     assert steps == 1000
     assert signal.getsignal(signal.SIGINT) is before
     pool.shutdown()
+
+
+def test_a_worker_whose_parent_is_gone_ends_quietly() -> None:
+    reading, writing = os.pipe()
+    os.close(writing)
+    command = _command_line(tracker_fd=reading, pipe_handle=reading)
+    done = subprocess.run(command, pass_fds=[reading], capture_output=True, check=False)
+    os.close(reading)
+    assert (done.returncode, done.stdout, done.stderr) == (1, b"", b"")
