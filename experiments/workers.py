@@ -147,8 +147,12 @@ def hire(workers: int) -> Iterator[ProcessPoolExecutor]:
         yield pool
         pool.shutdown()
     except BaseException:
+        manager = getattr(pool, "_executor_manager_thread", None)
         pool.shutdown(wait=False, cancel_futures=True)
         _dismiss()
+        if manager is not None:
+            # It closes a pipe that the interpreter writes to when it ends.
+            manager.join(GRACE)
         raise
     finally:
         spawn.get_command_line = _SPAWNED
