@@ -2,7 +2,8 @@
 
 ``dataset.dataset.dataset`` and ``robustness.sweep.robustness`` are named like their packages and so stand there.
 
-- Work: ``workers`` (local processes or a Dask cluster), ``scheduler_address`` (of the cluster).
+- Work: ``workers`` (local processes or a Dask cluster), ``local_workers``, ``worker_process`` (the set-up of each),
+  ``scheduler_address`` (of the cluster).
 - Files: ``places`` (a folder or an address, as typed), ``stores`` (reading and writing files at either),
   ``claimed_folder`` (an output that a command goes on with).
 - Results: ``statistics``, ``tables`` (CSV and Parquet), ``html_page``.

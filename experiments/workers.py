@@ -1,28 +1,21 @@
 """The same work for one process, several, or a cluster, behind the executor interface of concurrent.futures."""
 
 import contextlib
-import ctypes
 import functools
 import logging
-import multiprocessing
-import os
-import signal
-import threading
-import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain, count, islice
-from multiprocessing import spawn
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
+from typing import TYPE_CHECKING, Generic, TypeVar, cast
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
-from closedrooms.core.files.unfinished import remove_unfinished
 from closedrooms.core.runtime.packages import missing_package, require
-from closedrooms.core.runtime.stopping import SIGNALS, Stop, end_in_time, ending_with, handle
+from closedrooms.experiments.local_workers import hire
+from closedrooms.experiments.worker_process import keep_memory, one_thread
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -34,9 +27,6 @@ Result = TypeVar("Result")
 TRIES = 3
 # How long a scheduler may take to answer [s].
 PATIENCE = 10.0
-# How long workers may take to clear away what they have under way [s]; the parent itself has 1.4 s.
-GRACE = 1.0
-SAFE_PATH = "PYTHONSAFEPATH"
 # Jobs that a cluster is given for each of its threads: one to work on, one to go on with.
 AHEAD = 2
 
@@ -132,99 +122,6 @@ class Crew(Generic[Job, Result]):
                     yield begun.pop(under_way.pop(future)), outcome
 
 
-@contextlib.contextmanager
-def hire(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Start local workers: no part in Ctrl-C, no modules from the current directory, no life after the parent's.
-
-    On any error in the block, Ctrl-C included, they are told to clear away what they have under way, and ended.
-    """
-    before = os.environ.get(SAFE_PATH)
-    # A worker begins as `python -c`, which looks for modules in the current directory.
-    os.environ[SAFE_PATH] = "1"
-    spawn.get_command_line = _command_line
-    pool = _Pool(workers, multiprocessing.get_context("spawn"), _begin, (os.getpid(),))
-    try:
-        yield pool
-        pool.shutdown()
-    except BaseException:
-        manager = getattr(pool, "_executor_manager_thread", None)
-        pool.shutdown(wait=False, cancel_futures=True)
-        _dismiss()
-        if manager is not None:
-            # It closes a pipe that the interpreter writes to when it ends.
-            manager.join(GRACE)
-        raise
-    finally:
-        spawn.get_command_line = _SPAWNED
-        if before is None:
-            del os.environ[SAFE_PATH]
-        else:
-            os.environ[SAFE_PATH] = before
-
-
-_SPAWNED = spawn.get_command_line
-# A worker whose parent is gone before it has said what to do ends; Python's own words for that are a traceback.
-_QUIETLY = """\
-import pickle, sys
-try:
-    {program}
-except (EOFError, pickle.UnpicklingError):
-    sys.exit(1)
-"""
-
-
-def _command_line(**named: Any) -> list[str]:
-    """Make the command that a worker begins with, as the standard library does, but quiet where its parent is gone."""
-    words = list(_SPAWNED(**named))
-    at = words.index("-c") + 1
-    words[at] = _QUIETLY.format(program=words[at])
-    return words
-
-
-class _Pool(ProcessPoolExecutor):
-    """Workers that are not disturbed by signals while they begin, nor begun while a signal ends their parent."""
-
-    def submit(self, *work: Any, **named: Any) -> Future[Any]:
-        """Hand out a job; a worker that is begun for it inherits that SIGINT and SIGTERM wait."""
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-        try:
-            # Another thread may still take the signal, and its handler would run here.
-            with _signals_late():
-                return super().submit(*work, **named)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextlib.contextmanager
-def _signals_late() -> Iterator[None]:
-    """Handle signals that come in the block when it has ended; in the main thread, where handlers run."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    came: list[int] = []
-    handlers = {number: handler for number in SIGNALS if callable(handler := signal.getsignal(number))}
-    for number in handlers:
-        signal.signal(number, lambda number, _: came.append(number))
-    try:
-        yield
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-        if came:
-            signal.raise_signal(came[0])
-
-
-def _dismiss() -> None:
-    """End the workers, those that do not go by themselves too."""
-    children = multiprocessing.active_children()
-    for child in children:
-        child.terminate()
-    end = time.monotonic() + GRACE
-    for child in children:
-        child.join(max(0.0, end - time.monotonic()))
-        child.kill()
-
-
 def _prepared(function: Callable[[Job], Result], needs: tuple[str, ...], by: str, job: Job) -> Result:
     """Do one job on a worker of any kind, which is made ready once."""
     _make_ready(needs, by)
@@ -243,59 +140,6 @@ def _make_ready(needs: tuple[str, ...], by: str) -> None:
     require(*needs, by=by)
     one_thread()
     keep_memory()
-
-
-# What the numeric libraries ask when they are loaded.
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
-
-def one_thread() -> None:
-    """Limit a worker to one thread: workers share the processors, and a library's own threads would only be in the way.
-
-    Holds for OpenCV and BLAS, those that are loaded and those that will be.
-    """
-    import cv2
-    from threadpoolctl import threadpool_limits
-
-    os.environ.update(dict.fromkeys(THREADS, "1"))
-    threadpool_limits(1)
-    cv2.setNumThreads(1)
-
-
-# Of <malloc.h>: what is returned to the system at the end of the heap, and what is asked from it by itself [bytes].
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
-KEPT, OWN = 64 << 20, 32 << 20
-
-
-def keep_memory() -> None:
-    """Let this process keep the memory that it frees: the next map takes it again.
-
-    Dask's nanny starts workers with ``MALLOC_TRIM_THRESHOLD_=65536``, which also ends glibc's habit to raise both
-    limits by itself: every array above 128 kB is then asked from the system, zeroed page by page and given back at
-    once. Measured on 18 maps of school-01: 250,000 page faults against 76,000 without that variable and 5,700 with
-    this function, and a quarter less processor time.
-    """
-    adjust = getattr(ctypes.CDLL(None), "mallopt", None)
-    if adjust is not None:  # another C library has no such limits
-        adjust(M_MMAP_THRESHOLD, OWN)
-        adjust(M_TRIM_THRESHOLD, KEPT)
-
-
-def _begin(parent: int) -> None:
-    """Prepare a local worker: one thread, no part in the parent's Ctrl-C, and no life after the parent's."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    end_in_time((signal.SIGTERM,), lambda _: remove_unfinished(), patience=GRACE / 2)
-    ending_with(parent, signal.SIGTERM)()
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
-    one_thread()
-    # Until here the signal ends the worker by itself: it has nothing under way.
-    handle((signal.SIGTERM,), _Dismissal())
-
-
-class _Dismissal(Stop):
-    """End of a worker: multiprocessing tells any other exception in a traceback."""
-
-    error = SystemExit
 
 
 @contextlib.contextmanager

@@ -16,7 +16,8 @@ import pytest
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.runtime.packages import MissingPackageError
-from closedrooms.experiments.workers import AHEAD, TRIES, Crew, Lost, _command_line, _Pool
+from closedrooms.experiments.local_workers import _command_line, _Pool
+from closedrooms.experiments.workers import AHEAD, TRIES, Crew, Lost
 
 DEADLY = "__import__('os')._exit(1)"
 # `eval` is a function that any worker can find by name.
