@@ -195,7 +195,8 @@ class Panes:
 
     def _find(self, grid: OccupancyGrid) -> FloatArray:
         said = np.stack([said.codes for said in self._said.values()])
-        hit, askew, past, through = (np.count_nonzero(said == code, axis=0) for code in (1, 2, 3, 4))
+        codes = (HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE)
+        hit, askew, past, through = (np.count_nonzero(said == code, axis=0) for code in codes)
         hit = np.maximum(hit, 1)  # a glimpse between two keyframes at least
         glass = (past <= DOUBT * hit) & (through >= SEEN_THROUGH) & (askew <= DOUBT * through)
         no_pane = (past > 1) & (past > hit)

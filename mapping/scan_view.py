@@ -37,8 +37,6 @@ class View:
 
     def _lowest(self, level: int) -> FloatArray:
         """Shortest range within 2 ** level directions to either side."""
-        if not self._ranges.size:
-            return self._ranges
         if level not in self._levels:
             window = np.ones((1, 2 * (1 << level) + 1), dtype=np.uint8)
             shortest = cv2.erode(self._ranges[None], window, borderType=cv2.BORDER_REPLICATE)

@@ -6,6 +6,10 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
+from closedrooms.cli.commands import main
+
 COMMAND = [sys.executable, "-c", "import sys; from closedrooms.cli.commands import main; sys.exit(main())"]
 QUICK = ["--sim.lidar.beams", "180", "--repetitions", "2", "--max-closed", "2", "--seed", "5"]
 
@@ -21,3 +25,10 @@ def wait_for(condition: Callable[[], object], seconds: float = 120.0) -> None:
     while not condition():
         assert time.monotonic() < end, "nothing happened"
         time.sleep(0.02)
+
+
+def check_that_the_manifest_repeats(made: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make a dataset anew by its manifest, from another folder: the same files, byte for byte."""
+    monkeypatch.chdir(folder)
+    assert main(["dataset", "--config", str(made / "manifest.json"), "--out", "again", "--workers", "1"]) == 0
+    assert content(folder / "again") == content(made)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
-from dataset_files import COMMAND, QUICK, content, wait_for
+from dataset_files import COMMAND, QUICK, check_that_the_manifest_repeats, content, wait_for
 
 from closedrooms.cli.commands import main
 from closedrooms.core.errors import InvalidInputError
@@ -436,6 +436,4 @@ def test_explorations_that_end_early_and_doors_left_out_end_with_status_3(
 def test_the_manifest_repeats_the_dataset_from_any_folder(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["dataset", "--config", str(made / "manifest.json"), "--out", "again", "--workers", "1"]) == 0
-    assert content(tmp_path / "again") == content(made)
+    check_that_the_manifest_repeats(made, tmp_path, monkeypatch)

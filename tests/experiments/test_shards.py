@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
-from dataset_files import COMMAND, QUICK, content, wait_for
+from dataset_files import COMMAND, QUICK, check_that_the_manifest_repeats, content, wait_for
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -393,6 +393,4 @@ def test_an_object_store_is_gone_on_with_after_kill_9_and_holds_the_same_bytes(
 def test_the_manifest_repeats_the_dataset_from_any_folder(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["dataset", "--config", str(made / "manifest.json"), "--out", "again", "--workers", "1"]) == 0
-    assert content(tmp_path / "again") == content(made)
+    check_that_the_manifest_repeats(made, tmp_path, monkeypatch)
