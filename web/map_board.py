@@ -1,6 +1,7 @@
 """The map to pan and zoom: Leaflet in a flat coordinate system, its units metres of the grid's frame."""
 
-from collections.abc import Callable, Sequence
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +20,7 @@ attributionControl: false, keyboard: false, doubleClickZoom: false}"""
 SCRIPT = """
 const map = getElement(%d).map;
 L.control.scale({imperial: false, maxWidth: 160}).addTo(map);
-let focused = null;  // the door that has it; every change draws all doors anew
+let focused = null;  // the door that has it, whose handle is drawn anew where it changes
 map.on('layeradd', ({layer}) => {
   const handle = layer.options.handle;
   if (!handle || layer.told) return;
@@ -32,9 +33,14 @@ map.on('layeradd', ({layer}) => {
   const element = layer.getElement();
   element.setAttribute('aria-label', handle.kind + ' ' + handle.name);
   if (handle.kind === 'door' || handle.kind === 'chosen') {
-    if (focused === handle.name && document.activeElement === document.body) element.focus({preventScroll: true});
+    element.dataset.handle = handle.name;
+    const active = document.activeElement;
+    const here = active === document.body || active.dataset.handle === handle.name;
+    if (focused === handle.name && here) element.focus({preventScroll: true});
     element.addEventListener('focus', () => { focused = handle.name; });
-    element.addEventListener('blur', () => setTimeout(() => { if (element.isConnected) focused = null; }));
+    element.addEventListener('blur', ({relatedTarget}) => setTimeout(() => {
+      if (element.isConnected && relatedTarget?.dataset.handle !== handle.name) focused = null;
+    }));
   }
   const tell = type => emitEvent('handle',
     {type, kind: handle.kind, name: handle.name, x: layer.getLatLng().lng, y: layer.getLatLng().lat});
@@ -90,6 +96,8 @@ class HandleEvent:
 class MapBoard:
     """The map element; layers are drawn in named groups, of which each replaces its last one.
 
+    A handle that stays as it is keeps its element, and with it the focus and a key that is just being pressed.
+
     Args:
         on_click: Told where somebody clicked, frame of the grid [m].
         on_pointer: Told where the pointer is [m].
@@ -107,9 +115,13 @@ class MapBoard:
         self._map.props[":options"] = OPTIONS
         self._map.clear_layers()
         self._groups: dict[str, list[Any]] = {}
+        # Handles with what they were drawn as: those that stand, and those of groups that are being redrawn.
+        self._handles: dict[str, list[tuple[dict[str, Any], Any]]] = {}
+        self._last: dict[str, list[tuple[dict[str, Any], Any]]] = {}
         self._map.on("map-click", lambda event: on_click(_point(event.args)))
         self._map.on("map-mousemove", lambda event: on_pointer(_point(event.args)), throttle=0.1)
-        ui.on("handle", lambda event: on_handle(_handle(event.args)))
+        self._on_handle = on_handle
+        ui.on("handle", lambda event: self._handled(_handle(event.args)))
 
     async def ready(self) -> None:
         """Wait until the browser has made the map, and add what NiceGUI's element lacks."""
@@ -135,10 +147,17 @@ class MapBoard:
         y, x = self._map.center
         return (float(x), float(y))
 
-    def clear(self, group: str) -> None:
-        """Remove a group of layers."""
-        for layer in self._groups.pop(group, []):
-            self._map.remove_layer(layer)
+    @contextlib.contextmanager
+    def redrawn(self, *groups: str) -> Iterator[None]:
+        """Replace groups by what is drawn into them within the context; handles that are gone are removed last."""
+        for group in groups:
+            for layer in self._groups.pop(group, []):
+                self._map.remove_layer(layer)
+            self._last[group] = self._handles.pop(group, [])
+        yield
+        for group in groups:
+            for _, layer in self._last.pop(group):
+                self._map.remove_layer(layer)
 
     def picture(self, group: str, url: str, bounds: tuple[float, float, float, float], opacity: float = 1.0) -> None:
         """Draw a picture over ``(x_min, y_min, x_max, y_max)`` [m]."""
@@ -168,6 +187,7 @@ class MapBoard:
         opacity: float = 1.0,
     ) -> None:
         """Draw a handle at a point [m]: something to click or to drag, or a mere note."""
+        place = (point[1], point[0])
         options = {
             "draggable": draggable,
             "opacity": opacity,
@@ -175,11 +195,15 @@ class MapBoard:
             "keyboard": kind != "note",
             "handle": {"kind": kind, "name": name, "label": label, "colour": css(colour)},
         }
-        self._add(group, self._map.marker(latlng=(point[1], point[0]), options=options))
+        key = {"latlng": place, **options}
+        last = self._last.get(group, [])
+        same = next((number for number, (drawn, _) in enumerate(last) if drawn == key), None)
+        layer = self._map.marker(latlng=place, options=options) if same is None else last.pop(same)[1]
+        self._handles.setdefault(group, []).append((key, layer))
 
     def fade(self, group: str, opacity: float) -> None:
         """Set how opaque the pictures or handles of a group are, 0..1."""
-        for layer in self._groups.get(group, []):
+        for layer in (*self._groups.get(group, []), *(layer for _, layer in self._handles.get(group, []))):
             layer.run_method("setOpacity", opacity)
 
     def restyle(self, group: str, **style: Any) -> None:
@@ -189,6 +213,15 @@ class MapBoard:
 
     def _add(self, group: str, layer: Any) -> None:
         self._groups.setdefault(group, []).append(layer)
+
+    def _handled(self, event: HandleEvent) -> Any:
+        """Tell of a handle; one that was dragged is not where it was drawn."""
+        if event.type == "dragend":
+            for handles in self._handles.values():
+                for key, _ in handles:
+                    if (key["handle"]["kind"], key["handle"]["name"]) == (event.kind, event.name):
+                        key["latlng"] = None
+        return self._on_handle(event)
 
 
 def css(colour: Colour) -> str:

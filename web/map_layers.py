@@ -55,39 +55,43 @@ class MapLayers:
 
     def draw_doors(self) -> None:
         """Draw the doors with their handles; those of the selected one's jambs too."""
-        self._board.clear("doors")
-        colours, doors = self._colours(), self._session.document.doors
-        segments = {door.id: self._session.segment(door) for door in doors}
-        # A layer a colour, not one a door: each costs a message.
-        self._board.lines("doors", list(segments.values()), color="#000", weight=9, lineCap="butt")
-        for colour in dict.fromkeys(colours[door.id] for door in doors):
-            own = [segments[door.id] for door in doors if colours[door.id] == colour]
-            self._board.lines("doors", own, color=css(colour), weight=5, lineCap="butt")
-        for door in doors:
-            chosen, colour = door.id == self._session.selected, colours[door.id]
-            middle = self._session.sheet.point_on_grid(door.midpoint)
-            kind, label = "chosen" if chosen else "door", shown(door.id, longest=16)
-            self._board.handle("doors", middle, kind=kind, name=door.id, label=label, colour=colour, draggable=True)
-            for jamb, point in enumerate(segments[door.id] if chosen else ()):
-                self._board.handle("doors", point, kind="jamb", name=str(jamb), label="", colour=colour, draggable=True)
+        with self._board.redrawn("doors"):
+            colours, doors = self._colours(), self._session.document.doors
+            segments = {door.id: self._session.segment(door) for door in doors}
+            # A layer a colour, not one a door: each costs a message.
+            self._board.lines("doors", list(segments.values()), color="#000", weight=9, lineCap="butt")
+            for colour in dict.fromkeys(colours[door.id] for door in doors):
+                own = [segments[door.id] for door in doors if colours[door.id] == colour]
+                self._board.lines("doors", own, color=css(colour), weight=5, lineCap="butt")
+            for door in doors:
+                chosen, colour = door.id == self._session.selected, colours[door.id]
+                middle = self._session.sheet.point_on_grid(door.midpoint)
+                kind, label = "chosen" if chosen else "door", shown(door.id, longest=16)
+                self._board.handle("doors", middle, kind=kind, name=door.id, label=label, colour=colour, draggable=True)
+                for jamb, point in enumerate(segments[door.id] if chosen else ()):
+                    self._board.handle(
+                        "doors", point, kind="jamb", name=str(jamb), label="", colour=colour, draggable=True
+                    )
 
     def draw_proposals(self) -> None:
         """Draw the proposals that are left, dashed, with their scores."""
-        self._board.clear("proposals")
-        proposals = self._session.open_proposals
-        segments = [proposal.segment for _, proposal in proposals]
-        self._board.lines("proposals", segments, color="#fff", weight=8, lineCap="butt")
-        self._board.lines("proposals", segments, color=css(INK), weight=4, dashArray="6 5", lineCap="butt")
-        for number, proposal in proposals:
-            label = f"{proposal.score:.2f}"
-            self._board.handle(
-                "proposals", proposal.midpoint, kind="proposal", name=str(number), label=label, colour=INK
-            )
+        with self._board.redrawn("proposals"):
+            proposals = self._session.open_proposals
+            segments = [proposal.segment for _, proposal in proposals]
+            self._board.lines("proposals", segments, color="#fff", weight=8, lineCap="butt")
+            self._board.lines("proposals", segments, color=css(INK), weight=4, dashArray="6 5", lineCap="butt")
+            for number, proposal in proposals:
+                label = f"{proposal.score:.2f}"
+                self._board.handle(
+                    "proposals", proposal.midpoint, kind="proposal", name=str(number), label=label, colour=INK
+                )
 
     def draw_rooms(self) -> None:
         """Draw the predicted rooms, and the completed map below them where it is wanted."""
-        for group in ("completed", "rooms", "notes"):
-            self._board.clear(group)
+        with self._board.redrawn("completed", "rooms", "notes"):
+            self._draw_rooms()
+
+    def _draw_rooms(self) -> None:
         outcome, share, colours = self._session.outcome, self.share, self._colours()
         if outcome is None or outcome.prediction is None:
             return
@@ -110,8 +114,8 @@ class MapLayers:
 
     def draw_tour(self, tour: CoverageTour | str | None) -> None:
         """Draw a tour; none where there is none."""
-        self._board.clear("tour")
-        if isinstance(tour, CoverageTour):
-            for shape, about in make_tour_features(tour, "predicted"):
-                if about["type"] == "tour":
-                    self._board.shape("tour", shape, color=css(TOURS["predicted"]), weight=3, opacity=0.8)
+        with self._board.redrawn("tour"):
+            if isinstance(tour, CoverageTour):
+                for shape, about in make_tour_features(tour, "predicted"):
+                    if about["type"] == "tour":
+                        self._board.shape("tour", shape, color=css(TOURS["predicted"]), weight=3, opacity=0.8)
