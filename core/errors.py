@@ -1,7 +1,9 @@
 """Errors that a user can cause, each worth one clear line."""
 
+import contextlib
 import errno
 import traceback
+from collections.abc import Iterator
 from pathlib import Path
 
 from closedrooms.core.names import shown
@@ -19,15 +21,34 @@ class InvalidInputError(ClosedroomsError):
 
     The message reads ``what; expected ...: where``, the path last, on one line. Texts of the file stand in it as a
     terminal may show them (:func:`closedrooms.core.names.shown`).
+
+    Attributes:
+        where: The file or place that the message names, empty for none.
     """
 
     def __init__(self, what: str, *, expected: str = "", where: str | Path = "") -> None:
+        self.what, self.expected, self.where = what, expected, str(where)
         message = shown(what, longest=LONGEST_WHAT)
         if expected:
             message += f"; expected {shown(expected, longest=LONGEST_EXPECTED)}"
         if where:
             message += f": {shown(where, longest=LONGEST_EXPECTED)}"
         super().__init__(message)
+
+
+@contextlib.contextmanager
+def blaming(path: Path) -> Iterator[None]:
+    """Name a file in errors that name none: what is wrong shows only where its content is used.
+
+    Raises:
+        InvalidInputError: As raised inside, with a place.
+    """
+    try:
+        yield
+    except InvalidInputError as error:
+        if error.where:
+            raise
+        raise InvalidInputError(error.what, expected=error.expected, where=path) from error
 
 
 class OutputError(ClosedroomsError):

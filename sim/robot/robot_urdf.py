@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray
-from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.errors import InvalidInputError, blaming
 from closedrooms.sim.config import SimConfig
 from closedrooms.sim.physics_world import PhysicsWorld
 from closedrooms.sim.robot.drive_calibration import calibrate_drive
@@ -40,13 +40,8 @@ def read_robot(config: SimConfig) -> tuple[SimConfig, RobotModel]:
     """
     path = config.robot_urdf
     assert path is not None
-    try:
+    with blaming(path):
         return _measure_robot(config, path)
-    except InvalidInputError as error:
-        # Figures of the robot are checked where settings are, which know no file.
-        if path.name in str(error):
-            raise
-        raise InvalidInputError(str(error), where=path) from error
 
 
 def _measure_robot(config: SimConfig, path: Path) -> tuple[SimConfig, RobotModel]:

@@ -1,9 +1,11 @@
 import errno
 import os
+import pickle
+from pathlib import Path
 
 import pytest
 
-from closedrooms.core.errors import InvalidInputError, OutputError, reason
+from closedrooms.core.errors import InvalidInputError, OutputError, blaming, reason
 
 
 @pytest.mark.parametrize(
@@ -13,7 +15,10 @@ from closedrooms.core.errors import InvalidInputError, OutputError, reason
         (OSError(errno.ENOMEM, "no"), "more memory than there is"),
         (ImportError("libx.so: failed to map segment from shared object"), "more memory than there is"),
         (ImportError("libx.so: cannot allocate memory in static TLS block"), "more memory than there is"),
-        (OSError(errno.EMFILE, "no", "/x.ttf"), "more open files than the system allows; expected a higher limit (ulim"),
+        (
+            OSError(errno.EMFILE, "no", "/x.ttf"),
+            "more open files than the system allows; expected a higher limit (ulim",
+        ),
         (OSError(errno.ENFILE, "no"), "more open files than the system allows"),
         (ImportError("libx.so: cannot open shared object file: Too many open files"), "more open files than the sys"),
         (BlockingIOError(errno.EAGAIN, "no"), "more processes or threads than the system allows"),
@@ -29,7 +34,13 @@ def test_what_the_machine_lacks_is_no_defect(error: Exception, said: str) -> Non
 
 @pytest.mark.parametrize(
     "error",
-    [ImportError("no module named x"), OSError(errno.ENOENT, "no"), RuntimeError("x"), KeyError("a\nb"), OSError("odd")],
+    [
+        ImportError("no module named x"),
+        OSError(errno.ENOENT, "no"),
+        RuntimeError("x"),
+        KeyError("a\nb"),
+        OSError("odd"),
+    ],
 )
 def test_a_defect_is_told_with_its_kind_and_place(error: Exception) -> None:
     try:
@@ -55,3 +66,23 @@ def test_a_message_is_one_line_of_bounded_length_and_the_path_stands_last() -> N
     assert where.count("p") == 3
     assert str(error).isprintable()
     assert str(InvalidInputError("a")) == "a"
+
+
+@pytest.mark.parametrize(
+    ("raised", "said"),
+    [
+        (InvalidInputError("a"), "a: log.npz"),
+        (InvalidInputError("a", expected="b"), "a; expected b: log.npz"),
+        (InvalidInputError("a", where="other"), "a: other"),
+        (OutputError("full: out"), "full: out"),
+    ],
+)
+def test_an_error_without_a_place_is_given_one(raised: Exception, said: str) -> None:
+    with pytest.raises(type(raised)) as error, blaming(Path("log.npz")):
+        raise raised
+    assert str(error.value) == said
+
+
+def test_an_error_comes_whole_from_a_worker() -> None:
+    error = pickle.loads(pickle.dumps(InvalidInputError("a", expected="b", where="c")))
+    assert (str(error), error.what, error.expected, error.where) == ("a; expected b: c", "a", "b", "c")

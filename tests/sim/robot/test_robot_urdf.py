@@ -131,7 +131,7 @@ def test_a_size_that_is_no_number_is_refused_with_the_file(tmp_path: Path, found
     made = make_model(RobotConfig(radius=0.25), 0.3)
     assert isinstance(made.urdf, str)
     path = tmp_path / "robot.urdf"
-    boxed = made.urdf.replace("</robot>", LASER.replace("<link name=\"base_scan\"/>", BOXED.format(found, put)))
+    boxed = made.urdf.replace("</robot>", LASER.replace('<link name="base_scan"/>', BOXED.format(found, put)))
     path.write_text(boxed)
     with pytest.raises(InvalidInputError) as refused:
         read_robot(own(path))
