@@ -150,7 +150,7 @@ def _read_feature(number: int, feature: Any, path: Path) -> GeoFeature:
 
 
 def _geometry(given: Any) -> BaseGeometry:
-    """Make a geometry in the plane: heights and measures of its positions are left out; collections of one kind are one.
+    """Make a geometry in the plane, without the heights of its positions; a collection of one kind is its Multi form.
 
     Raises:
         ValueError: A collection of several kinds, and see :func:`_positions`.
@@ -162,7 +162,9 @@ def _geometry(given: Any) -> BaseGeometry:
     kinds = {part.geom_type for part in parts}
     if len(kinds) != 1 or not kinds <= {"Point", "LineString", "Polygon"}:
         raise ValueError("a collection of several kinds")
-    return {"Point": MultiPoint, "LineString": MultiLineString, "Polygon": MultiPolygon}[kinds.pop()](parts)
+    joined: dict[str, Any] = {"Point": MultiPoint, "LineString": MultiLineString, "Polygon": MultiPolygon}
+    made: BaseGeometry = joined[kinds.pop()](parts)
+    return made
 
 
 def _positions(value: Any, depth: int) -> list[Any]:
