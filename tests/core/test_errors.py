@@ -13,7 +13,10 @@ from closedrooms.core.errors import InvalidInputError, OutputError, reason
         (OSError(errno.ENOMEM, "no"), "more memory than there is"),
         (ImportError("libx.so: failed to map segment from shared object"), "more memory than there is"),
         (ImportError("libx.so: cannot allocate memory in static TLS block"), "more memory than there is"),
-        (OSError(errno.EMFILE, "no", "/x.ttf"), "more open files than the system allows; expected a higher limit (ulim"),
+        (
+            OSError(errno.EMFILE, "no", "/x.ttf"),
+            "more open files than the system allows; expected a higher limit (ulim",
+        ),
         (OSError(errno.ENFILE, "no"), "more open files than the system allows"),
         (ImportError("libx.so: cannot open shared object file: Too many open files"), "more open files than the sys"),
         (BlockingIOError(errno.EAGAIN, "no"), "more processes or threads than the system allows"),
@@ -29,7 +32,13 @@ def test_what_the_machine_lacks_is_no_defect(error: Exception, said: str) -> Non
 
 @pytest.mark.parametrize(
     "error",
-    [ImportError("no module named x"), OSError(errno.ENOENT, "no"), RuntimeError("x"), KeyError("a\nb"), OSError("odd")],
+    [
+        ImportError("no module named x"),
+        OSError(errno.ENOENT, "no"),
+        RuntimeError("x"),
+        KeyError("a\nb"),
+        OSError("odd"),
+    ],
 )
 def test_a_defect_is_told_with_its_kind_and_place(error: Exception) -> None:
     try:
