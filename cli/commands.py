@@ -73,8 +73,8 @@ def _own_process() -> None:
             name = ("stdin", "stdout", "stderr")[descriptor]
             setattr(sys, name, os.fdopen(descriptor, mode, closefd=False))
     end_in_time(SIGNALS, _leave)
-    # Pictures are drawn into files, whatever the user's own plots are drawn with; where that library may keep nothing at
-    # home it has a place of its own, and no need to say so.
+    # Pictures are drawn into files, whatever the user's own plots are drawn with; where their library may keep nothing
+    # at home it has a place of its own, and no need to say so.
     os.environ["MPLBACKEND"] = "agg"
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     # `python -m` looks for modules in the current directory first, and workers inherit where to look.

@@ -20,9 +20,10 @@ from closedrooms.core.random import stream
 from closedrooms.core.scan import LaserScan
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom, Wall
 
-# Properties hold on a busy machine too: an example that takes long is no failure. Examples are the same each time: a
-# rare one that fails is to be found by who looks for it (`make fuzz`), not by who changes something else.
+# Properties hold on a busy machine too: an example that takes long is no failure. The examples are the same in every
+# run, so that two runs of one commit agree; `pytest --hypothesis-profile anew` draws others.
 settings.register_profile("closedrooms", deadline=None, derandomize=True)
+settings.register_profile("anew", deadline=None)
 settings.load_profile("closedrooms")
 
 
