@@ -102,9 +102,9 @@ def _status(words: list[str], stop: Stop) -> int:
         if not stop:
             _complain(str(error))
             return BAD_INPUT
-    except MemoryError:
+    except MemoryError as error:
         if not stop:
-            _complain("more memory than there is; expected smaller input, or settings that ask for less")
+            _complain(reason(error))
             return BAD_INPUT
     except KeyboardInterrupt:
         stop.number = stop.number or INTERRUPTED - 128
