@@ -1,5 +1,6 @@
 """Signals at random moments of the long commands: the right status, within 2 s, no traceback, nothing left behind."""
 
+import contextlib
 import json
 import os
 import random
@@ -118,7 +119,8 @@ def kill(command: str, number: int, moment: float, inputs: Path, folder: Path, *
     wait_until_ours(process)
     time.sleep(moment)
     sent = time.monotonic()
-    (os.killpg if group else os.kill)(process.pid, number)
+    with contextlib.suppress(ProcessLookupError):  # it was quicker than the time before, and has ended
+        (os.killpg if group else os.kill)(process.pid, number)
     out, err = process.communicate(timeout=10 * PATIENCE)
     took = time.monotonic() - sent
     while living(mark) and time.monotonic() - sent < PATIENCE:
