@@ -6,19 +6,20 @@ normal and none of the others; what moves returns the same beams now and not the
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
-from closedrooms.mapping.scan_view import View, faces
+from closedrooms.mapping.met_surfaces import Glimpse, MetSurfaces
+from closedrooms.mapping.scan_view import View
 
 NEAR, OBLIQUE = math.radians(9.0), math.radians(22.0)
 """Incidence up to which a pane returns every beam, and from which on it returns none [rad]."""
@@ -32,6 +33,8 @@ DOUBT = 0.34
 """Scans of the wrong kind for each of the right kind from which on a place is no pane."""
 LENGTH = 0.5
 """Shortest pane [m]: a person is 0.4 m wide."""
+FEWEST = 4
+"""Fewest places of a pane."""
 THICK = 0.12
 """Standard deviation across a pane up to which its cells are in line [m]: walls are seen from both sides."""
 SOLID = 0.10
@@ -56,26 +59,11 @@ class _Said:
 
     Attributes:
         pose: From where.
-        codes: One of the four above, 0 for nothing, shape (places,).
+        codes: One of the four above, 0 for nothing, shape (places that are asked about,).
     """
 
     pose: Pose2
     codes: np.ndarray[tuple[int], np.dtype[np.int8]]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Glimpse:
-    """Surfaces that a scan met near their normal, in the frame of the keyframe before it.
-
-    Attributes:
-        keyframe: Its index.
-        points: Shape (n, 2) [m].
-        angles: Directions of their normals, shape (n,) [rad].
-    """
-
-    keyframe: int
-    points: FloatArray
-    angles: FloatArray
 
 
 class Panes:
@@ -83,29 +71,18 @@ class Panes:
 
     def __init__(self, resolution: float) -> None:
         self._resolution = resolution
-        self._glimpses: list[_Glimpse] = []
-        self._met = _MetCells(resolution)
-        self._taken = 0
-        self._suspected: set[tuple[int, int]] = set()
+        self._glimpses: list[Glimpse] = []
+        self._met = MetSurfaces(resolution)
         self._places: FloatArray = np.zeros((0, 2))
         self._normals: FloatArray = np.zeros((0, 2))
+        self._asked: IntArray = np.zeros(0, dtype=np.int64)
         self._said: dict[int, _Said] = {}
         self._views: dict[int, View] = {}
         self.segments: FloatArray = np.zeros((0, 2, 2))
 
-    def glimpse(self, keyframe: int, keyframe_T_robot: Pose2, points: FloatArray, origin: FloatArray) -> None:
-        """Take note of the surfaces that a scan met near their normal.
-
-        Args:
-            keyframe: Index of the latest keyframe.
-            keyframe_T_robot: From where, in its frame.
-            points: Where beams ended, in beam order, robot frame, shape (n, 2) [m].
-            origin: The sensor ``(x, y)``, robot frame [m].
-        """
-        normals, incidence = faces(points, origin)
-        near = incidence < OBLIQUE
-        angles = np.arctan2(normals[near, 1], normals[near, 0]) + keyframe_T_robot.theta
-        self._glimpses.append(_Glimpse(keyframe, keyframe_T_robot.transform(points[near]), angles))
+    def glimpse(self, glimpse: Glimpse) -> None:
+        """Take note of the surfaces that a scan met."""
+        self._glimpses.append(glimpse)
 
     def update(self, keyframes: Sequence[Keyframe], evidence: EvidenceGrid, *, moved: bool) -> FloatArray:
         """Take in what was seen since, and find the panes.
@@ -119,13 +96,16 @@ class Panes:
             The panes that are new, gone or of another length, as they were and as they are, shape (n, 2, 2).
         """
         if moved:
-            self._met, self._taken = _MetCells(self._resolution), 0
-        for glimpse in self._glimpses[self._taken :]:
-            pose = keyframes[glimpse.keyframe].pose
-            self._met.add(pose.transform(glimpse.points), glimpse.angles + pose.theta)
-        self._taken = len(self._glimpses)
-        self._suspect(evidence.crossed)
-        if not len(self._places):
+            self._met.clear()
+        new = self._glimpses[len(self._met) :]
+        self._met.add(new, [keyframes[glimpse.keyframe].pose for glimpse in new])
+        # What was met near its normal, and scans went through it all the same.
+        places, normals = self._met.near_normal(*evidence.crossed(SOLID), OBLIQUE)
+        self._places = np.concatenate((self._places, places))
+        self._normals = np.concatenate((self._normals, normals))
+        doubted = self._in_question()
+        self._asked = np.concatenate((self._asked, np.setdiff1d(doubted, self._asked)))
+        if not len(self._asked):
             return self.segments[:0]
         for keyframe in keyframes:
             self._ask(keyframe)
@@ -138,22 +118,24 @@ class Panes:
         new = [line for line, old in zip(found, kept, strict=True) if old is None]
         return np.array(gone + new).reshape(-1, 2, 2)
 
-    def _suspect(self, crossed: Callable[[FloatArray, float], BoolArray]) -> None:
-        """Add the places that were met near their normal and that scans went through all the same."""
-        places = self._met.places
-        names = self._met.names
-        new = [i for i in np.flatnonzero(crossed(places, SOLID)).tolist() if names[i] not in self._suspected]
-        self._suspected |= {names[i] for i in new}
-        self._places = np.concatenate((self._places, places[new]))
-        self._normals = np.concatenate((self._normals, self._met.normals(new)))
+    def _in_question(self) -> IntArray:
+        """List the places that could be on a pane, or where one could go on: few are so many side by side."""
+        reach = FARTHEST + FRAME
+        near = np.zeros(len(self._places), dtype=np.bool_)
+        for group in _touching(self._places, self._resolution) if len(near) else []:
+            low, high = group.min(axis=0), group.max(axis=0)
+            if len(group) >= FEWEST and math.dist(low, high) >= LENGTH:
+                near |= ((self._places > low - reach) & (self._places < high + reach)).all(axis=1)
+        return np.flatnonzero(near)
 
     def _ask(self, keyframe: Keyframe) -> None:
         """Bring up to date what a keyframe says about the places."""
         said = self._said.get(keyframe.index)
         count = 0 if said is None or said.pose != keyframe.pose else len(said.codes)
-        if count == len(self._places):
+        new = self._asked[count:]
+        if not len(new):
             return
-        codes = self._codes(keyframe, self._places[count:], self._normals[count:])
+        codes = self._codes(keyframe, self._places[new], self._normals[new])
         if said is not None and count:
             codes = np.concatenate((said.codes, codes))
         self._said[keyframe.index] = _Said(keyframe.pose, codes)
@@ -194,15 +176,18 @@ class Panes:
         return codes
 
     def _find(self, grid: OccupancyGrid) -> FloatArray:
-        said = np.stack([said.codes for said in self._said.values()])
+        # In the order in which they were met, not in that in which they were asked about.
+        order = np.argsort(self._asked)
+        places, normals = self._places[self._asked[order]], self._normals[self._asked[order]]
+        said = np.stack([said.codes for said in self._said.values()])[:, order]
         codes = (HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE)
         hit, askew, past, through = (np.count_nonzero(said == code, axis=0) for code in codes)
         hit = np.maximum(hit, 1)  # a glimpse between two keyframes at least
         glass = (past <= DOUBT * hit) & (through >= SEEN_THROUGH) & (askew <= DOUBT * through)
         no_pane = (past > 1) & (past > hit)
-        lines = _lines(self._places[glass], self._normals[glass], self._resolution)
-        may_be = self._places[~no_pane & (through >= SEEN_THROUGH)]
-        segments = [self._extended(line, grid, self._places[no_pane], may_be) for line in lines]
+        lines = _lines(places[glass], normals[glass], self._resolution)
+        may_be = places[~no_pane & (through >= SEEN_THROUGH)]
+        segments = [self._extended(line, grid, places[no_pane], may_be) for line in lines]
         return np.array(segments).reshape(-1, 2, 2)
 
     @staticmethod
@@ -226,43 +211,6 @@ class Panes:
                     solid = float(t)
             ends.append(end + (solid + MARGIN) * direction)
         return np.array(ends)
-
-
-class _MetCells:
-    """Cells in which surfaces were met near their normal, with those normals."""
-
-    def __init__(self, resolution: float) -> None:
-        self._resolution = resolution
-        self._rows: dict[tuple[int, int], int] = {}
-        self.names: list[tuple[int, int]] = []
-        # Of each cell: sum of x, of y, of the doubled angle's cosine and sine, and how many.
-        self._sums: FloatArray = np.zeros((256, 5))
-
-    def add(self, points: FloatArray, angles: FloatArray) -> None:
-        """Count points, shape (n, 2) [m], of surfaces whose normals have these angles, shape (n,) [rad]."""
-        cells = np.floor(points / self._resolution).astype(np.int64)
-        names = list(map(tuple, cells.tolist()))
-        for name in names:
-            if name not in self._rows:
-                self._rows[name] = len(self.names)
-                self.names.append(name)
-        while len(self._sums) < len(self.names):
-            self._sums = np.concatenate((self._sums, np.zeros_like(self._sums)))
-        rows = np.array([self._rows[name] for name in names], dtype=np.int64)
-        values = np.column_stack((points, np.cos(2.0 * angles), np.sin(2.0 * angles), np.ones(len(points))))
-        np.add.at(self._sums, rows, values)
-
-    @property
-    def places(self) -> FloatArray:
-        """Mean place in each cell, shape (n, 2) [m]."""
-        sums = self._sums[: len(self.names)]
-        result: FloatArray = sums[:, :2] / sums[:, 4:]
-        return result
-
-    def normals(self, rows: Sequence[int]) -> FloatArray:
-        """Mean unit normals of some cells, of either sign, shape (n, 2)."""
-        half = np.arctan2(self._sums[rows, 3], self._sums[rows, 2]) / 2.0
-        return np.column_stack((np.cos(half), np.sin(half)))
 
 
 def _lines(places: FloatArray, normals: FloatArray, resolution: float) -> list[FloatArray]:
@@ -299,7 +247,7 @@ def _touching(places: FloatArray, resolution: float) -> list[FloatArray]:
 
 def _line(places: FloatArray) -> FloatArray | None:
     """Draw the line through places, where they are in line, dense and long enough."""
-    if len(places) < 4:
+    if len(places) < FEWEST:
         return None
     middle = places.mean(axis=0)
     _, spread, axes = np.linalg.svd(places - middle, full_matrices=False)

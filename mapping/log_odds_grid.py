@@ -170,15 +170,17 @@ class EvidenceGrid:
         self._grid = OccupancyGrid(self._lattice.frame, cells)
         return self._grid
 
-    def crossed(self, points: FloatArray, apart: float) -> BoolArray:
-        """Check which places scans went through although a surface was seen there, shape (n,).
+    def crossed(self, apart: float) -> tuple[int, int, BoolArray]:
+        """Mark the cells that scans went through, whether or not a surface was seen there.
 
         The noise of a wall is crossed, too: what is within ``apart`` [m] of a surface that is not crossed does not
         count. Only what the last :meth:`grid` drew is looked at.
 
         Args:
-            points: Map frame, shape (n, 2) [m].
             apart: Reach of the noise of a surface [m].
+
+        Returns:
+            First row and column of the window that was drawn, on the lattice, and its cells.
         """
         row, col, n_rows, n_cols = self._redrawn
         hits, misses = (a[row : row + n_rows, col : col + n_cols] for a in (self._hits, self._misses))
@@ -186,11 +188,7 @@ class EvidenceGrid:
         span = 2 * math.ceil(apart / self._lattice.resolution) + 1
         solid = ((hits > 0) & ~through).astype(np.uint8)
         through &= cv2.dilate(solid, np.ones((span, span), dtype=np.uint8)) == 0
-        rows, cols = self._lattice.cells(points)
-        rows, cols = rows - row, cols - col
-        result = (rows >= 0) & (rows < n_rows) & (cols >= 0) & (cols < n_cols)
-        result[result] = through[rows[result], cols[result]]
-        return result
+        return row + self._lattice.row0, col + self._lattice.col0, through
 
     def _probabilities(self, hits: int, misses: int) -> CellArray:
         """Tabulate the probability in percent for each number of hits (rows) and misses (columns): it is quicker."""

@@ -25,6 +25,7 @@ from closedrooms.mapping.mapping_events import Event, EventLog
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.relocalisation import relocalise
 from closedrooms.mapping.matching.scan_matcher import ADVANTAGE, Match, match_scan
+from closedrooms.mapping.met_surfaces import Glimpse
 from closedrooms.mapping.motion import UncertainMotion
 from closedrooms.mapping.motion_prediction import MotionPrediction, PredictedStep
 from closedrooms.mapping.scan_preparation import PreparedScan
@@ -87,6 +88,11 @@ class Mapper:
     def edges(self) -> Sequence[Edge]:
         """The constraints between the keyframes."""
         return self._graph.graph.edges
+
+    @property
+    def panes(self) -> FloatArray:
+        """Panes of glass found so far, map frame, shape (n, 2, 2) [m]."""
+        return self._panes.segments
 
     @property
     def events(self) -> tuple[Remark, ...]:
@@ -156,7 +162,7 @@ class Mapper:
             points = hit_points(scan, max_range=GLIMPSE_RANGE, motion=motion)
             origin = np.array(scan.robot_T_sensor[:2])
         self._glimpsed = self._pose
-        self._panes.glimpse(latest.index, keyframe_T_robot, points, origin)
+        self._panes.glimpse(Glimpse(latest.index, keyframe_T_robot, points, origin))
 
     def _sweep_motion(self, scan: LaserScan, odometry: Pose2 | None) -> SweepMotion | None:
         """Find how the robot moved while a sweep was taken, ``None`` where that does not matter or is not known."""

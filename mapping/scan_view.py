@@ -5,7 +5,7 @@ import math
 import cv2
 import numpy as np
 
-from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.mapping.beams import Beams
 
 LATERAL = 0.12
@@ -71,48 +71,43 @@ class View:
         return result
 
 
-def faces(points: FloatArray, origin: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Find the direction in which the surface at each point of a scan faces, and the angle at which it was met.
+def faces(points: FloatArray, at: IntArray, towards: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Find the direction in which the surface at some points of scans faces, and the angle at which it was met.
 
     Args:
-        points: In beam order, robot frame, shape (n, 2) [m].
-        origin: The sensor, robot frame, ``(x, y)`` [m].
+        points: In beam order, robot frame, shape (n, 2) [m]; between one scan and the next stands a row of NaN.
+        at: Which of them, shape (k,).
+        towards: From the sensor to each of these, shape (k, 2) [m].
 
     Returns:
-        Unit normals, robot frame, shape (n, 2), of either sign, NaN where too little is seen; incidence against them,
-        shape (n,) [rad], 0 to a right angle.
+        Unit normals, robot frame, shape (k, 2), of either sign, NaN where too little is seen; incidence against them,
+        shape (k,) [rad], 0 to a right angle.
     """
-    count = len(points)
-    normals = np.full((count, 2), np.nan)
-    incidence = np.full(count, np.nan)
-    if count < 3:
-        return normals, incidence
-    low, high = _stretches(points)
-    middle = points.mean(axis=0)
-    local = points - middle
-    terms = np.column_stack((local, local[:, 0] ** 2, local[:, 1] ** 2, local[:, 0] * local[:, 1]))
-    sums = np.concatenate((np.zeros((1, 5)), np.cumsum(terms, axis=0)))
-    number = (high - low).astype(np.float64)
-    x, y, xx, yy, xy = ((sums[high] - sums[low]) / number[:, None]).T
-    xx, yy, xy = xx - x * x, yy - y * y, xy - x * y
+    local, on_surface = _stretches(points, at)
+    number = on_surface.sum(axis=1)
+    x, y = np.moveaxis(np.where(on_surface[:, :, None], local, 0.0), 2, 0)
+    sums = np.stack([terms.sum(axis=1) for terms in (x, y, x * x, y * y, x * y)])
+    mean_x, mean_y, xx, yy, xy = sums / number
+    xx, yy, xy = xx - mean_x * mean_x, yy - mean_y * mean_y, xy - mean_x * mean_y
     along = 0.5 * np.arctan2(2.0 * xy, xx - yy)
     spread = np.hypot((xx - yy) / 2.0, xy)
     # The larger of the two variances must clearly be so: else it is a blob, or a corner.
     clear = (number >= 5) & ((xx + yy) / 2.0 - spread < 0.1 * ((xx + yy) / 2.0 + spread))
-    towards = points - origin
     across = np.column_stack((-np.sin(along), np.cos(along)))
     met = np.abs((towards * across).sum(axis=1)) / np.maximum(np.hypot(*towards.T), 1e-9)
-    normals[clear] = across[clear]
-    incidence[clear] = np.arccos(np.minimum(met, 1.0))[clear]
-    return normals, incidence
+    incidence = np.arccos(np.minimum(met, 1.0))
+    return np.where(clear[:, None], across, np.nan), np.where(clear, incidence, np.nan)
 
 
-def _stretches(points: FloatArray) -> tuple[IntArray, IntArray]:
-    """Bound the neighbours of each point, on its own surface: indices from the first up to before the second."""
-    count = len(points)
-    number = np.arange(count)
-    new = np.concatenate(([True], np.hypot(*np.diff(points, axis=0).T) > FACE_GAP))
-    begins = np.flatnonzero(new)
-    of = np.cumsum(new) - 1
-    ends = np.append(begins[1:], count)
-    return np.maximum(begins[of], number - FACE_REACH), np.minimum(ends[of], number + FACE_REACH + 1)
+def _stretches(points: FloatArray, at: IntArray) -> tuple[FloatArray, BoolArray]:
+    """Collect the neighbours of points, from those, shape (k, m, 2), and mark those on the same surface, (k, m)."""
+    steps = np.arange(-FACE_REACH, FACE_REACH + 1)
+    places = at[:, None] + steps
+    local = points[np.clip(places, 0, len(points) - 1)]
+    # From each neighbour to the next, further out: where that is too far, the surface has ended.
+    joined = np.hypot(*np.moveaxis(np.diff(local, axis=1), 2, 0)) <= FACE_GAP
+    on_surface = np.ones(places.shape, dtype=np.bool_)
+    on_surface[:, FACE_REACH + 1 :] = np.logical_and.accumulate(joined[:, FACE_REACH:], axis=1)
+    on_surface[:, :FACE_REACH] = np.logical_and.accumulate(joined[:, FACE_REACH - 1 :: -1], axis=1)[:, ::-1]
+    on_surface &= (places >= 0) & (places < len(points))
+    return local - points[at][:, None], on_surface

@@ -14,7 +14,6 @@ from shapely.geometry.base import BaseGeometry
 from closedrooms.core.arrays import CellArray, handed_over
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.grey_png import encode_greys
 from closedrooms.core.files.map_picture import picture_path, read_picture
 from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.files.yaml_text import parse_yaml
@@ -114,8 +113,14 @@ def write_raw_map(stem: Path, grid: OccupancyGrid, *, map_T_grid: Pose2 = IDENTI
 
 def _write(stem: Path, grid: OccupancyGrid, shades: npt.NDArray[np.uint8], mode: str, map_T_grid: Pose2) -> None:
     """Write the picture, whose greys are the ``shades`` of the cells' bytes, and the YAML of a map."""
+    import cv2
+
     frame, picture = grid.frame, stem.with_name(stem.name + ".png")
-    write_bytes(picture, encode_greys(grid.cells[::-1].view(np.uint8), shades))
+    pixels = cv2.LUT(np.ascontiguousarray(grid.cells[::-1].view(np.uint8)), shades)
+    # Runs of one grey are what a map is made of.
+    settings = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE]
+    settings += [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
+    write_bytes(picture, cv2.imencode(".png", pixels, settings)[1].tobytes())
     x, y, yaw = frame.origin_x, frame.origin_y, 0.0
     if map_T_grid != IDENTITY:
         x, y, yaw = (map_T_grid @ Pose2(x, y)).as_tuple()

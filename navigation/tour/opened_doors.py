@@ -4,12 +4,18 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+import numpy as np
+import shapely
+
+from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import ClosedDoor, DoorSighting
 from closedrooms.core.grid import UNKNOWN, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.core.shapes import mark_doorways
+from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.config import MapperConfig
+from closedrooms.mapping.glass import before_glass
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
 from closedrooms.navigation.control_loop import MapMaker
@@ -26,6 +32,10 @@ class KeyframeMap(MapMaker, Protocol):
     def keyframes(self) -> Sequence[Keyframe]:
         """The scans that make the map, oldest first."""
 
+    @property
+    def panes(self) -> FloatArray:
+        """Panes of glass found so far, map frame, shape (n, 2, 2) [m]: nothing behind them is mapped."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Opening:
@@ -35,13 +45,13 @@ class _Opening:
         doors: The doors.
         first: Number of keyframes before.
         since: Evidence of the later ones.
-        drawn: Where these had their poses when they were counted in, by their index.
+        drawn: What of these was counted in, at which poses, and before which panes, by their index.
     """
 
     doors: tuple[ClosedDoor, ...]
     first: int
     since: EvidenceGrid
-    drawn: dict[int, Pose2] = field(default_factory=dict)
+    drawn: dict[int, tuple[Beams, Pose2, FloatArray]] = field(default_factory=dict)
 
 
 class ReopenedMap:
@@ -99,11 +109,22 @@ class ReopenedMap:
         return OccupancyGrid(grid.frame, cells)
 
     def _draw(self, opening: _Opening) -> None:
-        """Count in the keyframes since doors opened, where the mapper has them now."""
+        """Count in the keyframes since doors opened, where the mapper has them now and up to the panes it found."""
+        panes = _outside(self._mapper.panes, opening.doors)
         for keyframe in self._mapper.keyframes[opening.first :]:
             drawn = opening.drawn.get(keyframe.index)
-            if drawn != keyframe.pose:
-                if drawn is not None:
-                    opening.since.add(keyframe.beams, drawn, sign=-1)
-                opening.since.add(keyframe.beams, keyframe.pose)
-                opening.drawn[keyframe.index] = keyframe.pose
+            if drawn is not None and drawn[1] == keyframe.pose and np.array_equal(drawn[2], panes):
+                continue
+            if drawn is not None:
+                opening.since.add(drawn[0], drawn[1], sign=-1)
+            shown = before_glass(keyframe.beams, keyframe.pose, panes)
+            opening.since.add(shown, keyframe.pose)
+            opening.drawn[keyframe.index] = (shown, keyframe.pose, panes)
+
+
+def _outside(panes: FloatArray, doors: Sequence[ClosedDoor]) -> FloatArray:
+    """Leave out the panes that stand in the doorways of doors: a leaf of glass has gone with its door."""
+    leaves = shapely.union_all([shapely.LineString(door.segment) for door in doors if door.segment is not None])
+    if leaves.is_empty or not len(panes):
+        return panes
+    return panes[shapely.distance(shapely.points(panes.mean(axis=1)), leaves) > LEAF_REACH]

@@ -127,7 +127,7 @@ def test_a_view_tells_how_far_beams_went_beyond_a_place(office: SegmentWorld, la
 
 def test_faces_of_a_wall_point_across_it(office: SegmentWorld) -> None:
     beams = clean(office.scan(Pose2(10.0, 1.0, 0.0), beams=720), max_range=25.0)
-    normals, incidence = faces(beams.points, beams.origin)
+    normals, incidence = faces(beams.points, np.arange(len(beams.points)), beams.points - beams.origin)
     on_wall = (np.abs(beams.points[:, 1] - 1.0) < 0.01) & (np.abs(beams.points[:, 0]) < 1.5)
     assert on_wall.sum() > 50
     assert np.abs(normals[on_wall, 1]) == pytest.approx(1.0, abs=1e-3)

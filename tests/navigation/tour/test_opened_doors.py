@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.pose import Pose2
@@ -92,3 +93,17 @@ def test_all_but_the_doorways_stays_as_the_mapper_has_it() -> None:
     assert (np.abs(points[:, 0] - 2.5) <= 0.45).all()
     assert (np.abs(points[:, 1] - 1.0) <= 0.30).all()
     assert np.array_equal(ReopenedMap(mapper, []).grid().cells, theirs.cells)
+
+
+@pytest.mark.parametrize(("y", "is_open"), [(0.5, False), (1.0, True)])
+def test_a_pane_hides_the_doorway_behind_it_but_a_leaf_of_glass_went_with_its_door(y: float, is_open: bool) -> None:
+    class AmongGlass(Mapper):
+        panes = np.array([[[-3.0, y], [8.0, y]]])
+
+    mapper = AmongGlass()
+    stamp = _drive(mapper, np.arange(0.0, 5.0, 0.2), [*WALLS, LEAF], 0.0)
+    reopened = ReopenedMap(mapper, [DOOR])
+    _drive(mapper, np.arange(5.0, 0.0, -0.2), [*WALLS, *ROOM], stamp)
+    cells = _leaf_cells(reopened.grid(), 0.03)
+    known = np.mean(cells >= 0)
+    assert known == 1.0 if is_open else known < 0.2
