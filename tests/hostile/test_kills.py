@@ -14,7 +14,7 @@ import pytest
 
 SERVED = [sys.executable, "-m", "closedrooms.cli"]
 MOMENTS = int(os.environ.get("CLOSEDROOMS_MOMENTS", "3"))
-# What the command itself may take is 2 s, which an idle machine is asked for (CLOSEDROOMS_PATIENCE=2); where twenty other
+# What the command itself may take is 2 s, which an idle machine is asked for (CLOSEDROOMS_PATIENCE=2); where twenty
 # processes want the processor it took 5 s, and one that hangs is found all the same [s].
 PATIENCE = float(os.environ.get("CLOSEDROOMS_PATIENCE", "60"))
 HANG_UP = 1 << (signal.SIGHUP - 1)
