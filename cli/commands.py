@@ -6,8 +6,11 @@ on SIGTERM. Heavy libraries are imported by the command that needs them, so that
 
 import contextlib
 import json
+import logging
 import os
+import shutil
 import sys
+import warnings
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -27,6 +30,8 @@ from closedrooms.core.runtime.stopping import (
 )
 
 DONE, BAD_INPUT, WRONG_USAGE, PARTLY_FAILED, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
+# Help is not broken into narrower lines: what lays it out tries ever more below some ten columns, without end.
+NARROWEST = 20
 # Failures that are named on the terminal; the rest stands in files.
 MOST_NAMED = 10
 
@@ -69,6 +74,14 @@ def _own_process() -> None:
             name = ("stdin", "stdout", "stderr")[descriptor]
             setattr(sys, name, os.fdopen(descriptor, mode, closefd=False))
     end_in_time(SIGNALS, _leave)
+    if not sys.warnoptions:
+        # What there is to say of an input we say ourselves. Workers inherit the option.
+        sys.warnoptions.append("ignore")
+        warnings.simplefilter("ignore")
+    # Pictures are drawn into files, whatever the user's own plots are drawn with; where their library may keep nothing
+    # at home it has a place of its own, and no need to say so.
+    os.environ["MPLBACKEND"] = "agg"
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     # `python -m` looks for modules in the current directory first, and workers inherit where to look.
     if not sys.flags.safe_path and sys.path and sys.path[0] in {"", _here()}:
         del sys.path[0]
@@ -102,9 +115,9 @@ def _status(words: list[str], stop: Stop) -> int:
         if not stop:
             _complain(str(error))
             return BAD_INPUT
-    except MemoryError:
+    except MemoryError as error:
         if not stop:
-            _complain("more memory than there is; expected smaller input, or settings that ask for less")
+            _complain(reason(error))
             return BAD_INPUT
     except KeyboardInterrupt:
         stop.number = stop.number or INTERRUPTED - 128
@@ -126,6 +139,8 @@ def _last_words(number: int) -> str:
 
 
 def _main(words: Sequence[str]) -> int:
+    if shutil.get_terminal_size().columns < NARROWEST:
+        os.environ["COLUMNS"] = str(NARROWEST)
     if words[:1] == ["--version"]:
         from importlib.metadata import version
 

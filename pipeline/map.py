@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from closedrooms.core.errors import blaming
 from closedrooms.core.files.geojson import write_doors
 from closedrooms.core.files.output_folders import check_output_folder, output_folder
 from closedrooms.core.files.rosmap import write_map
@@ -69,7 +70,7 @@ def map_log(config: MapConfig, *, progress: Progress | None = None) -> Report:
             progress.advance(number + 1, f"{number + 1} of {len(run.scans)} scans")
             log_watch(number, map_T_robot, mapper)
 
-        with watch.stage("map"):
+        with watch.stage("map"), blaming(config.log):
             built = build_map(run, config.mapper, watch=step)
         log_watch.finish(built)
         with watch.stage("write"):

@@ -1,6 +1,5 @@
 """``summary.png``: one look at a run, a prediction or a tour."""
 
-import io
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -25,6 +24,8 @@ if TYPE_CHECKING:
 
 # Size of one panel, of the strip with its title, and of the gap between panels [pixels].
 PANEL, TITLE, GAP = 900, 40, 14
+# Size of a title's letters, and from one of its lines to the next [pixels].
+LETTERS, LINE = 22, 28
 # A room lower than this has its name and figure on one line [pixels].
 TWO_LINES = 44
 # Opacity of a room that is not sure at all and of one that is sure; how sure a room counts of which nothing is known.
@@ -231,23 +232,43 @@ def _canvas(bounds: Bounds) -> "Canvas":
 
 def _write(path: Path, panels: Sequence[Panel]) -> None:
     """Write panels in the grid nearest to the shape of a screen, each under its title, as PNG."""
+    import cv2
     from PIL import Image, ImageDraw
 
     from closedrooms.visualization.canvas import font
 
-    height, width = panels[0][1].shape[:2]
+    titles, widest = _wrapped([title for title, _ in panels], panels[0][1].shape[1])
+    height, width = panels[0][1].shape[0], max(panels[0][1].shape[1], widest)
+    strip = TITLE + LINE * (max(len(lines) for lines in titles) - 1)
     cols = min(
         range(1, len(panels) + 1),
-        key=lambda n: abs(math.log(n * width / (math.ceil(len(panels) / n) * (height + TITLE)) / 1.4)),
+        key=lambda n: abs(math.log(n * width / (math.ceil(len(panels) / n) * (height + strip)) / 1.4)),
     )
     rows = math.ceil(len(panels) / cols)
-    step_x, step_y = width + GAP, height + TITLE + GAP
+    step_x, step_y = width + GAP, height + strip + GAP
     image = Image.new("RGB", (cols * step_x + GAP, rows * step_y + GAP), "white")
     draw = ImageDraw.Draw(image)
-    for number, (title, pixels) in enumerate(panels):
+    for number, (lines, (_, pixels)) in enumerate(zip(titles, panels, strict=True)):
         x, y = GAP + number % cols * step_x, GAP + number // cols * step_y
-        draw.text((x + 2, y + TITLE / 2), shown(title), fill=colours.INK, font=font(22), anchor="lm")
-        image.paste(Image.fromarray(pixels), (x, y + TITLE))
-    data = io.BytesIO()
-    image.save(data, format="PNG", compress_level=6)
-    write_bytes(path, data.getvalue())
+        for line, text in enumerate(lines):
+            at = (x + 2, y + TITLE / 2 + LINE * line)
+            draw.text(at, text, fill=colours.INK, font=font(LETTERS), anchor="lm")
+        image.paste(Image.fromarray(pixels), (x, y + strip))
+    # A third of the time that Pillow takes, for a tenth more bytes.
+    settings = [cv2.IMWRITE_PNG_COMPRESSION, 3, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
+    write_bytes(path, cv2.imencode(".png", np.asarray(image)[..., ::-1], settings)[1].tobytes())
+
+
+def _wrapped(titles: Sequence[str], width: int) -> tuple[list[list[str]], int]:
+    """Break titles into lines that fit a width [pixels]; also returns the width of the widest line."""
+    from closedrooms.visualization.canvas import font
+
+    length = font(LETTERS).getlength
+    wrapped = []
+    for title in titles:
+        lines: list[str] = []
+        for word in shown(title).split() or [""]:
+            longer = f"{lines[-1]} {word}" if lines else word
+            lines[-1:] = [longer] if not lines or length(longer) <= width - 2 else [lines[-1], word]
+        wrapped.append(lines)
+    return wrapped, math.ceil(max(length(line) for lines in wrapped for line in lines)) + 2

@@ -32,8 +32,8 @@ class MapLayers:
 
     def draw_map(self) -> None:
         """Draw the map below all else and show what is known of it."""
-        self._board.picture("map", *paint_map(self._session.sheet.read.grid))
         self.show_all()
+        self._board.picture("map", *paint_map(self._session.sheet.read.grid))
 
     def show_all(self) -> None:
         """Fit the view to what is known and to the rooms that are predicted, with some room around them."""

@@ -25,6 +25,13 @@ GeoFeature = tuple[BaseGeometry, dict[str, Any]]
 MAX_FEATURES = 1_000_000
 # Other shapes of one room that are read; three are written.
 MAX_ALTERNATIVES = 100
+# Properties that editors and drivers spell in capitals (shapefiles, GDAL), by how they are spelt here.
+SPELT = ("id", "state", "width")
+# Doors wider than this are no doors, but are often in centimetres [m].
+ODD_WIDTH = 10.0
+# Several doors that all lie within this are in degrees, or all in one place by mistake [m].
+ONE_PLACE = 0.05
+DEGREES = ("CRS84", "4326", "4979", "WGS84", "WGS 84")
 # How deep the lists of coordinates of each geometry are, above the positions.
 LISTS = {"Point": 0, "LineString": 1, "MultiPoint": 1, "Polygon": 2, "MultiLineString": 2, "MultiPolygon": 3}
 
@@ -77,6 +84,8 @@ def read_features(
     if data.get("units", "m") != "m":
         raise InvalidInputError(f"units {repr_of(data['units'])}", expected="metres in the map frame ('m')", where=path)
     check_count(len(features), MAX_FEATURES, "features", path)
+    if remarks is not None:
+        remarks += _frame_remarks(data)
     null = sum(isinstance(f, dict) and f.get("geometry", f) is None for f in features)
     if null == len(features) > 0:
         raise InvalidInputError(f"{null} features without a geometry (null)", expected=what, where=path)
@@ -89,6 +98,19 @@ def read_features(
             for number, feature in enumerate(features)
             if not (isinstance(feature, dict) and feature.get("geometry", feature) is None)
         ]
+
+
+def _frame_remarks(data: dict[str, Any]) -> list[Remark]:
+    """Say which other frame a file claims, while its coordinates are taken as metres in the map frame."""
+    frame = data.get("frame", "map")
+    claims = [] if frame == "map" else [f"frame {repr_of(frame)}"]
+    system = data.get("crs")
+    named = system.get("properties") if isinstance(system, dict) else None
+    system = shown((named.get("name") if isinstance(named, dict) else system) or "", longest=60)
+    # The editor's default for a layer whose maker did not choose one.
+    claims += [f"crs {system} (degrees)"] if any(name in system.upper() for name in DEGREES) else []
+    why = "taken as metres in the map frame"
+    return [Remark(action="guessed", what="coordinates", why=f"the file says {claim}; {why}") for claim in claims]
 
 
 def _features(data: Any) -> list[Any] | None:
@@ -106,9 +128,7 @@ def _features(data: Any) -> list[Any] | None:
 def _read_feature(number: int, feature: Any, path: Path) -> GeoFeature:
     """Read the geometry and the properties of one feature of an untrusted file."""
     try:
-        geometry = feature["geometry"]
-        _check_positions(geometry["coordinates"], LISTS[geometry["type"]])
-        made = shape(geometry)
+        made = _geometry(feature["geometry"])
         properties = feature.get("properties") or {}
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, shapely.errors.ShapelyError) as error:
         raise InvalidInputError(
@@ -122,13 +142,33 @@ def _read_feature(number: int, feature: Any, path: Path) -> GeoFeature:
         )
     if made.is_empty:
         raise InvalidInputError(f"feature {number} is empty", expected="a geometry in metres", where=path)
+    low = {str(key).lower(): value for key, value in properties.items()}
+    properties = {**properties, **{key: low[key] for key in SPELT if key in low and key not in properties}}
     if properties.get("id") is None and feature.get("id") is not None:
         properties = {**properties, "id": feature["id"]}
     return made, properties
 
 
-def _check_positions(value: Any, depth: int) -> None:
-    """Check that coordinates are lists as deep as their geometry wants, and numbers at the bottom.
+def _geometry(given: Any) -> BaseGeometry:
+    """Make a geometry in the plane, without the heights of its positions; a collection of one kind is its Multi form.
+
+    Raises:
+        ValueError: A collection of several kinds, and see :func:`_positions`.
+    """
+    if given["type"] != "GeometryCollection":
+        return shape({"type": given["type"], "coordinates": _positions(given["coordinates"], LISTS[given["type"]])})
+    parts = [shape({**part, "coordinates": _positions(part["coordinates"], LISTS[part["type"]])})
+             for part in given["geometries"]]  # fmt: skip
+    kinds = {part.geom_type for part in parts}
+    if len(kinds) != 1 or not kinds <= {"Point", "LineString", "Polygon"}:
+        raise ValueError("a collection of several kinds")
+    joined: dict[str, Any] = {"Point": MultiPoint, "LineString": MultiLineString, "Polygon": MultiPolygon}
+    made: BaseGeometry = joined[kinds.pop()](parts)
+    return made
+
+
+def _positions(value: Any, depth: int) -> list[Any]:
+    """Take x and y of coordinates that are lists as deep as their geometry wants, and numbers at the bottom.
 
     Raises:
         ValueError: They are not: shapely would take some of them for something else.
@@ -136,10 +176,10 @@ def _check_positions(value: Any, depth: int) -> None:
     if not isinstance(value, list):
         raise ValueError("no list")
     if depth > 0:
-        for part in value:
-            _check_positions(part, depth - 1)
-    elif value and not (2 <= len(value) <= 4 and all(is_number(v) and -FARTHEST <= v <= FARTHEST for v in value)):
+        return [_positions(part, depth - 1) for part in value]
+    if value and not (2 <= len(value) <= 4 and all(is_number(v) and -FARTHEST <= v <= FARTHEST for v in value)):
         raise ValueError("no position")
+    return value[:2]
 
 
 def write_doors(path: Path, doors: Sequence[ClosedDoor]) -> None:
@@ -188,9 +228,27 @@ def read_doors(path: Path, *, remarks: list[Remark] | None = None) -> list[Close
         told.append(
             Remark(action="dropped", what=noun, why="the file says open", names=tuple(opened), count=len(opened))
         )
+    told += _odd_sizes(doors, path)
     if remarks is not None:
         remarks.extend(told)
     return doors
+
+
+def _odd_sizes(doors: Sequence[ClosedDoor], path: Path) -> list[Remark]:
+    """Warn of doors that are too wide for metres.
+
+    Raises:
+        InvalidInputError: Doors that all lie in one place, but not on one point.
+    """
+    places = np.array([door.midpoint for door in doors]).reshape(-1, 2)
+    spread = float(np.ptp(places, axis=0).max()) if len(places) else 0.0
+    if 0.0 < spread < ONE_PLACE:
+        raise InvalidInputError(
+            f"{len(doors)} doors within {spread:.2g} m (degrees?)", expected="metres in the map frame", where=path
+        )
+    wide = tuple(door.id for door in doors if door.width is not None and door.width > ODD_WIDTH)
+    why = f"above {ODD_WIDTH:g}; taken as metres (they look like centimetres)"
+    return [Remark(action="guessed", what="widths", why=why, names=wide, count=len(wide))] if wide else []
 
 
 def _parts(geometry: BaseGeometry) -> list[BaseGeometry]:
@@ -242,9 +300,19 @@ def _given_name(number: int, value: Any, path: Path) -> str | None:
     return str(value)
 
 
+def _width(value: Any) -> Any:
+    """Read a width, also of a column of texts; what is no number stays for the message."""
+    if not isinstance(value, str):
+        return value
+    try:
+        return float(value) if value.strip() else None
+    except ValueError:
+        return value
+
+
 def _door(name: str, geometry: BaseGeometry, properties: dict[str, Any], path: Path) -> ClosedDoor:
     """Make a door from its midpoint or its leaf, and what a file says of it."""
-    width = properties.get("width")
+    width = _width(properties.get("width"))
     if width is not None and not (is_number(width) and 0 < width <= WIDEST):
         raise InvalidInputError(
             f"door {name!r} of width {repr_of(width)}", expected=f"metres above 0, at most {WIDEST:g}", where=path

@@ -15,12 +15,16 @@ from closedrooms.core.files.incoming import is_file, opened, reading
 from closedrooms.core.names import shown
 
 WHAT = "a PGM or PNG map"
+GREYS = "greys or colours of 8 or 16 bits"
+MOST_SIXTEEN_BITS = 65_535
 # 20,000 x 20,000 cells are 1 km x 1 km at 0.05 m; a larger picture is refused before it is decoded.
 MAX_CELLS = 400_000_000
 # Pictures above the first number of cells have at most the second number of cells a byte: PNG shrinks blank paper up to
 # 1000 times (8000 at one bit a pixel), maps of buildings 20 to 300 times.
 UNSUSPICIOUS_CELLS, MAX_CELLS_A_BYTE = 30_000_000, 1000
 FORMATS = ("PNG", "PPM", "BMP", "TIFF", "JPEG", "GIF", "WEBP")
+# Rows that are copied at once.
+STRIP = 256
 SCHEME = re.compile(r"(?i)(file|package|model|https?)://")
 
 
@@ -107,7 +111,9 @@ def read_picture(path: Path) -> tuple[npt.NDArray[np.uint8], BoolArray | None]:
             # The other formats that Pillow knows start other programs (EPS) or hold no maps.
             with Image.open(file, formats=FORMATS) as image:
                 _check_size(image.size, os.fstat(file.fileno()).st_size, path)
-                return _greys(image)
+                if image.mode == "F":
+                    raise InvalidInputError("a picture of floating-point greys", expected=GREYS, where=path)
+                return _greys(image, path)
         except (OSError, SyntaxError, EOFError) as error:
             raise InvalidInputError("a picture that cannot be read", expected=WHAT, where=path) from error
 
@@ -122,18 +128,38 @@ def _check_size(size: tuple[int, int], file_bytes: int, path: Path) -> None:
         )
 
 
-def _greys(image: Any) -> tuple[npt.NDArray[np.uint8], BoolArray | None]:
+def _greys(image: Any, path: Path) -> tuple[npt.NDArray[np.uint8], BoolArray | None]:
     """Convert a picture to greys, 0 to 255, and where it is not transparent (``None`` where it cannot be)."""
     if "A" in image.getbands() or "transparency" in image.info:
         # By way of RGBA: of a palette with transparent colours Pillow makes no greys without a warning.
-        rgba = image.convert("RGBA")
-        return np.asarray(rgba.convert("L")), np.asarray(rgba)[..., 3] > 0
+        rgba = np.asarray(image.convert("RGBA"))
+        return _mean_of_colours(rgba[..., :3]), rgba[..., 3] > 0
     if image.mode in {"I", "I;16", "I;16B", "I;16L"}:
-        return _sixteen_bits(image), None
-    return np.asarray(image if image.mode == "L" else image.convert("L")), None
+        return _sixteen_bits(image, path), None
+    if image.mode in {"L", "1", "LA"}:
+        return _copy(image if image.mode == "L" else image.convert("L")), None
+    return _mean_of_colours(np.asarray(image.convert("RGB"))), None
 
 
-def _sixteen_bits(image: Any) -> npt.NDArray[np.uint8]:
+def _copy(image: Any) -> npt.NDArray[np.uint8]:
+    """Copy a picture of greys, some rows at a time: at once Pillow holds the whole three times."""
+    width, height = image.size
+    # From the bottom up, as the cells of a grid lie.
+    greys = np.empty((height, width), dtype=np.uint8)
+    for top in range(0, height, STRIP):
+        low = min(top + STRIP, height)
+        greys[height - low : height - top] = np.asarray(image.crop((0, top, width, low)))[::-1]
+    return greys[::-1]
+
+
+def _mean_of_colours(colours: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    """Average red, green and blue, shape (..., 3), as map_server does: how bright eyes find a colour does not count."""
+    return np.asarray(np.rint(colours.sum(axis=-1, dtype=np.uint16) / 3.0), dtype=np.uint8)
+
+
+def _sixteen_bits(image: Any, path: Path) -> npt.NDArray[np.uint8]:
     """Convert greys of 16 bits to 8; values up to 255 are taken as they are."""
     values = np.asarray(image).astype(np.int64)
+    if values.max() > MOST_SIXTEEN_BITS or values.min() < 0:
+        raise InvalidInputError("a picture of greys beyond 16 bits", expected=GREYS, where=path)
     return (values >> 8 if values.max() > 255 else values).clip(0, 255).astype(np.uint8)

@@ -21,6 +21,15 @@ TICKS = 1e-7
 """Windows file-time ticks of MRPT's stamps [s]."""
 MRPT_RANGE = 80.0
 """Longest range of the SICK LMS that recorded them [m]."""
+NEAREST = 1e-3
+"""Shorter ranges are none: 0 and below mark beams without an answer, and no lidar measures a millimetre [m]."""
+FIELDS = {
+    "stamps", "ranges", "odometry", "truth", "angle_min", "angle_increment", "range_max", "robot_T_sensor", "sweep",
+    "odom", "ts", "sensor_xy",
+}  # fmt: skip
+"""Arrays that are read, ours and MRPT's."""
+REAL = "biuf"
+"""Kinds of arrays that hold real numbers (NumPy's letters)."""
 
 
 def write_scans(path: Path, run: RecordedRun, *, estimate: FloatArray | None = None, compressed: bool = True) -> None:
@@ -63,6 +72,10 @@ def read_scans(path: Path) -> RecordedRun:
         InvalidInputError: Broken, too large, with pickles, or with arrays missing or of other shapes.
     """
     arrays: dict[str, Any] = read_arrays(path, what=EXPECTED)
+    for name in FIELDS & arrays.keys():
+        # Cast to numbers they would be others: halves of complex ones, nanoseconds of dates, bytes of records.
+        if arrays[name].dtype.kind not in REAL:
+            raise InvalidInputError(f"array {name} of {arrays[name].dtype}", expected="real numbers", where=path)
     try:
         if "odometry" in arrays:
             return _ours(arrays, path)
@@ -133,6 +146,7 @@ def _run(
     if not usable.all():
         stamps, ranges, odometry = stamps[usable], ranges[usable], odometry[usable]
         reference = None if reference is None else np.asarray(reference)[usable]
+    ranges = np.where(ranges >= NEAREST, ranges, np.nan)
     stamps, backwards = forward(stamps)
     scans = tuple(
         LaserScan(row, geometry[0], geometry[1], geometry[2], stamp=float(stamp), robot_T_sensor=mount, sweep=sweep)

@@ -9,7 +9,9 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 
 LATE = 0.5
-"""Time [s] from the nearest odometry up to which a scan takes it as it is."""
+"""Time [s] from the nearest odometry from which what lies between two readings counts as a gap."""
+OUTSIDE = 0.1
+"""Time [s] up to which a scan before the first reading, or after the last, takes it as it is: some centimetres."""
 LONGEST_GAP = 5.0
 """Time without odometry [s] across which it is interpolated: it counts on while messages are lost."""
 SPEED, TURN_RATE = 2.0, math.pi
@@ -155,10 +157,11 @@ def _interpolated(track: FloatArray, stamp: float) -> tuple[tuple[float, float, 
     near = [i for i in (after - 1, after) if 0 <= i < len(track)]
     if not near:
         return None, False
-    late = min(abs(track[i, 0] - stamp) for i in near) > LATE
+    apart = min(abs(track[i, 0] - stamp) for i in near)
     if len(near) == 1:
         x, y, theta = track[near[0], 1:]
-        return (None if late else (float(x), float(y), float(theta))), False
+        return (None if apart > OUTSIDE else (float(x), float(y), float(theta))), False
+    late = apart > LATE
     (t0, x0, y0, a0), (t1, x1, y1, a1) = track[near]
     if late and t1 - t0 > LONGEST_GAP:
         return None, False

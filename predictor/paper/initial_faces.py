@@ -1,7 +1,7 @@
 """Doors on edges, the face behind each door, and splits between doors (paper, section 3.2)."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,10 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.predictor.paper.arrangement import Arrangement
 from closedrooms.predictor.paper.lines import Line
 from closedrooms.predictor.structure.doorways import FacingDoor
+
+# Doors, and lines between doors, that are no further apart are at one place [m]; lines that differ by less are parallel
+# [rad]: both are rounding, a cell has 0.05 m.
+SAME, PARALLEL = 1e-3, 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,7 +131,7 @@ def splits_between(arrangement: Arrangement, entrances: Sequence[Entrance]) -> l
     by_face: dict[int, list[Entrance]] = {}
     for entrance in entrances:
         by_face.setdefault(entrance.face, []).append(entrance)
-    lines: dict[tuple[float, float], Line] = {}
+    lines: list[Line] = []
     for unordered in by_face.values():
         if len(unordered) < 2:
             continue
@@ -140,10 +144,34 @@ def splits_between(arrangement: Arrangement, entrances: Sequence[Entrance]) -> l
         axis = along if spread[0] >= spread[1] else across
         places = np.sort(points @ axis)
         for low, high in itertools.pairwise(places):
-            if high - low > 1e-3:
-                line = _across(axis, (low + high) / 2.0)
-                lines[round(line.angle, 6), round(line.offset, 4)] = line
-    return [lines[key] for key in sorted(lines)]
+            if high - low > SAME:
+                lines.append(_across(axis, (low + high) / 2.0))
+    return _merge_same(lines)
+
+
+def _merge_same(lines: Sequence[Line]) -> list[Line]:
+    """Merge lines that differ by rounding, as two pairs of doors that face each other have them, into their mean.
+
+    By how far apart they are: numbers rounded alike would be other ones after a shift of the map.
+    """
+    merged = []
+    for alike in _chain(sorted(lines, key=lambda line: line.angle), lambda line: line.angle, PARALLEL):
+        for group in _chain(sorted(alike, key=lambda line: line.offset), lambda line: line.offset, SAME):
+            angle, offset = (float(np.mean([getattr(line, name) for line in group])) for name in ("angle", "offset"))
+            merged.append(Line(angle, offset, "split"))
+    return merged
+
+
+def _chain(lines: Sequence[Line], value: Callable[[Line], float], reach: float) -> Iterator[list[Line]]:
+    """Part lines, in the order of a value, where one is more than ``reach`` from the next."""
+    chain: list[Line] = []
+    for line in lines:
+        if chain and value(line) - value(chain[-1]) > reach:
+            yield chain
+            chain = []
+        chain.append(line)
+    if chain:
+        yield chain
 
 
 def _across(axis: FloatArray, place: float) -> Line:

@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray
-from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.errors import InvalidInputError, blaming
 from closedrooms.sim.config import SimConfig
 from closedrooms.sim.physics_world import PhysicsWorld
 from closedrooms.sim.robot.drive_calibration import calibrate_drive
@@ -30,7 +31,21 @@ def with_own_robot(config: SimConfig) -> SimConfig:
 
 
 def read_robot(config: SimConfig) -> tuple[SimConfig, RobotModel]:
-    """Find out how the robot of ``config.robot_urdf`` drives.
+    """Find out how the robot of ``config.robot_urdf`` drives; what is wrong with it names the file.
+
+    See :func:`_measure_robot`.
+
+    Raises:
+        InvalidInputError: See :func:`with_own_robot`.
+    """
+    path = config.robot_urdf
+    assert path is not None
+    with blaming(path):
+        return _measure_robot(config, path)
+
+
+def _measure_robot(config: SimConfig, path: Path) -> tuple[SimConfig, RobotModel]:
+    """Measure wheels, size, lidar and drive.
 
     The wheels are found by their joints or named; a short drive on an empty floor tells by how much the robot gets
     further and turns less than its wheels say (a skid steer slips at every turn).
@@ -41,8 +56,6 @@ def read_robot(config: SimConfig) -> tuple[SimConfig, RobotModel]:
     Raises:
         InvalidInputError: See :func:`with_own_robot`.
     """
-    path = config.robot_urdf
-    assert path is not None
     check_description(path)
     check_loads(path)
     with PhysicsWorld(stepped=True) as physics:

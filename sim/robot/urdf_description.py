@@ -73,10 +73,15 @@ def _check_tree(root: Any, path: Path) -> None:
 
 
 def check_loads(path: Path) -> None:
-    """Load the description in a process of its own: what is broken in a mesh may end the process."""
+    """Load the description in a process of its own: what is broken in a mesh may end the process.
+
+    Raises:
+        InvalidInputError: It does not load, or not in a minute.
+    """
     code = "import sys, pybullet as p; p.connect(p.DIRECT); p.loadURDF(sys.argv[1]); p.stepSimulation()"
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(path)], capture_output=True, timeout=LOADING, check=False, cwd=path.parent
-    )
-    if done.returncode != 0:
-        raise InvalidInputError("a description that PyBullet does not load", expected=WHAT, where=path)
+    # -P: no module is imported from the folder of the description.
+    words = [sys.executable, "-P", "-c", code, str(path.absolute())]
+    try:
+        subprocess.run(words, capture_output=True, timeout=LOADING, check=True, cwd=path.parent)
+    except subprocess.SubprocessError as error:
+        raise InvalidInputError("a description that PyBullet does not load", expected=WHAT, where=path) from error

@@ -14,6 +14,14 @@ def test_only_beams_that_ended_on_something_have_points() -> None:
     assert not scan.ranges.flags.writeable
 
 
+def test_end_points_lie_at_the_range_and_the_angle_of_their_beam() -> None:
+    ranges = np.array([1.0, 2.0, 0.5, 3.0, 4.0, 2.5])
+    scan = LaserScan(ranges, -2.8, 0.9, 10.0)
+    points = scan.points_sensor()
+    assert np.hypot(points[:, 0], points[:, 1]) == pytest.approx(ranges, abs=1e-12)
+    assert np.arctan2(points[:, 1], points[:, 0]) == pytest.approx([-2.8, -1.9, -1.0, -0.1, 0.8, 1.7], abs=1e-12)
+
+
 def test_rejects_ranges_of_wrong_shape_and_impossible_limits() -> None:
     with pytest.raises(InvalidInputError, match="shape"):
         LaserScan(np.zeros((2, 2)), 0.0, 0.1, 10.0)

@@ -87,6 +87,12 @@ def test_readme_is_short_and_its_links_lead_somewhere() -> None:
         assert (ROOT / target).exists(), target
 
 
+def test_scripts_that_pages_and_figures_name_exist() -> None:
+    for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *DOCS.rglob("*.md"), *DOCS.rglob("*.csv")):
+        for script in re.findall(r"(?:benchmarks|tests|docs)/[\w/]+\.py", path.read_text()):
+            assert (ROOT / script).is_file(), f"{path.name} names {script}"
+
+
 def test_commands_of_readme_are_commands() -> None:
     text = (ROOT / "README.md").read_text()
     named = set(re.findall(r"^    closedrooms (\w+)", text, re.M))

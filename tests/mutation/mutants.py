@@ -180,24 +180,40 @@ class Reach:
 def reaches(root: Path, folder: str, kept: Path) -> list[Reach]:
     """What each test of a folder reaches, by running them once; taken from ``kept`` where nothing has changed since.
 
+    Where only tests have changed, only the files that did are run again.
+
     Raises:
-        RuntimeError: No test passes.
+        RuntimeError: The tests do not run.
     """
-    sources = sorted([*(root / folder).rglob("*.py"), *(root / "tests" / folder).rglob("*.py")])
-    key = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
+    tests = sorted((root / "tests" / folder).rglob("*.py"))
+    files = [path for path in tests if path.name.startswith("test_")]
+    key = _digest([*sorted((root / folder).rglob("*.py")), *(path for path in tests if path not in files)])
     known = json.loads(kept.read_text()) if kept.exists() else {}
-    if known.get(folder, {}).get("key") != key:
+    own = known.get(folder, {})
+    own = own if own.get("key") == key else {"key": key, "files": {}}
+    digests = {path.relative_to(root).as_posix(): _digest([path]) for path in files}
+    own["files"] = {name: kept for name, kept in own["files"].items() if kept["key"] == digests.get(name)}
+    if new := [name for name in digests if name not in own["files"]]:
         seen = root / "reached.json"
         seen.unlink(missing_ok=True)
-        _, said = run_tests(root, ["-p", "reached", f"tests/{folder}"], seen=seen)
+        _, said = run_tests(root, ["-p", "reached", *new], seen=seen)
         if not seen.exists():
             raise RuntimeError(f"the tests of {folder} do not run:\n{said}")
-        known[folder] = {"key": key, "tests": [test for test in json.loads(seen.read_text()) if test["passed"]]}
+        own["files"] |= {name: {"key": digests[name], "tests": []} for name in new}
+        for test in json.loads(seen.read_text()):
+            if test["passed"]:
+                own["files"][test["test"].partition("::")[0]]["tests"].append(test)
+        known[folder] = own
         kept.write_text(json.dumps(known))
     return [
         Reach(test["test"], test["seconds"], frozenset(test["functions"]), test["processes"])
-        for test in known[folder]["tests"]
+        for file in own["files"].values()
+        for test in file["tests"]
     ]
+
+
+def _digest(paths: Sequence[Path]) -> str:
+    return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()
 
 
 def lots(source: str, mutant: Mutant, tests: Sequence[Reach]) -> list[list[str]]:

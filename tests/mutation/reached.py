@@ -4,7 +4,8 @@
 
 The file holds a list of tests, each with ``test`` (its id), ``passed``, ``seconds``, ``functions`` (``module:line`` of
 the definition) and ``processes`` (whether it started any; what they run is not seen). Set-up that tests share counts
-for the first of them only.
+for the first of them only. Of a property only the first examples are run: they reach what it reaches, and its time is
+reckoned from them.
 """
 
 import json
@@ -20,10 +21,13 @@ from typing import Any
 import pytest
 
 ROOT = Path.cwd()
+# Examples of a property.
+EXAMPLES = 10
 _reached: set[CodeType] = set()
 _tests: list[dict[str, Any]] = []
 _started: list[str] = []
 _failed: set[str] = set()
+_full: dict[object, int] = {}
 sys.addaudithook(lambda event, _: _started.append(event) if event in {"subprocess.Popen", "os.fork"} else None)
 
 
@@ -32,11 +36,23 @@ def _trace(frame: FrameType, _event: str, _argument: object) -> None:
     _reached.add(frame.f_code)
 
 
+def _shorten(test: Any) -> float:
+    """Let a property run its first examples only; how many times as many it has as a rule."""
+    settings = getattr(test, "_hypothesis_internal_use_settings", None)
+    if settings is None:
+        return 1.0
+    # Of a test with parameters it is one function for all.
+    full = _full.setdefault(test, settings.max_examples)
+    test._hypothesis_internal_use_settings = type(settings)(settings, max_examples=min(full, EXAMPLES))
+    return max(float(full / EXAMPLES), 1.0)
+
+
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     """Trace one test with its set-up."""
     _reached.clear()
     _started.clear()
+    times = _shorten(getattr(item, "obj", None))
     before, begin = sys.gettrace(), time.process_time()
     threading.settrace(_trace)
     sys.settrace(_trace)
@@ -45,7 +61,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     finally:
         sys.settrace(before)
         threading.settrace(None)  # type: ignore[arg-type]
-        seconds = time.process_time() - begin
+        seconds = times * (time.process_time() - begin)
         functions = {place for code in _reached if (place := _place(code))}
         _tests.append(
             {

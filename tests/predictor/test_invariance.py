@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from shapely import affinity
 
@@ -62,6 +62,7 @@ def _same(before, after, how):
 
 
 @given(st.sets(st.sampled_from(NAMES), min_size=1, max_size=6), st.sampled_from([*MOVES, "reordered"]))
+@example({"t2", "b2", "b0", "t3", "t4", "b3"}, "shifted")
 @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_from_given_segments_and_directions_on_rose_moves_exactly_with_the_map(mapped, monkeypatch, closed, how):
     scene = mapped(closed=tuple(sorted(closed)))

@@ -140,3 +140,13 @@ def test_a_huge_map_is_drawn_as_small_as_what_is_known(tmp_path: Path) -> None:
 def test_a_missing_folder_is_one_clear_error(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot write"):
         draw_cover(tmp_path / "missing" / "cover.png", a_map(), [], a_tour())
+
+
+@pytest.mark.parametrize(("rows", "cols"), [(1200, 12), (160, 240), (12, 1200)])
+def test_titles_are_never_cut(tmp_path: Path, rows: int, cols: int) -> None:
+    cells = np.full((rows, cols), FREE, dtype=np.int8)
+    cells[0] = cells[-1] = cells[:, 0] = cells[:, -1] = OCCUPIED
+    grid = OccupancyGrid(GridFrame(0.05, 0.0, 0.0, rows, cols), cells)
+    draw_cover(tmp_path / "cover.png", grid, [], a_tour())
+    picture = cv2.imread(str(tmp_path / "cover.png"))
+    assert (picture[:, -5:] == 255).all()

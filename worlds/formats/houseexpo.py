@@ -27,6 +27,8 @@ WALL = 0.1
 NARROWEST, WIDEST, DOOR = 0.6, 1.3, 0.9
 # Rooms and leftovers below this are given to a neighbour [square metres].
 SMALLEST = 1.0
+# Leftovers of less than this in all are rounding [square metres].
+NOTICED = 0.05
 MAX_POINTS = 100_000
 
 
@@ -57,7 +59,7 @@ def read_houseexpo(path: str | Path) -> FloorPlan:
             remarks.append(Remark(action="dropped", what="rooms", why=why, names=(label,), loss=True))
     if not inside:
         raise no_rooms("boxes inside the outline", [outline.area / len(boxes)], remarks, path)
-    labels, polygons, hidden = _rooms(outline, inside)
+    labels, polygons, hidden = _rooms(outline, inside, remarks)
     if hidden:
         why = "their boxes lie in those of smaller rooms"
         remarks.append(
@@ -117,7 +119,9 @@ def _boxes(data: dict[str, Any], path: Path, remarks: list[Remark]) -> list[tupl
     return sorted(boxes, key=lambda box: (box[1].area, box[0]))
 
 
-def _rooms(outline: Polygon, boxes: list[tuple[str, Polygon]]) -> tuple[list[str], list[Polygon], list[str]]:
+def _rooms(
+    outline: Polygon, boxes: list[tuple[str, Polygon]], remarks: list[Remark]
+) -> tuple[list[str], list[Polygon], list[str]]:
     """Find labels and outlines of the rooms and of the corridors between them, and labels of boxes that are no room."""
     labels: list[str] = []
     hidden: list[str] = []
@@ -130,13 +134,16 @@ def _rooms(outline: Polygon, boxes: list[tuple[str, Polygon]]) -> tuple[list[str
             labels.append(label)
             polygons.append(part)
         left = areal(shapely.difference(left, box))
-    rest = _parts(left, 0.0)
-    for part in rest:
-        if part.area >= SMALLEST:
-            labels.append("corridor")
-            polygons.append(part)
-    small = [part for part in rest if part.area < SMALLEST]
-    for part in small:
+    # Strips between boxes are the walls that the boxes leave out: nobody walks there.
+    wide = left.buffer(-NARROWEST / 2, join_style="mitre").buffer(NARROWEST / 2, join_style="mitre").intersection(left)
+    corridors = _parts(wide, SMALLEST)
+    labels += ["corridor"] * len(corridors)
+    polygons += corridors
+    strips = _parts(left.difference(shapely.union_all(corridors)), 0.0)
+    if sum(strip.area for strip in strips) > NOTICED:
+        why = f"narrower than {NARROWEST} m or below {SMALLEST} square metres; given to a room beside"
+        remarks.append(Remark(action="repaired", what="gaps between boxes", why=why, count=len(strips)))
+    for part in strips:
         borders = [part.boundary.intersection(polygon.boundary).length for polygon in polygons]
         if borders and max(borders) > 0.01:
             best = int(np.argmax(borders))

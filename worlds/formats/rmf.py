@@ -54,10 +54,7 @@ def read_rmf(path: str | Path, level: str | None = None) -> FloorPlan:
         raise no_rooms(f"walls that close rooms on level {name}", faces, remarks, path)
     doors = _doors(read, rooms, remarks)
     segments = [*read.walls, *closers, *(door.segment for door in read.doors)]
-    walls = tuple(
-        Wall(f"w{number:03d}", segment, WALL, "glass" if segment in read.glass else "solid")
-        for number, segment in enumerate(segments)
-    )
+    walls = tuple(Wall(f"w{number:03d}", segment, WALL) for number, segment in enumerate(segments))
     plan = FloorPlan(
         name=f"{path.name.split('.')[0]}-{name}",
         rooms=rooms,

@@ -52,7 +52,6 @@ class RmfLevel:
         vertices: All of its vertices [m]; ``None`` for one that is no place.
         names: The name of each vertex (a waypoint), empty without one.
         walls: Centre lines of its walls, each once [m].
-        glass: Those that the file lets one see through.
         doors: Those that can be doors.
         listed_doors: How many the file lists.
         floor: What it calls floor [m], empty where it names none.
@@ -62,7 +61,6 @@ class RmfLevel:
     vertices: tuple[Point | None, ...]
     names: tuple[str, ...]
     walls: tuple[Segment, ...]
-    glass: frozenset[Segment]
     doors: tuple[RmfDoor, ...]
     listed_doors: int
     floor: Polygon | MultiPolygon
@@ -93,7 +91,7 @@ def read_level(path: Path, level: str | None, remarks: list[Remark]) -> RmfLevel
         why = "no [x, y, z, name]; what stands on them is left out"
         remarks.append(Remark(action="dropped", what="vertices", why=why, names=bad, count=len(bad)))
     names = [str(row[3]).strip() if isinstance(row, list) and len(row) > 3 and row[3] else "" for row in rows]
-    walls, glass = [], set()
+    walls, seen_through = [], 0
     for number, row in enumerate(_rows(fields, "walls", path)):
         segment = _segment(row, vertices)
         if segment is None:
@@ -101,8 +99,10 @@ def read_level(path: Path, level: str | None, remarks: list[Remark]) -> RmfLevel
             remarks.append(Remark(action="dropped", what="walls", why=why, names=(f"walls[{number}]",), loss=True))
             continue
         walls.append((min(segment), max(segment)))
-        if _is_seen_through(row):
-            glass.add(walls[-1])
+        seen_through += _is_seen_through(row)
+    if seen_through:
+        why = "drawn see-through (alpha below 1); taken to block rays, as in the worlds that RMF makes of them"
+        remarks.append(Remark(action="guessed", what="walls", why=why, count=seen_through))
     doors = []
     listed = _rows(fields, "doors", path)
     for number, row in enumerate(listed):
@@ -114,7 +114,6 @@ def read_level(path: Path, level: str | None, remarks: list[Remark]) -> RmfLevel
         tuple(vertices),
         tuple(names),
         tuple(dict.fromkeys(wall for wall in walls if math.dist(*wall) > 0.01)),
-        frozenset(glass),
         tuple(doors),
         len(listed),
         _floor(fields, vertices, remarks, path),
@@ -218,7 +217,7 @@ def _parameter(row: Any, key: str) -> str:
 
 
 def _is_seen_through(row: Any) -> bool:
-    """Check whether a wall's ``alpha``, with which the RMF tools draw it, is below 1."""
+    """Check whether a wall's ``alpha`` is below 1: RMF's tools only draw it so, and give every wall the same body."""
     try:
         return 0.0 <= float(_parameter(row, "alpha")) < 1.0
     except ValueError:

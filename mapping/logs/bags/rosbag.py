@@ -109,7 +109,7 @@ def _resolved(messages: BagMessages, options: BagOptions, remarks: list[Remark])
     scan_times = Times(*np.array([(stamp_of(message), at) for message, at in messages.scans]).T)
     times = None if track is None else Times(track[:, 0], track[:, 1])
     stamps, odometry_stamps, clock_remarks = scan_and_odometry_times(scan_times, times)
-    remarks += [*found, *mount_remarks, *clock_remarks]
+    remarks += [*found, *mount_remarks, *clock_remarks, *_put_in_order(messages, stamps)]
     if track is None:
         poses, known = np.zeros((len(stamps), 3)), np.ones(len(stamps), dtype=np.bool_)
     else:
@@ -119,6 +119,17 @@ def _resolved(messages: BagMessages, options: BagOptions, remarks: list[Remark])
         poses, known, lost = odometry_at(np.column_stack((odometry_stamps, moved)), stamps)
         remarks += [*jump_remarks(jumps), *lost]
     return _run(messages, known, poses, stamps, mounts, remarks, has_odometry=track is not None)
+
+
+def _put_in_order(messages: BagMessages, stamps: FloatArray) -> list[Remark]:
+    """Sort the scans, and their stamps in place, by time: networks deliver some of them late."""
+    late = int((np.diff(stamps) < 0.0).sum())
+    if not late:
+        return []
+    order = np.argsort(stamps, kind="stable")
+    stamps[:] = stamps[order]
+    messages.scans[:] = [messages.scans[i] for i in order.tolist()]
+    return [Remark(action="repaired", what="scans", why="recorded out of order; sorted by their time", count=late)]
 
 
 def _run(

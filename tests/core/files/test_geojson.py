@@ -214,3 +214,65 @@ def test_a_confidence_or_alternative_that_is_none_is_refused(
     path.write_text(json.dumps(data))
     with pytest.raises(InvalidInputError, match=match):
         read_rooms(path)
+
+
+def told(path: Path) -> tuple[list[ClosedDoor], list[str]]:
+    remarks: list[Remark] = []
+    return read_doors(path, remarks=remarks), [str(remark) for remark in remarks]
+
+
+def test_heights_and_measures_of_positions_are_left_out(tmp_path: Path) -> None:
+    line = {"type": "LineString", "coordinates": [[1, 2, 0.5, 7], [1, 3, 0.5, 8]]}
+    doors = read_doors(collection(tmp_path / "d", {"type": "Feature", "properties": {"id": "a"}, "geometry": line}))
+    assert doors == [ClosedDoor("a", (1.0, 2.5), ((1.0, 2.0), (1.0, 3.0)), 1.0)]
+
+
+def test_a_collection_of_one_kind_is_read_as_its_multi_form(tmp_path: Path) -> None:
+    points = [{"type": "Point", "coordinates": [x, 0]} for x in (1, 4)]
+    feature = {"type": "Feature", "properties": {"id": "a"}, "geometry": {"type": "GeometryCollection"}}
+    feature["geometry"]["geometries"] = points  # type: ignore[index]
+    assert [(d.id, d.midpoint) for d in read_doors(collection(tmp_path / "d", feature))] == [
+        ("a", (1.0, 0.0)),
+        ("a-2", (4.0, 0.0)),
+    ]
+    feature["geometry"]["geometries"] = [points[0], {"type": "LineString", "coordinates": [[0, 0], [1, 0]]}]  # type: ignore[index]
+    with pytest.raises(InvalidInputError, match="feature 0 has no readable geometry"):
+        read_doors(collection(tmp_path / "d", feature))
+
+
+def test_properties_are_read_however_they_are_spelt(tmp_path: Path) -> None:
+    path = collection(tmp_path / "d", point(0, 0, ID="a", Width="0.85"), point(1, 0, Id=7, STATE="Open"))
+    assert read_doors(path) == [ClosedDoor("a", (0.0, 0.0), None, 0.85)]
+    assert read_doors(collection(tmp_path / "d", point(0, 0, id="a", width=" ")))[0].width is None
+    for width in ("0,9", "0.9 m", 0):
+        with pytest.raises(InvalidInputError, match="door 'a' of width"):
+            read_doors(collection(tmp_path / "d", point(0, 0, id="a", width=width)))
+
+
+@pytest.mark.parametrize(
+    ("members", "claim"),
+    [
+        ({"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}}, "CRS84 (degrees)"),
+        ({"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::4326"}}}, "EPSG::4326 (degrees)"),
+        ({"crs": "EPSG:4326"}, "EPSG:4326 (degrees)"),
+        ({"frame": "odom"}, "frame 'odom'"),
+        ({"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3857"}}}, None),
+        ({"crs": {"properties": []}}, None),
+        ({"frame": "map"}, None),
+    ],
+)
+def test_another_frame_than_the_maps_is_told(tmp_path: Path, members: dict[str, Any], claim: str | None) -> None:
+    path = tmp_path / "d"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [point(1, 2, id="a")], **members}))
+    doors, remarks = told(path)
+    assert [door.midpoint for door in doors] == [(1.0, 2.0)]
+    assert len(remarks) == (claim is not None)
+    assert all(str(claim) in remark and "metres in the map frame" in remark for remark in remarks)
+
+
+def test_doors_in_degrees_or_centimetres_are_found_out(tmp_path: Path) -> None:
+    degrees = point(9.1912345, 45.4642345, id="a"), point(9.1912445, 45.4642395, id="b")
+    with pytest.raises(InvalidInputError, match=r"2 doors within 1e-05 m \(degrees\?\)"):
+        read_doors(collection(tmp_path / "d", *degrees))
+    _, remarks = told(collection(tmp_path / "d", point(0, 0, id="a", width=90), point(3, 0, id="b", width=0.9)))
+    assert remarks == ["guessed 1 widths (a): above 10; taken as metres (they look like centimetres)"]

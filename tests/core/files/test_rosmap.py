@@ -290,3 +290,29 @@ def test_addresses_of_files_are_decoded(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "a b.png"), np.zeros((1, 1), dtype=np.uint8))
     for image in ("file:///home/me/a%20b.png", "file:a%20b.png", "file://a%20b.png", "a b.png"):
         assert picture_of(tmp_path, image)[0].occupied.all(), image
+
+
+@pytest.mark.parametrize("mode", ["RGB", "RGBA", "P"])
+def test_colours_are_averaged_as_map_server_does(tmp_path: Path, mode: str) -> None:
+    # Red, green and blue have the mean 85: p is 0.67 and above 0.65. Yellow has 170: neither free nor occupied.
+    picture = Image.fromarray(np.array([[[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0]]], dtype=np.uint8))
+    picture.convert(mode).save(tmp_path / "m.png")
+    (tmp_path / "m.yaml").write_text("image: m.png\nresolution: 0.05\norigin: [0, 0, 0]\n")
+    assert read_map(tmp_path / "m.yaml").cells.tolist() == [[OCCUPIED, OCCUPIED, OCCUPIED, UNKNOWN]]
+
+
+@pytest.mark.parametrize("values", [np.array([[0.0, 1.0]], dtype=np.float32), np.array([[0, 1 << 20]], dtype=np.int32)])
+def test_greys_that_no_map_server_writes_are_refused(tmp_path: Path, values: np.ndarray) -> None:
+    Image.fromarray(values).save(tmp_path / "m.tif")
+    (tmp_path / "m.yaml").write_text("image: m.tif\nresolution: 0.05\norigin: [0, 0, 0]\n")
+    with pytest.raises(InvalidInputError, match="expected greys or colours of 8 or 16 bits"):
+        read_map(tmp_path / "m.yaml")
+
+
+def test_greys_of_sixteen_bits_are_those_of_eight(tmp_path: Path) -> None:
+    eight = np.array([[0, 60, 205, 254, 255], [89, 90, 150, 206, 204]], dtype=np.uint8)
+    wanted = read_map(save(tmp_path, eight)).cells
+    assert len(np.unique(wanted)) == 3
+    for sixteen in (eight.astype(np.uint16) * 257, (eight.astype(np.uint16) << 8), eight.astype(np.uint16)):
+        Image.fromarray(sixteen).save(tmp_path / "m.png")
+        assert (read_map(tmp_path / "m.yaml").cells == wanted).all()

@@ -90,3 +90,19 @@ def test_arrays_of_mrpt_are_half_a_turn_of_beams_steps_of_odometry_and_ticks(tmp
     assert run.odometry == pytest.approx(np.array([[0, 0, 0], [0, 0, np.pi / 2], [0, 1, np.pi / 2]]))
     assert [scan.stamp for scan in run.scans] == pytest.approx([0.0, 0.5, 2.0])
     assert first.robot_T_sensor == pytest.approx((0.2, -0.1, 0.0))
+
+
+@pytest.mark.parametrize("field", ["stamps", "ranges", "odometry", "truth", "range_max"])
+@pytest.mark.parametrize("kind", ["complex128", "datetime64[s]", "U8", "S8", "V8"])
+def test_arrays_of_anything_but_real_numbers_are_refused(tmp_path: Path, field: str, kind: str) -> None:
+    honest = arrays() | {"truth": np.zeros((3, 3))}
+    path = saved(tmp_path, **(honest | {field: np.zeros(np.shape(honest[field]), dtype=kind)}))
+    with pytest.raises(InvalidInputError, match=rf"array {field} of .*; expected real numbers: .*scans\.npz$"):
+        read_run(path)
+
+
+def test_ranges_below_a_millimetre_are_beams_without_an_answer(tmp_path: Path) -> None:
+    ranges = np.full((3, 90), 2.0)
+    ranges[:, :4] = 0.0, -1.0, 5e-324, 0.0011
+    for scan in read_run(saved(tmp_path, ranges=ranges)).scans:
+        assert scan.ranges[:5] == pytest.approx([np.nan, np.nan, np.nan, 0.0011, 2.0], nan_ok=True)

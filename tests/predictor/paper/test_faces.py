@@ -159,6 +159,24 @@ def test_doors_on_one_edge_are_parted_in_the_middle():
         assert b in again.neighbours[a]
 
 
+@pytest.mark.parametrize("shift", [0.0, 13.35, -4.2, 1.00005, 0.00015, 0.00004999])
+def test_doors_that_face_each_other_but_for_rounding_are_parted_by_one_line_wherever_the_map_lies(shift):
+    # Two rows of doors above and below a corridor, the lower one 0.06 mm further: one line in the middle, not two.
+    arrangement = build_arrangement(
+        [Line(0.0, 1.0), Line(0.0, -1.0)], (Line(0.0, -5.0), Line(0.0, 5.0), *(Line(math.pi / 2, x) for x in (-40, 40)))
+    )
+    unknown = np.array([abs(face.centroid.y) > 1.0 for face in arrangement.faces])
+    doors = [ClosedDoor(f"t{x}", (x + shift, 1.0)) for x in (-3.0, 1.0)]
+    doors += [ClosedDoor(f"b{x}", (x + 6e-5 + shift, -1.0)) for x in (-3.0, 1.0)]
+    entrances = [find_entrance(arrangement, unknown, door, reach=1.0) for door in doors]
+    (line,) = splits_between(arrangement, entrances)
+    assert -line.offset * math.sin(line.angle) == pytest.approx(-1.0 + 3e-5 + shift, abs=1e-9)
+    apart = [
+        ClosedDoor(door.id, (door.midpoint[0] + 0.01 * (door.midpoint[1] > 0), door.midpoint[1])) for door in doors
+    ]
+    assert len(splits_between(arrangement, [find_entrance(arrangement, unknown, d, reach=1.0) for d in apart])) == 2
+
+
 def test_a_line_with_a_span_ends_at_full_lines() -> None:
     # A grid of 2 m; a slanted line whose walls lie in the cell around the origin.
     places = (-3.0, -1.0, 1.0, 3.0)

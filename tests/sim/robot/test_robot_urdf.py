@@ -12,6 +12,7 @@ from closedrooms.pipeline.bounds import check_width
 from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.robot.robot_model import make_model
 from closedrooms.sim.robot.robot_urdf import read_robot
+from closedrooms.sim.robot.urdf_description import check_loads
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.plan import FloorPlan
 
@@ -123,6 +124,33 @@ def test_a_description_that_cannot_be_used_is_refused(tmp_path: Path, content: s
     with pytest.raises(InvalidInputError, match=why) as refused:
         read_robot(own(path))
     assert str(path) in str(refused.value)
+
+
+@pytest.mark.parametrize(("found", "put"), [("box size", "nan nan nan"), ("box size", "0.1 0.1 nan")])
+def test_a_size_that_is_no_number_is_refused_with_the_file(tmp_path: Path, found: str, put: str) -> None:
+    made = make_model(RobotConfig(radius=0.25), 0.3)
+    assert isinstance(made.urdf, str)
+    path = tmp_path / "robot.urdf"
+    boxed = made.urdf.replace("</robot>", LASER.replace('<link name="base_scan"/>', BOXED.format(found, put)))
+    path.write_text(boxed)
+    with pytest.raises(InvalidInputError) as refused:
+        read_robot(own(path))
+    assert str(refused.value).endswith(f": {path}")
+
+
+BOXED = "<link name=\"base_scan\"><collision><geometry><{}='{}'/></geometry></collision></link>"
+
+
+def test_nothing_beside_a_description_is_run(tmp_path: Path) -> None:
+    for name in ("pybullet", "numpy", "os", "encodings"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'w').close()\nraise SystemExit(0)\n")
+    with pytest.raises(InvalidInputError, match="PyBullet does not load"):
+        check_loads(tmp_path / "gone.urdf")
+    made = make_model(RobotConfig(radius=0.25), 0.3)
+    assert isinstance(made.urdf, str)
+    (tmp_path / "robot.urdf").write_text(made.urdf)
+    check_loads(tmp_path / "robot.urdf")
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_missing_file_a_folder_and_unknown_wheels_are_refused(tmp_path: Path, bundled: Path) -> None:

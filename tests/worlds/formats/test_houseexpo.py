@@ -49,6 +49,17 @@ def test_boxes_apart_are_joined_through_what_lies_between_them(tmp_path: Path) -
     assert len(closable_rooms(plan)) == 2
 
 
+def test_a_strip_between_boxes_is_their_wall_and_no_corridor(tmp_path: Path) -> None:
+    plan = read(tmp_path, SQUARE, Bedroom=[[0, 0, 4.9, 6]], Kitchen=[[5.05, 0, 10, 6]], Bath=[[0, 6.1, 4, 8]])
+    labels = {room.id: room.label for room in plan.rooms}
+    assert sorted(labels.values()) == ["bath", "bedroom", "corridor", "kitchen"]
+    assert sum(room.polygon.area for room in plan.rooms) == pytest.approx(80.0)
+    pairs = {frozenset(labels[side] for side in door.rooms if side) for door in plan.doors}
+    assert frozenset({"bedroom", "kitchen"}) in pairs
+    assert frozenset({"bedroom", "bath"}) in pairs
+    assert not leaks(plan)
+
+
 def test_boxes_that_touch_over_less_than_a_door_have_wall_only(tmp_path: Path) -> None:
     outline = [[0.0, 0.0], [4.0, 0.0], [4.0, 3.5], [8.0, 3.5], [8.0, 8.0], [4.0, 8.0], [4.0, 4.0], [0.0, 4.0]]
     plan = read(tmp_path, outline, Bedroom=[[0, 0, 4, 4]], Kitchen=[[4, 3.5, 8, 8]])

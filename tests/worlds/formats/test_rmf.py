@@ -55,22 +55,16 @@ def test_pixels_are_scaled_by_the_measurements_and_metres_are_not(tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    ("alpha", "material"),
-    [
-        ([3, 0.4], "glass"),
-        ([3, 0.0], "glass"),
-        ([3, 1.0], "solid"),
-        ([3, -1], "solid"),
-        ([1, "x"], "solid"),
-        (2, "solid"),
-    ],
+    ("alpha", "told"),
+    [([3, 0.4], 1), ([3, 0.0], 1), ([3, 1.0], 0), ([3, -1], 0), ([1, "x"], 0), (2, 0)],
 )
-def test_a_wall_that_one_sees_through_is_of_glass(tmp_path: Path, alpha: object, material: str) -> None:
+def test_a_wall_that_is_drawn_see_through_blocks_rays_and_is_told(tmp_path: Path, alpha: object, told: int) -> None:
     data = building()
     data["levels"]["L1"]["walls"][1][2] = {"alpha": alpha}
-    walls = {wall.segment: wall.material for wall in read(tmp_path, data).walls}
-    assert walls[((10, 0), (10, 3))] == material
-    assert [m for segment, m in walls.items() if segment != ((10, 0), (10, 3))] == ["solid"] * (len(walls) - 1)
+    plan = read(tmp_path, data)
+    assert {wall.material for wall in plan.walls} == {"solid"}
+    assert ((10, 0), (10, 3)) in {wall.segment for wall in plan.walls}
+    assert sum(remark.count for remark in plan.remarks if "see-through" in remark.why) == told
 
 
 @pytest.mark.parametrize("system", ["wgs84", "web_mercator", "WGS84", 3, ["a"]])

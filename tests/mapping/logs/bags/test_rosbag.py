@@ -453,3 +453,22 @@ def test_stamps_that_are_missing_now_and_then_are_said(new_bag: Bags) -> None:
     run = read_run(bag.write())
     assert [scan.stamp for scan in run.scans] == pytest.approx(100.0 + 0.1 * np.arange(9), abs=1e-6)
     assert [(remark.action, remark.what, remark.count) for remark in run.remarks] == [("repaired", "stamps", 3)]
+
+
+def test_scans_that_were_recorded_out_of_order_are_sorted(new_bag: Callable[[], Any]) -> None:
+    bag = new_bag().drive(scans=False).transform("base_link", "laser")
+    for place, i in enumerate((1, 0, 3, 2, 4)):
+        bag.scan(100.0 + 0.1 * i, recorded=100.0 + 0.1 * place)
+    run = read_run(bag.write())
+    assert [round(scan.stamp - 100.0, 6) for scan in run.scans] == [0.0, 0.1, 0.2, 0.3, 0.4]
+    assert run.odometry[:, 0] == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2])
+    assert [str(r) for r in run.remarks] == ["repaired 2 scans: recorded out of order; sorted by their time"]
+
+
+def test_scans_well_before_the_first_odometry_do_not_take_it(new_bag: Callable[[], Any]) -> None:
+    bag = new_bag().drive(scans=False).transform("base_link", "laser")
+    for stamp in (99.6, 99.85, 99.95, 100.0, 100.5):
+        bag.scan(stamp)
+    run = read_run(bag.write())
+    assert run.odometry[:, 0] == pytest.approx([0.0, 0.0, 0.25])
+    assert "dropped 2 scans: before the odometry begins or after it ends" in [str(r) for r in run.remarks]
