@@ -21,7 +21,7 @@ FORMATS, MUTATIONS = inputs.FORMATS, inputs.MUTATIONS
 # In no format can these be read.
 REFUSED = {*inputs.PLACES, "empty", "zeros", "brackets", "tags"}
 # Every single answer comes within this time of the processor, and where it only waits, within the other one [s].
-PATIENCE, WAITING = 20, 120
+PATIENCE, WAITING = 20, 600
 
 
 @contextmanager
