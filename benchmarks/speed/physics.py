@@ -1,6 +1,6 @@
 """What bodies cost: processor time a simulated second, kinematic beside wheels beside bare ``stepSimulation``.
 
-    python benchmarks/speed/physics.py [WORLD ...] [--seconds S]
+    python benchmarks/speed/physics.py [WORLD ...] [--seconds S] [--sweeps] [--csv CSV]
 
 The robot drives the same commands in every row. Bare steps are those of the world with wheels, without commands,
 encoders or contacts being read. Rays are one sweep of 720 beams a tenth of a second. The figures are this machine's and
@@ -9,9 +9,12 @@ mapper is off with instant and rolling sweeps, straightened and not.
 """
 
 import argparse
+import csv
 import math
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from itertools import pairwise
+from pathlib import Path
 from time import process_time
 
 import numpy as np
@@ -29,6 +32,9 @@ from closedrooms.worlds.plan import FloorPlan
 
 WORLDS = ("office-01", "office-07", "school-09")
 CLOSED = 5
+COST_HEAD = ("world", "doors", "body", "move [ms/s]", "rays [ms/s]", "step [us]", "times kinematic")
+SWEEP_HEAD = ("world", "sweep", "straightened", "way [m]", "ATE [m]", "ATE [deg]")
+Row = tuple[str, ...]
 
 
 def main() -> None:
@@ -36,18 +42,18 @@ def main() -> None:
     parser.add_argument("worlds", nargs="*", default=WORLDS)
     parser.add_argument("--seconds", type=float, default=20.0, help="simulated [s]")
     parser.add_argument("--sweeps", action="store_true", help="errors of rolling sweeps instead of costs")
+    parser.add_argument("--csv", type=Path, help="write the table here, not to the screen")
     options = parser.parse_args()
-    if options.sweeps:
-        for name in options.worlds:
-            compare_sweeps(name, load_world(name), options.seconds)
+    compare, head = (compare_sweeps, SWEEP_HEAD) if options.sweeps else (compare_bodies, COST_HEAD)
+    rows = (row for name in options.worlds for row in compare(name, load_world(name), options.seconds))
+    if options.csv is None:
+        csv.writer(sys.stdout, lineterminator="\n").writerows((head, *rows))
         return
-    heads = "".join(f"{head:>13}" for head in ("move [ms/s]", "rays [ms/s]", "us a step", "x kinematic"))
-    print(f"{'world':<12}{'doors':>6}{'body':>11}{heads}")
-    for name in options.worlds:
-        compare_bodies(name, load_world(name), options.seconds)
+    with options.csv.open("w", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows((head, *rows))
 
 
-def compare_bodies(name: str, plan: FloorPlan, seconds: float) -> None:
+def compare_bodies(name: str, plan: FloorPlan, seconds: float) -> Iterator[Row]:
     """Measure one row a body, and one for the steps alone."""
     closed = draw_closed(plan, min(CLOSED, len(closable_rooms(plan))), np.random.default_rng(0))
     first = 0.0
@@ -60,15 +66,16 @@ def compare_bodies(name: str, plan: FloorPlan, seconds: float) -> None:
                 moved += cost(lambda n=number: sim.step(0.3, 0.8 * math.sin(n / 9), 0.1))
                 rays += cost(sim.observe)
             first = first or moved + rays
-            row(name, len(plan.doors), body, moved / seconds, rays / seconds, (moved + rays) / first)
+            yield cost_row(name, plan, body, moved / seconds, rays / seconds, (moved + rays) / first)
             if body == "wheels":
                 bare = sum(cost(sim.physics.step) for _ in range(round(seconds * STEPS)))
-                row(name, len(plan.doors), "bare steps", bare / seconds, 0.0, bare / first)
+                yield cost_row(name, plan, "bare steps", bare / seconds, 0.0, bare / first)
 
 
-def row(name: str, doors: int, body: str, moved: float, rays: float, share: float) -> None:
-    step = f"{moved / STEPS * 1e6:.1f}" if body != "kinematic" else ""
-    print(f"{name:<12}{doors:>6}{body:>11}{1e3 * moved:>13.2f}{1e3 * rays:>13.2f}{step:>13}{share:>13.2f}", flush=True)
+def cost_row(name: str, plan: FloorPlan, body: str, moved: float, rays: float, share: float) -> Row:
+    """Write what a simulated second costs [s]."""
+    step = "" if body == "kinematic" else f"{moved / STEPS * 1e6:.1f}"
+    return (name, str(len(plan.doors)), body, f"{1e3 * moved:.2f}", f"{1e3 * rays:.2f}", step, f"{share:.2f}")
 
 
 def cost(work: Callable[[], object]) -> float:
@@ -78,7 +85,7 @@ def cost(work: Callable[[], object]) -> float:
     return process_time() - begun
 
 
-def compare_sweeps(name: str, plan: FloorPlan, seconds: float) -> None:
+def compare_sweeps(name: str, plan: FloorPlan, seconds: float) -> Iterator[Row]:
     """Compare trajectory errors on one drive back and forth with turns on the spot, at 10 Hz."""
     for sweep, undistort in (("instant", True), ("rolling", False), ("rolling", True)):
         lidar = LidarConfig(sweep="rolling") if sweep == "rolling" else LidarConfig()
@@ -93,8 +100,8 @@ def compare_sweeps(name: str, plan: FloorPlan, seconds: float) -> None:
             mapper.finish()
             position, heading = ate(mapper.trajectory()[1], np.array(truth))
             way = sum(Pose2(*a).distance(Pose2(*b)) for a, b in pairwise(truth))
-            how = "straightened" if sweep == "rolling" and undistort else ""
-            print(f"{name:<12}{sweep:<8} {how:<13}{way:6.1f} m  ATE {position:.4f} m {math.degrees(heading):.3f} deg")
+            how = "" if sweep == "instant" else "yes" if undistort else "no"
+            yield (name, sweep, how, f"{way:.1f}", f"{position:.4f}", f"{math.degrees(heading):.3f}")
 
 
 def command(number: int, ranges: np.ndarray) -> tuple[float, float]:
