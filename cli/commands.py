@@ -10,6 +10,7 @@ import logging
 import os
 import shutil
 import sys
+import warnings
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -73,6 +74,10 @@ def _own_process() -> None:
             name = ("stdin", "stdout", "stderr")[descriptor]
             setattr(sys, name, os.fdopen(descriptor, mode, closefd=False))
     end_in_time(SIGNALS, _leave)
+    if not sys.warnoptions:
+        # What there is to say of an input we say ourselves. Workers inherit the option.
+        sys.warnoptions.append("ignore")
+        warnings.simplefilter("ignore")
     # Pictures are drawn into files, whatever the user's own plots are drawn with; where their library may keep nothing
     # at home it has a place of its own, and no need to say so.
     os.environ["MPLBACKEND"] = "agg"

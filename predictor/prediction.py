@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from shapely.geometry import Polygon
 
-from closedrooms.core.arrays import BoolArray, FloatArray, IntArray, handed_over
-from closedrooms.core.grid import UNKNOWN, OccupancyGrid
+from closedrooms.core.arrays import BoolArray, CellArray, FloatArray, IntArray, handed_over
+from closedrooms.core.grid import UNKNOWN, GridFrame, OccupancyGrid, is_known
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import Shape
 from closedrooms.predictor.confidence.belief import Belief
@@ -133,7 +133,22 @@ def free_probability(prediction: Prediction, grid: OccupancyGrid) -> OccupancyGr
     frame = prediction.grid.frame
     cells = np.zeros(frame.shape, dtype=np.int8)
     if prediction.probability is not None:
-        # What lies outside of the window reads as unknown there.
-        np.maximum(prediction.probability.on(frame).cells, 0, out=cells)
-    cells[grid.on(frame).known] = UNKNOWN
+        _put(prediction.probability, frame, cells)
+    observed = grid.on(frame)
+    if (bounds := observed.known_bounds()) is not None:
+        row, col, rows, cols = bounds
+        window = slice(row, row + rows), slice(col, col + cols)
+        cells[window][is_known(observed.cells[window])] = UNKNOWN
     return OccupancyGrid(frame, handed_over(cells))
+
+
+def _put(probability: OccupancyGrid, frame: GridFrame, cells: CellArray) -> None:
+    """Write into the ``cells`` of a frame what a window of its lattice holds, which may reach outside; -1 as 0."""
+    window = probability.frame
+    centre = np.array([window.origin_x + window.resolution / 2, window.origin_y + window.resolution / 2])
+    row, col = frame.to_cells(centre).tolist()
+    r0, c0 = max(row, 0), max(col, 0)
+    r1, c1 = min(row + window.rows, frame.rows), min(col + window.cols, frame.cols)
+    if r1 > r0 and c1 > c0:
+        part = probability.cells_on(frame.cropped(r0, c0, r1 - r0, c1 - c0))
+        np.maximum(part, 0, out=cells[r0:r1, c0:c1])

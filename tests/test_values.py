@@ -47,3 +47,22 @@ def test_values_with_arrays_are_told_apart_by_what_they_are_not_by_their_numbers
 
 def holds_array(field: ast.stmt) -> bool:
     return isinstance(field, ast.AnnAssign) and ast.unparse(field.annotation).split(" | ")[0].endswith("Array")
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_values_have_slots(folder: str) -> None:
+    # Settings are the exception: their fields are given by name; and what keeps what it has computed.
+    loose = [
+        name
+        for name, said, node in dataclasses(folder)
+        if said.get("frozen") and not said.get("kw_only") and not said.get("slots") and not keeps_something(node)
+    ]
+    assert loose == []
+
+
+def keeps_something(node: ast.ClassDef) -> bool:
+    return any(
+        ast.unparse(decorator) == "cached_property"
+        for item in node.body
+        for decorator in getattr(item, "decorator_list", [])
+    )

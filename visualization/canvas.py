@@ -87,15 +87,19 @@ class Canvas:
 
     def dashed(self, shape: BaseGeometry, colour: Colour, *, width: int = 2, dash: float = 9.0) -> None:
         """Draw the rings of a polygon in dashes of a length [pixels] with gaps as long."""
-        for piece in cut_dashes(shape, dash / self.scale):
-            self.line(piece, colour, width=width)
+        self._lines(list(cut_dashes(shape, dash / self.scale)), colour, width)
 
     def line(self, points: FloatArray, colour: Colour, *, width: int = 2) -> None:
         """Draw a polyline, shape (k, 2)."""
         if len(points) > 1:
-            cv2.polylines(
-                self.pixels, [self._fixed(points)], False, colour, thickness=width, lineType=cv2.LINE_AA, shift=SHIFT
-            )
+            self._lines([points], colour, width)
+
+    def _lines(self, lines: Sequence[FloatArray], colour: Colour, width: int) -> None:
+        """Draw polylines, each of shape (k, 2), at once."""
+        if lines:
+            places = self._fixed(np.concatenate(lines))
+            pieces = np.split(places, np.cumsum([len(line) for line in lines[:-1]]))
+            cv2.polylines(self.pixels, pieces, False, colour, thickness=width, lineType=cv2.LINE_AA, shift=SHIFT)
 
     def course(self, points: FloatArray, *, width: int = 2) -> None:
         """Draw a path, shape (k, 2), from blue at its start to orange at its end; rows of NaN interrupt it."""

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
-from shapely.ops import substring
 
 from closedrooms.core.arrays import FloatArray
 
@@ -20,7 +19,18 @@ def cut_dashes(shape: BaseGeometry, dash: float) -> Iterator[FloatArray]:
         Polylines, shape (k, 2).
     """
     for ring in shapely.get_rings(shapely.get_parts(shape)):
-        line = shapely.LineString(ring.coords)
-        step = max(dash, line.length / MOST_DASHES)
-        for start in np.arange(0.0, line.length, 2 * step):
-            yield shapely.get_coordinates(substring(line, start, min(start + step, line.length)))
+        corners = shapely.get_coordinates(ring)
+        # How far along the ring each corner lies [m].
+        along = np.concatenate([[0.0], np.hypot(*np.diff(corners, axis=0).T).cumsum()])
+        step = max(dash, along[-1] / MOST_DASHES)
+        starts = np.arange(0.0, along[-1], 2 * step)
+        ends = np.minimum(starts + step, along[-1])
+        heads, tails = (_points_at(corners, along, places) for places in (starts, ends))
+        first, last = np.searchsorted(along, starts, side="right"), np.searchsorted(along, ends, side="left")
+        for head, tail, low, high in zip(heads, tails, first.tolist(), last.tolist(), strict=True):
+            yield np.concatenate([[head], corners[low:high], [tail]])
+
+
+def _points_at(corners: FloatArray, along: FloatArray, places: FloatArray) -> FloatArray:
+    """Find the points of a polyline at some places along it [m], shape (n, 2)."""
+    return np.column_stack([np.interp(places, along, corners[:, axis]) for axis in (0, 1)])

@@ -4,5 +4,5 @@
   where a door goes, ``drafts`` what is kept, ``gate`` who may look, ``settings_form`` the settings as rows,
   ``pictures`` encode a map.
 - Drawn with NiceGUI: ``server`` opens the ``page``, made of ``map_board``, ``map_layers``, ``door_list``,
-  ``settings_dialog`` and ``prompts``.
+  ``door_row``, ``settings_dialog`` and ``prompts``.
 """

@@ -1,26 +1,24 @@
 """The lists beside the map: doors with what is behind them, proposals to accept or dismiss."""
 
-import math
 from collections.abc import Awaitable, Callable
 from functools import partial
-from typing import Any
 
 from nicegui import ui
+from nicegui.element import Element
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.names import shown
 from closedrooms.core.room import Room
+from closedrooms.predictor.structure.door_proposals import DoorProposal
 from closedrooms.visualization.colours import room_colours
-from closedrooms.web.document import Document, as_segment
+from closedrooms.web.door_row import DoorRow
 from closedrooms.web.map_board import css
+from closedrooms.web.prompts import plain_button
 from closedrooms.web.session import EditSession
-
-# Turning by a button [rad].
-TURN = math.radians(15)
 
 
 class DoorList:
-    """Doors and proposals as rows.
+    """Doors and proposals as rows; a row stays while its door or proposal does, and with it the focus.
 
     Args:
         session: What is shown.
@@ -35,77 +33,67 @@ class DoorList:
         select: Callable[[str | None], None],
     ) -> None:
         self._session, self._done, self._select = session, done, select
-        self._doors = ui.column().classes("w-full gap-1").props("data-id=doors")
+        self._rows: list[DoorRow] = []
+        self._proposed: dict[int, Element] = {}
+        with ui.column().classes("w-full gap-1").props("data-id=doors") as self._doors:
+            ui.label("Doors").classes("text-bold")
         self._proposals = ui.column().classes("w-full gap-1").props("data-id=proposals")
+        with self._proposals, ui.row().classes("w-full items-center justify-between"):
+            ui.label("Proposed").classes("text-bold")
+            ui.button("accept all", on_click=lambda: done(session.accept_all())).props("flat dense no-caps")
+        self._proposals.set_visibility(False)
 
     def draw(self) -> None:
         """Show what stands."""
-        session = self._session
-        colours = room_colours(door.id for door in session.document.doors)
-        self._doors.clear()
+        self._draw_doors()
+        self._draw_proposals()
+
+    def _draw_doors(self) -> None:
+        doors = self._session.document.doors
+        names = [door.id for door in doors]
+        self._rename_rows(names)
+        last = {row.name: row for row in self._rows}
+        for name in last.keys() - set(names):
+            last.pop(name).box.delete()
         with self._doors:
-            ui.label("Doors").classes("text-bold")
-            for door in session.document.doors:
-                self._door(door, css(colours[door.id]))
-        self._proposals.clear()
-        left = session.open_proposals
-        if not left:
+            self._rows = [last.get(name) or DoorRow(self._session, self._done, self._select, name) for name in names]
+        _order(self._doors, [row.box for row in self._rows])
+        colours = room_colours(names)
+        for row, door in zip(self._rows, doors, strict=True):
+            row.show(door, css(colours[door.id]), self._describe_behind(door))
+
+    def _rename_rows(self, names: list[str]) -> None:
+        """Let the row of a door that has another name now, at its old place, be that of the new name."""
+        last = {row.name for row in self._rows}
+        if len(names) != len(self._rows):
             return
+        for row, name in zip(self._rows, names, strict=True):
+            if row.name not in names and name not in last:
+                row.rename(name)
+
+    def _draw_proposals(self) -> None:
+        left = dict(self._session.open_proposals)
+        for number in self._proposed.keys() - left.keys():
+            self._proposed.pop(number).delete()
         with self._proposals:
-            with ui.row().classes("w-full items-center justify-between"):
-                ui.label("Proposed").classes("text-bold")
-                ui.button("accept all", on_click=lambda: self._done(session.accept_all())).props("flat dense no-caps")
-            for number, proposal in left:
-                x, y = session.sheet.point_on_map(proposal.midpoint)
-                with ui.row().classes("w-full items-center justify-between no-wrap gap-1"):
-                    ui.label(f"score {proposal.score:.2f}, {proposal.width:.2f} m at ({x:.1f}, {y:.1f})")
-                    with ui.row().classes("no-wrap gap-0"):
-                        self._button("check", f"accept proposal {number}", partial(session.accept, number))
-                        self._button("close", f"dismiss proposal {number}", partial(session.dismiss, number))
+            self._proposed = {
+                number: self._proposed.get(number) or self._proposal(number, proposal)
+                for number, proposal in left.items()
+            }
+        _order(self._proposals, list(self._proposed.values()))
+        self._proposals.set_visibility(bool(left))
 
-    def _door(self, door: ClosedDoor, colour: str) -> None:
-        session, name = self._session, door.id
-        chosen = name == session.selected
-        with (
-            ui.column()
-            .classes("w-full gap-0 q-pa-xs")
-            .style(f"border-left: 6px solid {colour};" + ("background: #eee;" if chosen else ""))
-        ):
-            with ui.row().classes("w-full items-center no-wrap gap-1"):
-                field = ui.input(value=name).props('dense borderless aria-label="name of the door"').classes("col-grow")
-                field.props["data-door"] = name
-                field.on("change", lambda: self._done(session.rename(name, str(field.value))))
-                field.on("keydown.enter", js_handler="event => event.target.blur()")
-                self._plain("my_location", "select", lambda: self._select(None if chosen else name))
-                self._button("rotate_left", "turn left", self._turn(name, TURN))
-                self._button("rotate_right", "turn right", self._turn(name, -TURN))
-                self._button("delete", "delete", lambda: session.change(lambda d: d.without_door(name)))
-            ui.label(self._behind(door)).classes("text-body2").props("data-id=behind")
-            if chosen:
-                self._numbers(door)
+    def _proposal(self, number: int, proposal: DoorProposal) -> Element:
+        session, done = self._session, self._done
+        x, y = session.sheet.point_on_map(proposal.midpoint)
+        with ui.row().classes("w-full items-center justify-between no-wrap gap-1") as row:
+            ui.label(f"score {proposal.score:.2f}, {proposal.width:.2f} m at ({x:.1f}, {y:.1f})")
+            with ui.row().classes("no-wrap gap-0"):
+                for icon, verb, work in (("check", "accept", session.accept), ("close", "dismiss", session.dismiss)):
+                    plain_button(icon, f"{verb} proposal {number}", partial(_do, done, partial(work, number)))
+        return row
 
-    def _numbers(self, door: ClosedDoor) -> None:
-        """Draw width and direction of the selected door, to type."""
-        name = door.id
-        (x0, y0), (x1, y1) = as_segment(door)
-        with ui.row().classes("no-wrap gap-2"):
-            width = ui.number("width [m]", value=round(math.hypot(x1 - x0, y1 - y0), 3), step=0.05, min=0.2)
-            turn = ui.number("direction [°]", value=round(math.degrees(math.atan2(y1 - y0, x1 - x0)), 1), step=1)
-            for field in (width, turn):
-                field.props("dense").classes("w-28")
-                field.on("keydown.enter", js_handler="event => event.target.blur()")
-        width.on("change", lambda: self._typed(width, name, Document.widened))
-        turn.on("change", lambda: self._typed(turn, name, _aimed))
-
-    async def _typed(self, field: ui.number, name: str, change: Callable[[Document, str, float], Document]) -> None:
-        if field.value is not None:
-            value = float(field.value)
-            await self._done(self._session.change(lambda document: change(document, name, value)))
-
-    def _turn(self, name: str, angle: float) -> Callable[[], str]:
-        return lambda: self._session.change(lambda document: document.turned(name, angle))
-
-    def _behind(self, door: ClosedDoor) -> str:
+    def _describe_behind(self, door: ClosedDoor) -> str:
         """Describe what is known of the room behind a door."""
         outcome = self._session.outcome
         if outcome is None or self._session.stale:
@@ -115,16 +103,16 @@ class DoorList:
             return shown(outcome.failures.get(door.id) or outcome.trouble or "no room was predicted")
         return describe(room)
 
-    def _button(self, icon: str, about: str, work: Callable[[], str]) -> None:
-        self._plain(icon, about, lambda: self._done(work()))
 
-    @staticmethod
-    def _plain(icon: str, about: str, work: Callable[[], Any]) -> None:
-        ui.button(icon=icon, on_click=work).props(f'flat dense round size=sm aria-label="{about}"')
+async def _do(done: Callable[[str], Awaitable[None]], work: Callable[[], str]) -> None:
+    await done(work())
 
 
-def _aimed(document: Document, name: str, degrees: float) -> Document:
-    return document.aimed(name, math.radians(degrees))
+def _order(box: Element, rows: list[Element]) -> None:
+    """Bring the rows of a list into their order, below its heading; one that is in its place is not touched."""
+    for place, row in enumerate(rows, start=1):
+        if box.default_slot.children[place] is not row:
+            row.move(box, target_index=place)
 
 
 def describe(room: Room) -> str:

@@ -49,7 +49,7 @@ class Keyboard:
 
     async def set_door(self) -> None:
         """Set a door in the middle of the view."""
-        await self._done(self._session.point_at(self._board.middle))
+        await self._done(self._session.point_at(await self._board.find_middle()))
 
     async def _pressed(self, event: KeyEventArguments) -> None:
         """Do what a key that goes down means."""

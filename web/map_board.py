@@ -54,6 +54,10 @@ document.addEventListener('keydown', e => {  // from within a field too
 });
 true;
 """
+# Of moves by a key: Leaflet gives up one that still glides for the next, so that a key that is held would hardly move.
+AT_ONCE = {"animate": False}
+# How long a browser with other work to do may take to answer [s].
+PATIENCE = 120.0
 CSS = """
 .leaflet-container { background: #dedede; font: inherit; }
 .leaflet-image-layer { image-rendering: pixelated; }
@@ -126,26 +130,25 @@ class MapBoard:
     async def ready(self) -> None:
         """Wait until the browser has made the map, and add what NiceGUI's element lacks."""
         await self._map.initialized()
-        await ui.run_javascript(SCRIPT % self._map.id, timeout=10.0)
+        await ui.run_javascript(SCRIPT % self._map.id, timeout=PATIENCE)
 
     def show(self, bounds: tuple[float, float, float, float]) -> None:
         """Fit the view to ``(x_min, y_min, x_max, y_max)`` [m]."""
         x0, y0, x1, y1 = bounds
-        self._map.run_map_method("fitBounds", [[y0, x0], [y1, x1]])
+        self._map.run_map_method("fitBounds", [[y0, x0], [y1, x1]], AT_ONCE)
 
     def pan(self, right: float, down: float) -> None:
         """Move the view by pixels."""
-        self._map.run_map_method("panBy", [right, down])
+        self._map.run_map_method("panBy", [right, down], AT_ONCE)
 
     def zoom(self, steps: int) -> None:
         """Go nearer, or further away."""
-        self._map.run_map_method("zoomIn" if steps > 0 else "zoomOut", abs(steps))
+        self._map.run_map_method("zoomIn" if steps > 0 else "zoomOut", abs(steps), AT_ONCE)
 
-    @property
-    def middle(self) -> Point:
-        """The middle of the view, frame of the grid [m]."""
-        y, x = self._map.center
-        return (float(x), float(y))
+    async def find_middle(self) -> Point:
+        """Ask for the middle of the view as it is in the browser, frame of the grid [m]."""
+        place = await self._map.run_map_method("getCenter", timeout=PATIENCE)
+        return (float(place["lng"]), float(place["lat"]))
 
     @contextlib.contextmanager
     def redrawn(self, *groups: str) -> Iterator[None]:

@@ -15,9 +15,10 @@ from closedrooms.core.errors import ClosedroomsError
 from closedrooms.core.report import counted
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.predictor.methods import METHODS
+from closedrooms.web.document import Document
 from closedrooms.web.door_list import DoorList
 from closedrooms.web.keyboard import Keyboard
-from closedrooms.web.map_board import HandleEvent, MapBoard
+from closedrooms.web.map_board import PATIENCE, HandleEvent, MapBoard
 from closedrooms.web.map_layers import MapLayers
 from closedrooms.web.prompts import ask, icon_button, show_keys, switch, tell
 from closedrooms.web.session import EditSession
@@ -39,8 +40,6 @@ body { margin: 0; }
   .wide { display: none; }
 }
 """
-# How long a browser may take to connect [s].
-PATIENCE = 30.0
 # Largest list of doors [bytes].
 MOST_BYTES = 20_000_000
 T = TypeVar("T")
@@ -53,6 +52,7 @@ class EditPage:
         self._session = session
         self._tour: CoverageTour | str | None = None
         self._busy = False
+        self._saved: tuple[Document, Path] | None = None
         ui.page_title(f"{session.config.map.name} - closedrooms")
         self._bar()
         with ui.element("div").classes("work"):
@@ -62,7 +62,7 @@ class EditPage:
                 self._pointer = ui.label("").classes("pointer").props("data-id=pointer")
             with ui.column().classes("side"):
                 self._status = ui.label("").props("data-id=status role=status aria-live=polite")
-                self._list = DoorList(session, self._done, self._select)
+                self._list = DoorList(session, self._done, self._show_door)
         self._keys = Keyboard(session, self._board, self._done, self._select, self._layers.show_all)
         ui.on("save", self._save_pressed)
 
@@ -109,11 +109,13 @@ class EditPage:
                 ui.label("prediction").classes("wide")
             icon_button("fit_screen", "show all (0)", self._show_all)
             ui.space()
-            icon_button("folder_open", "take doors from a GeoJSON file", self._pick_file)
             self._upload = ui.upload(
                 on_upload=self._uploaded, on_rejected=self._refused, auto_upload=True, max_file_size=MOST_BYTES
             )
             self._upload.classes("hidden")
+            pick = icon_button("folder_open", "take doors from a GeoJSON file")
+            # Browsers open a list of files only within seconds of a click: not after a way to the server and back.
+            pick.on("click", js_handler=f"() => runMethod({self._upload.id}, 'pickFiles', [])")
             icon_button("help_outline", "keys", show_keys)
             ui.button("save", icon="save", on_click=self._save).props("dense data-id=save")
 
@@ -132,9 +134,6 @@ class EditPage:
         self._tour = None
         self._layers.draw_tour(self._tour)
         await self._plan_tour()
-
-    def _pick_file(self) -> None:
-        self._upload.run_method("pickFiles")
 
     async def _uploaded(self, event: UploadEventArguments) -> None:
         content = await event.file.read()
@@ -187,6 +186,12 @@ class EditPage:
         self._session.selected = name
         self.draw()
 
+    def _show_door(self, name: str | None) -> None:
+        """Select a door from the list, where nobody sees which one it is, and go to it on the map."""
+        self._select(name)
+        if name is not None:
+            self._layers.show_door(name)
+
     # What comes of it
 
     async def _done(self, told: str) -> None:
@@ -229,6 +234,8 @@ class EditPage:
             text += f"; {self._tour}"
         elif self._tour is not None:
             text += f"; tour {self._tour.length:.1f} m"
+        if self._saved is not None and self._saved[0] is self._session.document:
+            text += f"; saved to {self._saved[1]}"
         self._status.set_text(text)
 
     async def _plan_tour(self) -> None:
@@ -258,11 +265,13 @@ class EditPage:
             return
         self._status.set_text(f"saving to {session.out} ...")
         try:
+            document = session.document
             report = await work_aside(session.save)
         except ClosedroomsError as error:
             tell(f"not saved: {error}", bad=True)
         else:
-            tell(f"saved to {Path(report.folder).resolve()}: {report.title}")
+            self._saved = (document, Path(report.folder).resolve())
+            tell(f"saved to {self._saved[1]}: {report.title}")
         self._say_outcome()
 
     async def _offer_draft(self) -> None:

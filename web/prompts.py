@@ -1,5 +1,6 @@
 """Small parts of the page: questions, messages, buttons."""
 
+from collections.abc import Callable
 from typing import Any
 
 from nicegui import ui
@@ -42,11 +43,16 @@ def show_keys() -> None:
     dialog.set_value(True)
 
 
-def icon_button(icon: str, about: str, work: Any) -> ui.button:
+def icon_button(icon: str, about: str, work: Any = None) -> ui.button:
     """Make a button with a picture; what it does is said to readers of screens too."""
     button = ui.button(icon=icon, on_click=work).props(f'flat dense round aria-label="{about}"')
     button.tooltip(about)
     return button
+
+
+def plain_button(icon: str, about: str, work: Callable[[], Any]) -> None:
+    """Make a small button of a row; what it does is said to readers of screens."""
+    ui.button(icon=icon, on_click=work).props(f'flat dense round size=sm aria-label="{about}"')
 
 
 def switch(about: str, work: Any) -> ui.switch:

@@ -21,6 +21,8 @@ from closedrooms.web.session import EditSession
 from closedrooms.web.sheet import MapSheet, open_sheet
 
 HOST = "127.0.0.1"
+# How long a page may be without its server, or a busy machine silent, before it begins anew from its draft [s].
+LONGEST_BREAK = 120.0
 
 
 def edit_map(config: EditConfig, *, progress: Progress) -> list[str]:  # noqa: ARG001 (the server says where it is)
@@ -112,7 +114,7 @@ def _server(config: EditConfig, token: str, port: int) -> Any:
 
     ui.page("/")(page)
     app = FastAPI(openapi_url=None)
-    ui.run_with(app, title="closedrooms", show_welcome_message=False, reconnect_timeout=30.0)
+    ui.run_with(app, title="closedrooms", show_welcome_message=False, reconnect_timeout=LONGEST_BREAK)
     settings = uvicorn.Config(
         Gate(app, token, port), log_level="warning", access_log=False, timeout_graceful_shutdown=1, lifespan="on"
     )

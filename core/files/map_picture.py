@@ -23,6 +23,8 @@ MAX_CELLS = 400_000_000
 # 1000 times (8000 at one bit a pixel), maps of buildings 20 to 300 times.
 UNSUSPICIOUS_CELLS, MAX_CELLS_A_BYTE = 30_000_000, 1000
 FORMATS = ("PNG", "PPM", "BMP", "TIFF", "JPEG", "GIF", "WEBP")
+# Rows that are copied at once.
+STRIP = 256
 SCHEME = re.compile(r"(?i)(file|package|model|https?)://")
 
 
@@ -135,8 +137,19 @@ def _greys(image: Any, path: Path) -> tuple[npt.NDArray[np.uint8], BoolArray | N
     if image.mode in {"I", "I;16", "I;16B", "I;16L"}:
         return _sixteen_bits(image, path), None
     if image.mode in {"L", "1", "LA"}:
-        return np.asarray(image.convert("L")), None
+        return _copy(image if image.mode == "L" else image.convert("L")), None
     return _mean_of_colours(np.asarray(image.convert("RGB"))), None
+
+
+def _copy(image: Any) -> npt.NDArray[np.uint8]:
+    """Copy a picture of greys, some rows at a time: at once Pillow holds the whole three times."""
+    width, height = image.size
+    # From the bottom up, as the cells of a grid lie.
+    greys = np.empty((height, width), dtype=np.uint8)
+    for top in range(0, height, STRIP):
+        low = min(top + STRIP, height)
+        greys[height - low : height - top] = np.asarray(image.crop((0, top, width, low)))[::-1]
+    return greys[::-1]
 
 
 def _mean_of_colours(colours: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:

@@ -94,7 +94,7 @@ def write_map(stem: Path, grid: OccupancyGrid, *, map_T_grid: Pose2 = IDENTITY) 
     shades = np.full(256, PIXEL_UNKNOWN, dtype=np.uint8)
     shades[is_free(values)] = PIXEL_FREE
     shades[is_occupied(values)] = PIXEL_OCCUPIED
-    _write(stem, grid.frame, shades[grid.cells[::-1].view(np.uint8)], "trinary", map_T_grid)
+    _write(stem, grid, shades, "trinary", map_T_grid)
 
 
 def write_raw_map(stem: Path, grid: OccupancyGrid, *, map_T_grid: Pose2 = IDENTITY) -> None:
@@ -108,15 +108,19 @@ def write_raw_map(stem: Path, grid: OccupancyGrid, *, map_T_grid: Pose2 = IDENTI
     Raises:
         OutputError: The folder cannot be written.
     """
-    _write(stem, grid.frame, grid.cells[::-1].view(np.uint8), "raw", map_T_grid)
+    _write(stem, grid, np.arange(256).astype(np.uint8), "raw", map_T_grid)
 
 
-def _write(stem: Path, frame: GridFrame, pixels: npt.NDArray[np.uint8], mode: str, map_T_grid: Pose2) -> None:
-    """Write the picture and the YAML of a map."""
+def _write(stem: Path, grid: OccupancyGrid, shades: npt.NDArray[np.uint8], mode: str, map_T_grid: Pose2) -> None:
+    """Write the picture, whose greys are the ``shades`` of the cells' bytes, and the YAML of a map."""
     import cv2
 
-    picture = stem.with_name(stem.name + ".png")
-    write_bytes(picture, cv2.imencode(".png", pixels)[1].tobytes())
+    frame, picture = grid.frame, stem.with_name(stem.name + ".png")
+    pixels = cv2.LUT(np.ascontiguousarray(grid.cells[::-1].view(np.uint8)), shades)
+    # Runs of one grey are what a map is made of.
+    settings = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE]
+    settings += [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
+    write_bytes(picture, cv2.imencode(".png", pixels, settings)[1].tobytes())
     x, y, yaw = frame.origin_x, frame.origin_y, 0.0
     if map_T_grid != IDENTITY:
         x, y, yaw = (map_T_grid @ Pose2(x, y)).as_tuple()
@@ -197,8 +201,13 @@ def read_bare_picture(path: Path, *, resolution: float) -> OccupancyGrid:
 
 def _grid(picture: Path, table: CellArray, resolution: float, x: float, y: float) -> OccupancyGrid:
     """Make the grid that a picture holds when ``table`` gives the cell of each grey value."""
+    import cv2
+
     pixels, opaque = read_picture(picture)
-    cells: CellArray = table[pixels[::-1]]
+    # Ten times as quick as indexing the table, and in place where nobody else holds the picture.
+    upwards = np.ascontiguousarray(pixels[::-1])
+    own = upwards if upwards.flags.writeable else None
+    cells: CellArray = cv2.LUT(upwards, table.view(np.uint8), dst=own).view(np.int8)
     if opaque is not None:
         cells[~opaque[::-1]] = UNKNOWN
     return OccupancyGrid(GridFrame(resolution, x, y, *pixels.shape), handed_over(cells))

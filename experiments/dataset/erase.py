@@ -14,7 +14,7 @@ from hashlib import blake2b
 import numpy as np
 import shapely
 
-from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.arrays import FloatArray, IntArray, frozen
 from closedrooms.core.door import ClosedDoor, DoorSighting
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
@@ -22,7 +22,7 @@ from closedrooms.core.random import stream
 from closedrooms.core.scan import LaserScan
 from closedrooms.experiments.dataset.open_survey import OpenSurvey
 from closedrooms.experiments.dataset.rays import first_hits
-from closedrooms.mapping.beams import clean
+from closedrooms.mapping.beams import Beams, clean
 from closedrooms.mapping.door_fusion import fuse_doors
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.log_odds_grid import EvidenceGrid, Imprint
@@ -35,8 +35,12 @@ from closedrooms.worlds.geometry import areal
 # A ray counts as ended on an open leaf when it went this far, less so many standard deviations of the range [m]. Rays
 # that ended just before it come along: they are cast anew, which gives what they measured but for the noise.
 NEAR_LEAF, SIGMAS = 0.02, 4.0
-# Drawn scans that are remembered, most of them with some doors closed: about 30 kB each.
-KEPT_KEYFRAMES = 8000
+# Most memory of the drawn scans that are remembered, most of them with some doors closed [bytes]: 2,500 scans of
+# school-08, whose maps ask for 24,000. 6,100 of these differ, fewer than 7,200 are drawn; with 500 it would be 17,600.
+KEPT = 64_000_000
+# Of the objects of a drawn scan beside its arrays [bytes].
+OVERHEAD = 2500
+NOTHING = Beams(*(frozen(np.zeros(shape)) for shape in ((0, 2), (0, 2), 2)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,12 +71,18 @@ class _Crossings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Drawn:
-    """A keyframe as it stands in the drawing, with the closed doors that its scan measured."""
+    """A keyframe as it stands in the drawing, with the closed doors that its scan measured, but without its beams."""
 
     scan: LaserScan
     keyframe: Keyframe
     doors: tuple[str, ...]
     imprint: Imprint | None
+
+    @property
+    def size(self) -> int:
+        """How much memory it takes [bytes]."""
+        drawn = 0 if self.imprint is None else self.imprint.misses.nbytes + self.imprint.hits.nbytes
+        return OVERHEAD + self.scan.ranges.nbytes + drawn
 
 
 class Eraser:
@@ -110,6 +120,7 @@ class Eraser:
         self._grid = EvidenceGrid(survey.mapper)
         self._drawn: list[_Drawn | None] = [None] * len(survey.poses)
         self._known: OrderedDict[tuple[int, tuple[str, ...], bytes], _Drawn] = OrderedDict()
+        self._kept = 0
         self._draw(np.arange(len(survey.poses)), self._ranges, np.full(self._ranges.shape, -1), ())
 
     def erase(self, closed: Collection[str]) -> ErasedMap:
@@ -152,10 +163,13 @@ class Eraser:
     def _keyframe(self, number: int, ranges: FloatArray, doors: tuple[str, ...]) -> _Drawn:
         """Make a keyframe of the survey with other ranges that sees ``doors``; keep it, as few doors show in one."""
         key = (number, doors, blake2b(ranges.tobytes(), digest_size=16).digest())
-        drawn = self._known.pop(key, None) or self._new_keyframe(number, ranges, doors)
+        drawn = self._known.pop(key, None)
+        if drawn is None:
+            drawn = self._new_keyframe(number, ranges, doors)
+            self._kept += drawn.size
         self._known[key] = drawn
-        if len(self._known) > KEPT_KEYFRAMES:
-            self._known.popitem(last=False)
+        while self._kept > KEPT and len(self._known) > 1:
+            self._kept -= self._known.popitem(last=False)[1].size
         return drawn
 
     def _new_keyframe(self, number: int, ranges: FloatArray, doors: tuple[str, ...]) -> _Drawn:
@@ -165,10 +179,13 @@ class Eraser:
         if not np.array_equal(ranges, self._ranges[number], equal_nan=True):
             scan = replace(scan, ranges=ranges)
         beams, pose = clean(scan, max_range=survey.mapper.max_range), Pose2(*survey.poses[number])
-        keyframe = Keyframe(number, scan.stamp, pose, beams, np.zeros((0, 2)), 0.0)
+        keyframe = Keyframe(number, scan.stamp, pose, beams, np.zeros((0, 2)), beams.points, 0.0)
         for name in doors:
             keyframe.remember(self._sighting(name, number), Pose2())
-        return _Drawn(scan, keyframe, doors, self._grid.imprint(beams, pose))
+        imprint = self._grid.imprint(beams, pose)
+        # Twice as large as all the rest; only what was seen of doors is asked for from here on.
+        keyframe.beams = NOTHING
+        return _Drawn(scan, keyframe, doors, imprint)
 
     def _outside(self, closed: Collection[str], poses_map: FloatArray) -> IntArray:
         """Find the true poses, shape (n, 3), map frame, that are not behind a closed door: their indices."""

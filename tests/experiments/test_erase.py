@@ -8,6 +8,7 @@ from shapely.geometry import box
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
+from closedrooms.experiments.dataset import erase as erase_module
 from closedrooms.experiments.dataset.erase import Eraser, erase
 from closedrooms.experiments.dataset.open_survey import OpenSurvey, survey_open
 from closedrooms.experiments.dataset.rays import first_hits
@@ -128,6 +129,24 @@ def test_a_map_does_not_depend_on_what_was_erased_before() -> None:
 
 
 @pytest.mark.simulation
+@pytest.mark.simulation
+def test_little_memory_changes_no_map(monkeypatch: pytest.MonkeyPatch) -> None:
+    survey = surveyed("medium")
+    orders = [("into-room",), ("into-corridor", "into-room"), (), ("into-corridor",), ("into-room",)]
+    plenty = Eraser(survey)
+    expected = [plenty.erase(closed) for closed in orders]
+    own = [drawn.size for drawn in plenty._known.values()]
+    assert sum(own) == plenty._kept
+    monkeypatch.setattr(erase_module, "KEPT", sum(own) // 4)
+    little = Eraser(survey)
+    for closed, full in zip(orders, expected, strict=True):
+        erased = little.erase(closed)
+        assert np.array_equal(erased.grid.cells, full.grid.cells)
+        assert erased.doors == full.doors
+        assert sum(drawn.size for drawn in little._known.values()) == little._kept <= sum(own) // 4
+    assert len(little._known) < len(plenty._known) / 2
+
+
 def test_refuses_a_door_that_does_not_exist() -> None:
     with pytest.raises(InvalidInputError, match="unknown door 'attic'"):
         erase(surveyed("medium"), ("attic",))

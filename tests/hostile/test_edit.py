@@ -3,6 +3,11 @@
 What the page shows of a line is tried in a browser (``tests/web/test_page.py``); here, every kind of bad file.
 """
 
+import re
+import signal
+import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import inputs
@@ -94,3 +99,93 @@ def test_a_defect_is_told_in_one_line_too(
     with pytest.raises(ClosedroomsError, match="internal error, please report it: IndexError: at nothing"):
         Desk(EditConfig(map=honest / "map.yaml", doors=None)).session("visitor")
     assert len(capfd.readouterr().err.splitlines()) == 1
+
+
+HEAD = " HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: close\r\n"
+OPEN = "GET /?token={token}" + HEAD + "\r\n"
+SOCKET = (
+    " HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+    "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+)
+# What comes in over the wire, byte by byte; none of it is let in. {path} stands for anything that the server has.
+REQUESTS = {
+    "no token": "GET {path}" + HEAD + "\r\n",
+    "an empty token": "GET {path}?token=" + HEAD + "\r\n",
+    "two tokens, the first wrong": "GET {path}?token=x&token={token}" + HEAD + "\r\n",
+    "a token of a megabyte": "GET {path}?token={long}" + HEAD + "\r\n",
+    "a token that is no text": "GET {path}?token=%ff%00%0d%0a" + HEAD + "\r\n",
+    "the token in another cookie": "GET {path}" + HEAD + "Cookie: token={token}\r\n\r\n",
+    "another host": "GET {path}?token={token} HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n",
+    "no host": "GET {path}?token={token} HTTP/1.0\r\n\r\n",
+    "another origin": "GET {path}?token={token}" + HEAD + "Origin: http://evil\r\n\r\n",
+    "a path that leads out": "GET /../../../etc/passwd" + HEAD + "\r\n",
+    "an upload": "POST {path}" + HEAD + "Content-Length: 5\r\n\r\nhello",
+    "a negative length": "POST {path}" + HEAD + "Content-Length: -5\r\n\r\nx",
+    "chunks that are none": "POST {path}" + HEAD + "Transfer-Encoding: chunked\r\n\r\nzz\r\n",
+    "a socket": "GET /_nicegui_ws/socket.io/?EIO=4&transport=websocket" + SOCKET + "\r\n",
+    "a socket from another page": "GET /_nicegui_ws/socket.io/?EIO=4&transport=websocket&token={token}"
+    + SOCKET
+    + "Origin: http://evil\r\n\r\n",
+    "a method that is none": "BREW {path}" + HEAD + "\r\n",
+    "another protocol": "\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n",
+    "a header of a megabyte": "GET {path}" + HEAD + "X: {long}\r\n\r\n",
+}
+# To these there is no answer: the connection is closed when they are sent.
+HALVES = {
+    "half a request": "GET / HTT",
+    "nothing": "",
+    "line ends alone": "\r\n" * 2000,
+    "an upload that breaks off": "POST /?token={token}" + HEAD + "Content-Length: 999999999999\r\n\r\nx",
+}
+PATHS = ("/", "/_nicegui/x", "/_nicegui_ws/socket.io/?EIO=4&transport=polling", "/docs", "/openapi.json")
+
+
+def talk(port: int, text: str, *, listen: bool = True) -> bytes:
+    """Send something and take what comes until the server ends it; nothing where it cuts the connection."""
+    with socket.create_connection(("127.0.0.1", port), timeout=120) as connection:
+        said = b""
+        try:
+            connection.sendall(text.encode("latin-1"))
+            while listen and (block := connection.recv(65536)):
+                said += block
+        except ConnectionError:
+            pass
+    return said
+
+
+def test_nothing_on_the_wire_is_let_in_or_ends_the_server(honest: Path) -> None:
+    words = ["edit", "--no-browser", str(honest / "map.yaml")]
+    server = subprocess.Popen(
+        [sys.executable, "-m", "closedrooms.cli", *words], cwd=honest, text=True, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )  # fmt: skip
+    try:
+        assert server.stdout is not None
+        found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)\n", server.stdout.readline())
+        assert found is not None
+        port, token = int(found[1]), found[2]
+        wanted = talk(port, OPEN.format(port=port, token=token))
+        assert wanted.startswith(b"HTTP/1.1 200 ")
+        for name, request in REQUESTS.items():
+            for path in PATHS if "{path}" in request else ("",):
+                said = talk(
+                    port, request.format(port=port, token=token, path=path, long="x" * 1_000_000, socket=SOCKET)
+                )
+                assert not said or said.split(b" ", 2)[1] in {b"400", b"403", b"405", b"431"}, (name, path, said[:300])
+        for half in HALVES.values():
+            talk(port, half.format(port=port, token=token), listen=False)
+        # Connections that say nothing hold nobody up, and stay open while the server is ended.
+        silent = [socket.create_connection(("127.0.0.1", port)) for _ in range(50)]
+        assert talk(port, OPEN.format(port=port, token=token)).startswith(b"HTTP/1.1 200 ")
+        server.send_signal(signal.SIGTERM)
+        _, errors = server.communicate(timeout=120)
+        for connection in silent:
+            connection.close()
+    finally:
+        server.kill()
+        server.wait()
+    assert server.returncode == 128 + signal.SIGTERM
+    assert "Traceback" not in errors
+    assert [line for line in errors.splitlines() if line.startswith("closedrooms: ")] == [
+        "closedrooms: terminated; nothing half-written was left behind"
+    ]

@@ -36,6 +36,7 @@ CASES: dict[str, tuple[str, str, dict[str, str | None], int, str]] = {
     "memory for no library": ("ulimit -v 200000;", PREDICT, {}, 1, MEMORY),
     "a terminal of one column": ("", "run --help", {"COLUMNS": "1"}, 0, ""),
     "a terminal of no column": ("", "--help", {"COLUMNS": "-1"}, 0, ""),
+    "a library that warns of the picture": ("mv tags.tif map.png;", PREDICT, {}, 1, "cannot be read"),
     "letters that a terminal lacks": ("", "worlds list", {"PYTHONIOENCODING": "ascii", "LC_ALL": "C"}, 0, ""),
     "a backend of pictures that there is not": ("", SHOW, {"MPLBACKEND": "nonsense"}, 0, ""),
 }
@@ -46,6 +47,8 @@ def folder(tmp_path: Path) -> Path:
     for kind in ("map", "doors", "plan"):
         (tmp_path / inputs.FORMATS[kind].name).write_bytes(inputs.FORMATS[kind].content)
     (tmp_path / "map.png").write_bytes(inputs.picture())
+    # Tags that point beyond the end, of which Pillow warns.
+    (tmp_path / "tags.tif").write_bytes(b"II*\0\x08\0\0\0" + b"\x10\0" + b"\x01\x01\x05\0\xff\0\0\0\xff\xff\0\0" * 3)
     return tmp_path
 
 

@@ -1,7 +1,6 @@
 """Every tab of a recording at every moment, as the viewer shows it: no view is empty."""
 
 import importlib.util
-import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -59,9 +58,6 @@ def test_what_is_still_being_loaded_is_empty_and_so_is_a_plot_with_a_legend_alon
     assert screenshots.is_empty(plot, plot=True)
 
 
-@pytest.mark.skipif(
-    "CLOSEDROOMS_SCREENSHOTS" not in os.environ, reason="a hundred pictures of a viewer: set CLOSEDROOMS_SCREENSHOTS=1"
-)
 @pytest.mark.slow
 @needs_viewer
 @pytest.mark.parametrize("method", ["best", "paper"])

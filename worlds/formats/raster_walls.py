@@ -22,6 +22,23 @@ MAX_PIECES = 60_000
 THICKEST = 4.0
 
 
+def check_pieces(grid: OccupancyGrid, path: Path) -> None:
+    """Refuse a map whose walls fall into too many pieces, before any shape of its rooms is made.
+
+    Every outward corner of the walls is a corner of a piece, and a piece has four.
+
+    Raises:
+        InvalidInputError: There are more than four for each of ``MAX_PIECES``.
+    """
+    solid = np.pad(~grid.free, 1, constant_values=True).view(np.uint8)
+    around = solid[:-1, :-1] + solid[1:, :-1] + solid[:-1, 1:] + solid[1:, 1:]
+    pieces = int((around == 1).sum()) // 4
+    if pieces > MAX_PIECES:
+        raise InvalidInputError(
+            f"a map whose walls fall into at least {pieces} pieces", expected=f"at most {MAX_PIECES}", where=path
+        )
+
+
 def trace_walls(grid: OccupancyGrid, more: BoolArray, path: Path, remarks: list[Remark]) -> list[Piece]:
     """Cut occupied cells, unknown ones that touch free space, and ``more`` into straight pieces of wall."""
     import cv2

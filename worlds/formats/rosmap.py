@@ -14,7 +14,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.door_hinges import hung
 from closedrooms.worlds.formats.raster_rooms import find_rooms_and_doors, mark_gaps
-from closedrooms.worlds.formats.raster_walls import trace_walls
+from closedrooms.worlds.formats.raster_walls import check_pieces, trace_walls
 from closedrooms.worlds.formats.settlement import Source, settle
 from closedrooms.worlds.geometry import WallAxes
 from closedrooms.worlds.plan import FloorPlan, Wall
@@ -55,6 +55,7 @@ def read_raster(path: str | Path, doors_path: Path | None = None) -> FloorPlan:
     if read.turned:
         why = "the plan keeps the axes of the picture, the map's origin has a yaw"
         remarks.append(Remark(action="repaired", what="axes", why=why))
+    check_pieces(grid, path)
     rooms, doors, frames, beside_doors = find_rooms_and_doors(grid, given, remarks)
     if not rooms:
         raise InvalidInputError("a plan without rooms", expected="free areas in the map", where=path)

@@ -91,6 +91,17 @@ def test_what_shrinks_too_much_or_is_too_large_is_refused(tmp_path: Path, monkey
         list(log_lines(tmp_path / "log", gzipped=False, what="a log", longest=100, max_bytes=5000))
 
 
+def test_what_is_large_and_shrinks_as_honest_logs_do_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(archives, "UNSUSPICIOUS_LOG", 10_000)
+    lines = [f"FLASER {n} {n * n * 7919 % 10007}\n".encode() for n in range(20_000)]
+    with gzip.open(tmp_path / "log.gz", "wb") as file:
+        file.writelines(lines)
+    assert list(log_lines(tmp_path / "log.gz", gzipped=True, what="a log", longest=100)) == lines
+    assert list(log_lines(tmp_path / "log.gz", gzipped=True, what="a log", longest=100, max_bytes=sum(map(len, lines))))
+    honest = np.random.default_rng(0).random(3_000_000)
+    assert len(read_arrays(npz(tmp_path / "a.npz", {"x.npy": npy(honest)}), what="scans")["x"]) == len(honest)
+
+
 @pytest.mark.parametrize("damage", ["cut", "flipped"])
 def test_a_damaged_log_gives_what_came_before(tmp_path: Path, damage: str) -> None:
     lines = [f"FLASER {n} {n * n * 7919 % 10007}\n".encode() for n in range(20_000)]

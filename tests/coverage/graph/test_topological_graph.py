@@ -10,6 +10,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.coverage.config import CoverageConfig, GraphConfig
+from closedrooms.coverage.graph import graph_builder
 from closedrooms.coverage.graph.free_space import clean_free_space
 from closedrooms.coverage.graph.graph_builder import build_graph
 from closedrooms.coverage.graph.line_of_sight import is_clear
@@ -184,6 +185,23 @@ def test_of_two_parts_the_one_with_the_start_is_covered(draw, plain):
 def test_a_start_far_from_free_space_is_noted(draw, plain):
     built = build_graph(draw(8.0, 8.0, [(1.0, 1.0, 4.0, 4.0)]), config=plain, start=(7.5, 7.5))
     assert any("from free space" in note for note in built.notes)
+
+
+@pytest.mark.parametrize(("away", "noted"), [(0.9, False), (1.1, True)])
+def test_a_start_is_noted_from_a_metre_off_free_space_on(draw, plain, away, noted):
+    built = build_graph(draw(8.0, 8.0, [(1.0, 1.0, 4.0, 4.0)]), config=plain, start=(4.0 + away, 2.5))
+    assert any("from free space" in note for note in built.notes) == noted
+
+
+@pytest.mark.parametrize(("left_out", "noted"), [(0.99, False), (1.0, True), (1.5, True)])
+def test_space_that_the_robot_cannot_get_into_is_noted_from_a_square_metre_on(
+    draw, plain, monkeypatch, left_out, noted
+):
+    grid = draw(8.0, 8.0, [(1.0, 1.0, 4.0, 4.0)])
+    space = replace(clean_free_space(grid, plain.graph), unreachable=left_out)
+    monkeypatch.setattr(graph_builder, "clean_free_space", lambda *_: space)
+    notes = build_graph(grid, config=plain).notes
+    assert any(f"{left_out:.1f} m2 that a robot" in note for note in notes) == noted
 
 
 @pytest.mark.parametrize("boxes", [[], [(1.0, 1.0, 1.2, 7.0)]])

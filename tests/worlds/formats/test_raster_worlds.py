@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -22,6 +23,7 @@ from closedrooms.sim.physics_world import PhysicsWorld
 from closedrooms.sim.robot.differential_drive import Drive
 from closedrooms.sim.solids import upright
 from closedrooms.worlds.extrusion import extrude
+from closedrooms.worlds.formats import raster_walls, rosmap
 from closedrooms.worlds.formats.rosmap import _differences, read_raster
 from closedrooms.worlds.geometry import room_interior
 from closedrooms.worlds.outline import leaks
@@ -214,3 +216,24 @@ def test_a_door_given_as_a_point_takes_no_cell_of_its_jambs(tmp_path: Path, wide
     plan, _ = plan_of(cells, tmp_path, doors)
     assert plan.doors[0].width == pytest.approx(wide * CELL, abs=CELL / 2)
     assert not [remark for remark in plan.remarks if remark.loss]
+
+
+def test_a_map_of_noise_is_refused_before_its_rooms_are_shaped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def shaped(*_: object) -> None:
+        raise AssertionError("the rooms were shaped")
+
+    monkeypatch.setattr(rosmap, "find_rooms_and_doors", shaped)
+    cells = np.where(np.random.default_rng(0).random((1200, 1200)) < 0.65, 254, 0).astype(np.uint8)
+    cv2.imwrite(str(tmp_path / "noise.png"), cells)
+    with pytest.raises(InvalidInputError, match=r"walls fall into at least \d{6} pieces; expected at most 60000"):
+        read_raster(tmp_path / "noise.png")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_map_is_not_refused_for_fewer_pieces_than_it_has(seed: int) -> None:
+    cells = np.random.default_rng(seed).choice([FREE, OCCUPIED, UNKNOWN], (40, 50), p=(0.7, 0.2, 0.1)).astype(np.int8)
+    grid = OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 40, 50), cells)
+    pieces = len(raster_walls.trace_walls(grid, np.zeros((40, 50), dtype=np.bool_), Path("m"), []))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(raster_walls, "MAX_PIECES", pieces)
+        raster_walls.check_pieces(grid, Path("m"))
