@@ -62,7 +62,7 @@ class EditPage:
                 self._pointer = ui.label("").classes("pointer").props("data-id=pointer")
             with ui.column().classes("side"):
                 self._status = ui.label("").props("data-id=status role=status aria-live=polite")
-                self._list = DoorList(session, self._done, self._select)
+                self._list = DoorList(session, self._done, self._show_door)
         self._keys = Keyboard(session, self._board, self._done, self._select, self._layers.show_all)
         ui.on("save", self._save_pressed)
 
@@ -185,6 +185,12 @@ class EditPage:
     def _select(self, name: str | None) -> None:
         self._session.selected = name
         self.draw()
+
+    def _show_door(self, name: str | None) -> None:
+        """Select a door from the list, where nobody sees which one it is, and go to it on the map."""
+        self._select(name)
+        if name is not None:
+            self._layers.show_door(name)
 
     # What comes of it
 

@@ -1,17 +1,18 @@
 """What bodies cost: processor time a simulated second, kinematic beside wheels beside bare ``stepSimulation``.
 
-    python benchmarks/speed/physics.py [WORLD ...] [--seconds S]
+    python benchmarks/speed/physics.py [WORLD ...] [--seconds S] [--rounds N] [--quick]
 
 The robot drives the same commands in every row. Bare steps are those of the world with wheels, without commands,
-encoders or contacts being read. Rays are one sweep of 720 beams a tenth of a second. The figures are this machine's and
-should be quoted as ratios. With ``--sweeps`` it drives at 1 m/s and turns at 2 rad/s instead, and says how far the
-mapper is off with instant and rolling sweeps, straightened and not.
+encoders or contacts being read. Rays are one sweep of 720 beams a tenth of a second. The bodies take turns, figures are
+medians over the rounds; the last column is what moving takes beside bare steps. With ``--sweeps`` it drives at 1 m/s
+and turns at 2 rad/s instead, and says how far the mapper is off with instant and rolling sweeps, straightened and not.
 """
 
 import argparse
 import math
 from collections.abc import Callable
 from itertools import pairwise
+from statistics import median
 from time import process_time
 
 import numpy as np
@@ -35,40 +36,47 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("worlds", nargs="*", default=WORLDS)
     parser.add_argument("--seconds", type=float, default=20.0, help="simulated [s]")
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--quick", action="store_true", help="one world, 5 s, one round")
     parser.add_argument("--sweeps", action="store_true", help="errors of rolling sweeps instead of costs")
     options = parser.parse_args()
+    if options.quick:
+        options.worlds, options.seconds, options.rounds = options.worlds[:1], 5.0, 1
     if options.sweeps:
         for name in options.worlds:
             compare_sweeps(name, load_world(name), options.seconds)
         return
-    heads = "".join(f"{head:>13}" for head in ("move [ms/s]", "rays [ms/s]", "us a step", "x kinematic"))
-    print(f"{'world':<12}{'doors':>6}{'body':>11}{heads}")
+    heads = "".join(f"{head:>13}" for head in ("move [ms/s]", "rays [ms/s]", "us a step"))
+    print(f"{'world':<12}{'doors':>6}{'body':>11}{heads}{'ours / best known':>19}")
     for name in options.worlds:
-        compare_bodies(name, load_world(name), options.seconds)
+        compare_bodies(name, load_world(name), options.seconds, options.rounds)
 
 
-def compare_bodies(name: str, plan: FloorPlan, seconds: float) -> None:
+def compare_bodies(name: str, plan: FloorPlan, seconds: float, rounds: int) -> None:
     """Measure one row a body, and one for the steps alone."""
     closed = draw_closed(plan, min(CLOSED, len(closable_rooms(plan))), np.random.default_rng(0))
-    first = 0.0
-    for body in ("kinematic", "wheels"):
-        config = SimConfig(body="wheels") if body == "wheels" else SimConfig()
-        with Simulation(plan, closed, config, 0) as sim:
-            count = round(seconds / 0.1)
-            moved, rays = 0.0, 0.0
-            for number in range(count):
-                moved += cost(lambda n=number: sim.step(0.3, 0.8 * math.sin(n / 9), 0.1))
-                rays += cost(sim.observe)
-            first = first or moved + rays
-            row(name, len(plan.doors), body, moved / seconds, rays / seconds, (moved + rays) / first)
-            if body == "wheels":
-                bare = sum(cost(sim.physics.step) for _ in range(round(seconds * STEPS)))
-                row(name, len(plan.doors), "bare steps", bare / seconds, 0.0, bare / first)
-
-
-def row(name: str, doors: int, body: str, moved: float, rays: float, share: float) -> None:
-    step = f"{moved / STEPS * 1e6:.1f}" if body != "kinematic" else ""
-    print(f"{name:<12}{doors:>6}{body:>11}{1e3 * moved:>13.2f}{1e3 * rays:>13.2f}{step:>13}{share:>13.2f}", flush=True)
+    taken: dict[str, list[tuple[float, float]]] = {"kinematic": [], "wheels": [], "bare steps": []}
+    for _ in range(rounds):
+        for body in ("kinematic", "wheels"):
+            config = SimConfig(body="wheels") if body == "wheels" else SimConfig(body="kinematic")
+            with Simulation(plan, closed, config, 0) as sim:
+                moved, rays = 0.0, 0.0
+                for number in range(round(seconds / 0.1)):
+                    moved += cost(lambda n=number: sim.step(0.3, 0.8 * math.sin(n / 9), 0.1))
+                    rays += cost(sim.observe)
+                taken[body].append((moved / seconds, rays / seconds))
+                if body == "wheels":
+                    bare = sum(cost(sim.physics.step) for _ in range(round(seconds * STEPS)))
+                    taken["bare steps"].append((bare / seconds, 0.0))
+    limit = median(moved for moved, _ in taken["bare steps"])
+    for body, times in taken.items():
+        moved, rays = (median(column) for column in zip(*times, strict=True))
+        step = f"{moved / STEPS * 1e6:.1f}" if body != "kinematic" else ""
+        print(
+            f"{name:<12}{len(plan.doors):>6}{body:>11}{1e3 * moved:>13.2f}{1e3 * rays:>13.2f}{step:>13}"
+            f"{moved / limit:>19.2f}",
+            flush=True,
+        )
 
 
 def cost(work: Callable[[], object]) -> float:
