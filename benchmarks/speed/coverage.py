@@ -5,10 +5,12 @@
     python benchmarks/speed/coverage.py --quick              # the smallest office of each table
 
 Times are CPU seconds of this process, the best of three (of one where a run takes seconds). Tours are compared on the
-metric closure of the same graph, each solver for the whole graph at once; ``ours`` is what the default method does.
+metric closure of the same graph, each solver for the whole graph at once; ``ours`` is what the default method does. The
+last columns are "ours / best known" in processor time: of tracing beside a plain loop, of the tour beside each solver.
 """
 
 import argparse
+import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -129,8 +131,9 @@ def length(distances: FloatArray, tour: list[int]) -> float:
 
 
 def speed(sizes: Sequence[tuple[float, float]]) -> None:
-    print("| map [m] | cells | clean [s] | thin [s] | trace [s] | plain loop trace [s] | all to graph [s] | vertices |")
-    print("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |")
+    print("| map [m] | cells | clean [s] | thin [s] | trace [s] | plain loop trace [s] | all to graph [s] | vertices | "
+          "trace: ours / best known |")  # fmt: skip
+    print("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
     config = CoverageConfig()
     build_graph(office(20.0, 20.0))
     for width, height in sizes:
@@ -142,7 +145,7 @@ def speed(sizes: Sequence[tuple[float, float]]) -> None:
         whole, built = measured(lambda grid=grid: build_graph(grid, config=config))
         print(
             f"| {width:.0f} x {height:.0f} | {grid.frame.cols} x {grid.frame.rows} | {clean:.2f} | {thinned:.2f} | "
-            f"{traced:.3f} | {plain:.2f} | {whole:.2f} | {len(built.graph.vertices)} |"
+            f"{traced:.3f} | {plain:.2f} | {whole:.2f} | {len(built.graph.vertices)} | {traced / plain:.2f} |"
         )
 
 
@@ -165,13 +168,17 @@ def solvers(name: str, graph: TopologicalGraph) -> None:
     try:
         import fast_tsp
     except ImportError:
-        pass
+        print("fast-tsp is not installed and passed over", file=sys.stderr)
     else:
         seconds, plan = measured(lambda: fast_tsp.find_tour(units, duration_seconds=2.0), 1)
         rows.append(("fast-tsp, 2 s", seconds, length(distances, plan)))
     for solver, taken, metres in rows:
         over = 100.0 * (metres / ours.lower_bound - 1.0)
-        print(f"| {name} | {len(members)} | {solver} | {taken:.3f} | {metres:.1f} | {over:.2f} |", flush=True)
+        print(
+            f"| {name} | {len(members)} | {solver} | {taken:.3f} | {metres:.1f} | {over:.2f} "
+            f"| {rows[0][1] / taken:.3f} |",
+            flush=True,
+        )
 
 
 def main() -> None:
@@ -181,8 +188,8 @@ def main() -> None:
     options = parser.parse_args()
     most = 1 if options.quick else None
     speed(SIZES[:most])
-    print("\n| map | vertices | solver | CPU [s] | length [m] | above the lower bound [%] |")
-    print("| --- | ---: | --- | ---: | ---: | ---: |")
+    print("\n| map | vertices | solver | CPU [s] | length [m] | above the lower bound [%] | CPU: ours / it |")
+    print("| --- | ---: | --- | ---: | ---: | ---: | ---: |")
     bare = CoverageConfig(graph=replace(CoverageConfig().graph, clutter_filter=False))
     offices = ((0, (40.0, 30.0)), (60, (60.0, 45.0)), (120, (80.0, 60.0)))
     for pillars, (width, height) in offices[:most]:

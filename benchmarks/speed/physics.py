@@ -1,18 +1,23 @@
 """What bodies cost: processor time a simulated second, kinematic beside wheels beside bare ``stepSimulation``.
 
-    python benchmarks/speed/physics.py [WORLD ...] [--seconds S]
+    python benchmarks/speed/physics.py [WORLD ...] [--seconds S] [--rounds N] [--quick] [--sweeps] [--csv CSV]
 
 The robot drives the same commands in every row. Bare steps are those of the world with wheels, without commands,
-encoders or contacts being read. Rays are one sweep of 720 beams a tenth of a second. The figures are this machine's and
-should be quoted as ratios. With ``--sweeps`` it drives at 1 m/s and turns at 2 rad/s instead, and says how far the
-mapper is off with instant and rolling sweeps, straightened and not.
+encoders or contacts being read. Rays are one sweep of 720 beams a tenth of a second. The bodies take turns, figures are
+medians over the rounds; the last column is what moving takes beside bare steps. With ``--sweeps`` it drives at 1 m/s
+and turns at 2 rad/s instead, and says how far the mapper is off with instant and rolling sweeps, straightened and not.
 """
 
 import argparse
+import csv
 import math
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from itertools import pairwise
+from pathlib import Path
+from statistics import median
 from time import process_time
+from typing import TextIO
 
 import numpy as np
 
@@ -29,46 +34,68 @@ from closedrooms.worlds.plan import FloorPlan
 
 WORLDS = ("office-01", "office-07", "school-09")
 CLOSED = 5
+COST_HEAD = ("world", "doors", "body", "move [ms/s]", "rays [ms/s]", "us a step", "ours / best known")
+SWEEP_HEAD = ("world", "sweep", "straightened", "way [m]", "ATE [m]", "ATE [deg]")
+Row = tuple[str, ...]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("worlds", nargs="*", default=WORLDS)
     parser.add_argument("--seconds", type=float, default=20.0, help="simulated [s]")
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--quick", action="store_true", help="one world, 5 s, one round")
     parser.add_argument("--sweeps", action="store_true", help="errors of rolling sweeps instead of costs")
+    parser.add_argument("--csv", type=Path, help="write the table here, not to the screen")
     options = parser.parse_args()
+    if options.quick:
+        options.worlds, options.seconds, options.rounds = options.worlds[:1], 5.0, 1
+    plans = ((name, load_world(name)) for name in options.worlds)
     if options.sweeps:
-        for name in options.worlds:
-            compare_sweeps(name, load_world(name), options.seconds)
+        head, rows = SWEEP_HEAD, (row for plan in plans for row in compare_sweeps(*plan, options.seconds))
+    else:
+        head, rows = (
+            COST_HEAD,
+            (row for plan in plans for row in compare_bodies(*plan, options.seconds, options.rounds)),
+        )
+    if options.csv is None:
+        write_rows(sys.stdout, head, rows)
         return
-    heads = "".join(f"{head:>13}" for head in ("move [ms/s]", "rays [ms/s]", "us a step", "x kinematic"))
-    print(f"{'world':<12}{'doors':>6}{'body':>11}{heads}")
-    for name in options.worlds:
-        compare_bodies(name, load_world(name), options.seconds)
+    with options.csv.open("w", newline="") as file:
+        write_rows(file, head, rows)
 
 
-def compare_bodies(name: str, plan: FloorPlan, seconds: float) -> None:
+def write_rows(file: TextIO, head: Row, rows: Iterator[Row]) -> None:
+    """Write a table, each row as soon as it is measured."""
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(head)
+    for row in rows:
+        writer.writerow(row)
+        file.flush()
+
+
+def compare_bodies(name: str, plan: FloorPlan, seconds: float, rounds: int) -> Iterator[Row]:
     """Measure one row a body, and one for the steps alone."""
     closed = draw_closed(plan, min(CLOSED, len(closable_rooms(plan))), np.random.default_rng(0))
-    first = 0.0
-    for body in ("kinematic", "wheels"):
-        config = SimConfig(body="wheels") if body == "wheels" else SimConfig()
-        with Simulation(plan, closed, config, 0) as sim:
-            count = round(seconds / 0.1)
-            moved, rays = 0.0, 0.0
-            for number in range(count):
-                moved += cost(lambda n=number: sim.step(0.3, 0.8 * math.sin(n / 9), 0.1))
-                rays += cost(sim.observe)
-            first = first or moved + rays
-            row(name, len(plan.doors), body, moved / seconds, rays / seconds, (moved + rays) / first)
-            if body == "wheels":
-                bare = sum(cost(sim.physics.step) for _ in range(round(seconds * STEPS)))
-                row(name, len(plan.doors), "bare steps", bare / seconds, 0.0, bare / first)
-
-
-def row(name: str, doors: int, body: str, moved: float, rays: float, share: float) -> None:
-    step = f"{moved / STEPS * 1e6:.1f}" if body != "kinematic" else ""
-    print(f"{name:<12}{doors:>6}{body:>11}{1e3 * moved:>13.2f}{1e3 * rays:>13.2f}{step:>13}{share:>13.2f}", flush=True)
+    taken: dict[str, list[tuple[float, float]]] = {"kinematic": [], "wheels": [], "bare steps": []}
+    for _ in range(rounds):
+        for body in ("kinematic", "wheels"):
+            config = SimConfig(body="wheels") if body == "wheels" else SimConfig(body="kinematic")
+            with Simulation(plan, closed, config, 0) as sim:
+                moved, rays = 0.0, 0.0
+                for number in range(round(seconds / 0.1)):
+                    moved += cost(lambda n=number: sim.step(0.3, 0.8 * math.sin(n / 9), 0.1))
+                    rays += cost(sim.observe)
+                taken[body].append((moved / seconds, rays / seconds))
+                if body == "wheels":
+                    bare = sum(cost(sim.physics.step) for _ in range(round(seconds * STEPS)))
+                    taken["bare steps"].append((bare / seconds, 0.0))
+    limit = median(moved for moved, _ in taken["bare steps"])
+    for body, times in taken.items():
+        moved, rays = (median(column) for column in zip(*times, strict=True))
+        step = f"{moved / STEPS * 1e6:.1f}" if body != "kinematic" else ""
+        beside = f"{moved / limit:.2f}"
+        yield (name, str(len(plan.doors)), body, f"{1e3 * moved:.2f}", f"{1e3 * rays:.2f}", step, beside)
 
 
 def cost(work: Callable[[], object]) -> float:
@@ -78,7 +105,7 @@ def cost(work: Callable[[], object]) -> float:
     return process_time() - begun
 
 
-def compare_sweeps(name: str, plan: FloorPlan, seconds: float) -> None:
+def compare_sweeps(name: str, plan: FloorPlan, seconds: float) -> Iterator[Row]:
     """Compare trajectory errors on one drive back and forth with turns on the spot, at 10 Hz."""
     for sweep, undistort in (("instant", True), ("rolling", False), ("rolling", True)):
         lidar = LidarConfig(sweep="rolling") if sweep == "rolling" else LidarConfig()
@@ -93,8 +120,8 @@ def compare_sweeps(name: str, plan: FloorPlan, seconds: float) -> None:
             mapper.finish()
             position, heading = ate(mapper.trajectory()[1], np.array(truth))
             way = sum(Pose2(*a).distance(Pose2(*b)) for a, b in pairwise(truth))
-            how = "straightened" if sweep == "rolling" and undistort else ""
-            print(f"{name:<12}{sweep:<8} {how:<13}{way:6.1f} m  ATE {position:.4f} m {math.degrees(heading):.3f} deg")
+            how = "" if sweep == "instant" else "yes" if undistort else "no"
+            yield (name, sweep, how, f"{way:.1f}", f"{position:.4f}", f"{math.degrees(heading):.3f}")
 
 
 def command(number: int, ranges: np.ndarray) -> tuple[float, float]:

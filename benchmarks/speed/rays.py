@@ -4,7 +4,8 @@
 
 Without a world it measures corridors with rooms on both sides, of growing length. Each world is crossed by a robot that
 turns away from what is near; the same poses are then cast by every way in turn, and the median of some repeats counts.
-The last column is "ours / best known": processor time of a noisy sweep against PyBullet's bare ``rayTestBatch``.
+The last column is "ours / best known": processor time of a noisy sweep against the quicker of PyBullet's bare
+``rayTestBatch`` and, where ``embreex`` is installed, Embree on the same walls, which is asked for distances alone.
 """
 
 import argparse
@@ -97,6 +98,26 @@ def bare_batches(physics: PhysicsWorld, poses: list[Pose2], lidar: LidarConfig) 
     return run
 
 
+def embree_batches(plan: FloorPlan, poses: list[Pose2], lidar: LidarConfig) -> Callable[[], object] | None:
+    """Prepare the same rays for Embree on the walls as extruded, ``None`` where it is not installed."""
+    try:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+    except ImportError:
+        return None
+    vertices, faces = extrude(building_solids(plan))
+    scene = EmbreeScene()
+    TriangleMesh(scene, np.asarray(vertices, dtype=np.float32)[np.asarray(faces)])
+    angles = lidar.angle_min + lidar.angle_increment * np.arange(lidar.beams)
+    batches = []
+    for pose in poses:
+        starts = np.tile(np.array([pose.x, pose.y, lidar.height], dtype=np.float32), (lidar.beams, 1))
+        directions = np.zeros((lidar.beams, 3), dtype=np.float32)
+        directions[:, 0], directions[:, 1] = np.cos(angles + pose.theta), np.sin(angles + pose.theta)
+        batches.append((starts, directions))
+    return lambda: [scene.run(starts, directions, query="DISTANCE") for starts, directions in batches]
+
+
 def measure(plan: FloorPlan, scans: int, repeats: int) -> str:
     """Measure one line of the table."""
     config = SimConfig(noise=noise_level("medium"))
@@ -109,8 +130,10 @@ def measure(plan: FloorPlan, scans: int, repeats: int) -> str:
         scanner = Lidar(lidar, config.noise, physics, 0)
         with PhysicsWorld() as simple:
             simple.add_static(*extrude(building_solids(plan)))
+            embree = embree_batches(plan, poses, lidar)
             seconds = medians(
                 {
+                    **({"embree": embree} if embree else {}),
                     "bare": bare_batches(simple, poses, lidar),
                     "ours": bare_batches(physics, poses, lidar),
                     "cast": lambda: [scanner.track(pose) for pose in poses],
@@ -120,11 +143,13 @@ def measure(plan: FloorPlan, scans: int, repeats: int) -> str:
                 repeats,
             )
     rate = {name: scans * lidar.beams / 1000 / taken for name, taken in seconds.items()}
+    best = min(seconds["bare"], seconds.get("embree", np.inf))
     x0, y0, x1, y1 = building_solids(plan).bounds
     return (
-        f"{plan.name[:20]:20} {max(x1 - x0, y1 - y0):6.1f} {len(plan.doors):5d} {built:6.2f} {rate['bare']:9.0f}"
+        f"{plan.name[:20]:20} {max(x1 - x0, y1 - y0):6.1f} {len(plan.doors):5d} {built:6.2f}"
+        f" {rate.get('embree', np.nan):9.0f} {rate['bare']:9.0f}"
         f" {rate['ours']:9.0f} {rate['cast']:9.0f} {rate['sweep']:9.0f} {seconds['step'] / scans * 1e6:8.0f}"
-        f" {0.1 * scans / (seconds['sweep'] + seconds['step']):7.0f} {seconds['sweep'] / seconds['bare']:10.2f}"
+        f" {0.1 * scans / (seconds['sweep'] + seconds['step']):7.0f} {seconds['sweep'] / best:10.2f}"
     )
 
 
@@ -141,8 +166,8 @@ def main() -> None:
     print(f"{arguments.scans} scans; thousands of rays a second.\n")
     print("bare: rayTestBatch on the walls as extruded, without doors; bare+: on the simulation's own bodies, doors")
     print("included; true: Lidar.track; noisy: Lidar.sweep at medium noise; step: 0.1 s of driving; x real: both.\n")
-    print(f"{'world':20} {'size/m':>6} {'doors':>5} {'build':>6} {'bare':>9} {'bare+':>9} {'true':>9} {'noisy':>9}"
-          f" {'step/us':>8} {'x real':>7} {'ours/best':>10}")  # fmt: skip
+    print(f"{'world':20} {'size/m':>6} {'doors':>5} {'build':>6} {'embree':>9} {'bare':>9} {'bare+':>9}"
+          f" {'true':>9} {'noisy':>9} {'step/us':>8} {'x real':>7} {'ours/best':>10}")  # fmt: skip
     plans = [load_world(name) for name in arguments.worlds] or [
         comb(length) for length in LENGTHS[: 1 if arguments.quick else None]
     ]

@@ -1,13 +1,15 @@
 """How long commands take on small inputs, most of it start-up: CPU seconds, and how many times quicker than before.
 
-    python benchmarks/speed/start_up.py [--calls N] [--quick] [--baseline SOURCE]
+    python benchmarks/speed/start_up.py [--calls N] [--quick] [--baseline SOURCE] [--samples FOLDER ...] [--csv]
 
 SOURCE is the source of another version of this program, its ``.typing`` folder included; both are called in turn, and
-the last column is the median of the ratios of neighbours, before / now: above 1 is quicker. The first row is an empty
-Python, to be taken off when machines are compared. ``--quick`` calls each three times and simulates nothing.
+the last column is the median of the ratios of neighbours, before / now: above 1 is quicker. Each command is called once
+more before, for the byte code, which an installation has from its beginning. ``--quick`` calls each three times and
+simulates nothing. ``--samples`` predicts on the maps of these folders too; ``--csv`` prints rows for docs/results.
 """
 
 import argparse
+import itertools
 import os
 import resource
 import subprocess
@@ -61,6 +63,8 @@ def call(source: Path, words: tuple[str, ...], out: Path) -> float:
             at = line.index("--sim.body")
             del line[at : at + 2]
     environment = {**os.environ, "PYTHONPATH": str(source / ".typing"), "OMP_NUM_THREADS": "1"}
+    environment |= {"OPENBLAS_NUM_THREADS": "1", "PYTHONPYCACHEPREFIX": str(out.parent / "byte-code")}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(line, capture_output=True, text=True, check=False, env=environment, cwd=out.parent)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -76,11 +80,24 @@ def prepare_inputs(folder: Path) -> None:
     call(HERE, ("doors", str(folder / "truth.yaml"), "--out", str(folder / "doors.geojson")), folder / "none")
 
 
+def predictions(samples: list[Path]) -> dict[str, tuple[str, ...]]:
+    """List the command lines that predict on samples, by name."""
+    return {
+        f"predict best, {sample.parent.name[:12]}/{sample.name}": (
+            "predict", str(sample / "map.yaml"), "--doors", str(sample / "doors.geojson"), "--out", "OUT",
+        )
+        for sample in map(Path.resolve, samples)
+    }  # fmt: skip
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--calls", type=int, default=7)
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--baseline", type=Path)
+    parser.add_argument("--samples", type=Path, nargs="*", default=[], help="folders with map.yaml and doors.geojson")
+    parser.add_argument("--only", nargs="*", help="beginnings of the names of what is called")
+    parser.add_argument("--csv", action="store_true")
     options = parser.parse_args()
     calls = 3 if options.quick else options.calls
     sources = [HERE, *([options.baseline.resolve()] if options.baseline else [])]
@@ -88,22 +105,27 @@ def main() -> None:
         folder = Path(scratch)
         prepare_inputs(folder)
         lines = {name: words for name, words in commands(folder).items() if not (options.quick and name in SIMULATED)}
+        lines |= predictions(options.samples)
+        if options.only:
+            lines = {name: words for name, words in lines.items() if name.startswith(tuple(options.only))}
         if "evaluate" in lines:
-            call(HERE, (*lines["dataset"][:-1], str(folder / "data")), folder / "none")
-        print(f"{'command':<16}{'CPU s':>8}" + (f"{'before':>9}{'before / now':>14}" if options.baseline else ""))
+            call(HERE, (*commands(folder)["dataset"][:-1], str(folder / "data")), folder / "none")
+        print_row(options.csv, "command", "CPU s", *(["before", "before / now"] if options.baseline else []))
+        outs = (folder / f"out-{number}" for number in itertools.count())
         for name, words in lines.items():
-            times = [
-                [
-                    call(source, words, folder / f"{name.replace(' ', '-')}-{i}-{number}")
-                    for i, source in enumerate(sources)
-                ]
-                for number in range(calls)
-            ]
-            now = median(pair[0] for pair in times)
-            row = f"{name:<16}{now:8.3f}"
+            for source in sources:
+                call(source, words, next(outs))
+            times = [[call(source, words, next(outs)) for source in sources] for _ in range(calls)]
+            figures = [f"{median(column):.3f}" for column in zip(*times, strict=True)]
             if options.baseline:
-                row += f"{median(p[1] for p in times):9.3f}{median(p[1] / p[0] for p in times):14.2f}"
-            print(row, flush=True)
+                figures.append(f"{median(before / now for now, before in times):.2f}")
+            print_row(options.csv, name, *figures)
+
+
+def print_row(as_csv: bool, name: str, *figures: str) -> None:
+    """Print a row of the table, or of the file."""
+    text = ",".join([f'"{name}"', *figures]) if as_csv else name.ljust(36) + "".join(f"{f:>14}" for f in figures)
+    print(text, flush=True)
 
 
 if __name__ == "__main__":
