@@ -39,3 +39,18 @@ def test_the_curvature_of_one_step_is_that_of_finite_differences_in_metres(resol
     expected = (1.0 - MEMORY) * slopes.T @ slopes
     assert found.hessian == pytest.approx(expected, rel=1e-3, abs=1e-3 * np.abs(expected).max())
     assert found.score == pytest.approx(likelihoods(field, points, guess).mean(), abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_where_the_field_is_flat_the_pose_goes_to_what_odometry_says(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    field = LikelihoodField(0.05, MatcherConfig())
+    field.add(np.array([[50.0, 50.0]]))
+    half = rng.normal(size=(3, 3)) * [10.0, 10.0, 3.0]
+    prior = Pose2(*rng.uniform(-0.2, 0.2, 3))
+    found = refine(
+        field, rng.uniform(-1.0, 1.0, (20, 2)), Pose2(0.03, -0.02, 0.01), prior=prior,
+        prior_information=half @ half.T + 5.0 * np.eye(3),
+    )  # fmt: skip
+    assert found.pose.as_tuple() == pytest.approx(prior.as_tuple(), abs=1e-3)
+    assert found.hessian == pytest.approx(np.zeros((3, 3)))

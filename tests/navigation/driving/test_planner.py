@@ -7,6 +7,7 @@ from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.driving.costmap import Costmap, NavigationMap
+from closedrooms.navigation.driving.path_back import GOAL_RADIUS, cells_near
 from closedrooms.navigation.driving.planner import PlannedPath, plan_path, reachable_cells
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
@@ -107,3 +108,11 @@ def test_a_start_at_the_goal_needs_no_way() -> None:
     path = path_between(two_rooms(0.9), (1.0, 1.0), (1.0, 1.0))
     assert path is not None
     assert path.length < 0.3
+
+
+@pytest.mark.parametrize("place", [(2.03, 1.98), (0.1, 4.05), (9.0, 9.0)])
+def test_the_cells_near_a_place_are_those_within_the_radius_of_a_goal(place: tuple[float, float]) -> None:
+    costmap = costmap_of(two_rooms(1.0))
+    every = np.argwhere(np.ones(costmap.frame.shape, dtype=np.bool_))
+    away = np.hypot(*(costmap.frame.to_points(every) - np.array(place)).T)
+    assert np.argwhere(cells_near(place, costmap)).tolist() == every[away <= GOAL_RADIUS].tolist()

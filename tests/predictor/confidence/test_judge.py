@@ -122,6 +122,28 @@ def test_a_room_between_known_ones_is_bounded_and_one_beyond_is_not(scene):
     assert measured[1, outside] == pytest.approx(1.0)
 
 
+def test_what_is_measured_of_a_shape_alone_is_what_it_says(scene):
+    belief = Belief(0.5, (), Spread(np.zeros(2), np.array([1.0, 0.0]), 0.1, np.zeros((1, 1))))
+    room = predict(scene.grid, scene.doors, "best").rooms[0]
+    shapes = (shapely.box(0.0, 0.0, 5.0, 5.0), shapely.box(0.0, 0.0, 2.0, 8.0))
+    found = [
+        replace(room, polygon=shape, kind=kind, score=score, doors=doors)
+        for shape, kind, score, doors in zip(
+            shapes, ("dependent", "border"), (4.0, None), (("a",), ("a", "b")), strict=True
+        )
+    ]
+    measured = measure_rooms(scene.grid, tuple(found), [belief, belief])
+    wanted = {
+        "log area": (0.0, np.log(16.0 / 25.0)), "log area squared": (0.0, np.log(16.0 / 25.0) ** 2),
+        # Of a square it is 1.
+        "compactness": (1.0, 16.0 * 16.0 / 20.0**2), "dependent": (1.0, 0.0), "border": (0.0, 1.0), "doors": (1.0, 2.0),
+        "expected IoU": (0.5, 0.5),
+    }  # fmt: skip
+    for name, values in wanted.items():
+        assert measured[:, NAMES.index(name)] == pytest.approx(values), name
+    assert measured[0, NAMES.index("score")] == pytest.approx(0.4)
+
+
 def test_variants_are_the_room_itself_and_longer_and_wider_ones(scene):
     prediction = predict(scene.grid, scene.doors, "best")
     room = next(room for room in prediction.rooms if room.doors == ("b3",))
