@@ -133,6 +133,8 @@ class EditPage:
     async def _tour_switched(self) -> None:
         self._tour = None
         self._layers.draw_tour(self._tour)
+        if not self._busy:
+            self._say_outcome()
         await self._plan_tour()
 
     async def _uploaded(self, event: UploadEventArguments) -> None:
