@@ -15,14 +15,15 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 import tyro
 from PIL import Image
-from rerun.experimental import ViewerClient
+from rerun.experimental import ViewerClient, ViewerState
 
 # A view is empty when fewer of its pixels are drawn, of a million: a robot that has seen one corridor fills thousands,
 # an empty map none.
@@ -43,6 +44,7 @@ TRIES, LEAST_PICTURES = 20, 10
 # How long a viewer may take to start and to load [s], and between two questions.
 LONGEST_START, PAUSE = 300.0, 0.2
 Area = tuple[float, float, float, float]
+T = TypeVar("T")
 PLOTS = {"TimeSeries", "BarChart", "StateTimeline"}
 
 
@@ -94,17 +96,16 @@ def take(config: ScreenshotConfig) -> list[Shot]:
     config.out.mkdir(parents=True, exist_ok=True)
     shots = []
     with _open_viewer(config) as viewer:
-        blueprint = viewer.get_blueprint().blueprint
+        blueprint = _insist(viewer.get_blueprint).blueprint
         for name, choices in list(_tabs(blueprint)):
             if config.tabs and name.split(" - ")[0] not in config.tabs:
                 continue
             for container, tab in choices:
                 blueprint[container]["ContainerBlueprint"]["active_tab"] = tab
-            viewer.set_blueprint(blueprint, of="recording")
+            _insist(lambda: viewer.set_blueprint(blueprint, of="recording"))
             for moment, where in _moments(config, unchanging=name.split(" - ")[0] in config.unchanging):
                 if where:
-                    rest = {key: value for key, value in where.items() if key != "timeline"}
-                    viewer.set_time(where["timeline"], play_state="paused", **rest)
+                    _insist(partial(viewer.set_time, play_state="paused", **where))
                 picture, empty = _take_full_picture(viewer, blueprint, config.patience)
                 path = config.out / f"{_file_name(name)}-{moment}.png"
                 shots.append(Shot(name, moment, path, empty))
@@ -133,12 +134,16 @@ def _open_viewer(config: ScreenshotConfig) -> Iterator[ViewerClient]:
     process = subprocess.Popen(command, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         viewer = _connect(f"rerun+http://127.0.0.1:{port}/proxy")
-        viewer.open(str(config.recording.resolve()))
-        _wait_until(lambda: bool(viewer.get_state().views) and not viewer.get_state().loading)
+        _insist(lambda: viewer.open(str(config.recording.resolve())))
+        _wait_until(lambda: _is_loaded(_insist(viewer.get_state)))
         yield viewer
     finally:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
+
+
+def _is_loaded(state: ViewerState) -> bool:
+    return bool(state.views) and not state.loading
 
 
 def _connect(address: str) -> ViewerClient:
@@ -187,11 +192,15 @@ def _take_full_picture(
 
 
 def _take_picture(viewer: ViewerClient) -> Image.Image:
-    """Take a picture; a machine with other work to do, drawing without a GPU, is given more than one chance."""
+    return Image.open(BytesIO(_insist(viewer.take_screenshot))).convert("RGB")
+
+
+def _insist(ask: Callable[[], T]) -> T:
+    """Ask the viewer; on a machine with other work to do, drawing without a GPU, it is given more than one chance."""
     for _ in range(TRIES - 1):
         with contextlib.suppress(TimeoutError):
-            return Image.open(BytesIO(viewer.take_screenshot())).convert("RGB")
-    return Image.open(BytesIO(viewer.take_screenshot())).convert("RGB")
+            return ask()
+    return ask()
 
 
 def _free_port() -> int:
@@ -289,7 +298,7 @@ def _root(blueprint: dict[str, Any]) -> str:
 def _find_empty(viewer: ViewerClient, blueprint: dict[str, Any], picture: Image.Image) -> Iterator[str]:
     """Find the names of the views that show nothing, and what the viewer complains of."""
     pixels = np.array(picture).astype(np.int16)
-    views = {view.view_id: view for view in viewer.get_state().views}
+    views = {view.view_id: view for view in _insist(viewer.get_state).views}
     area = (0.0, float(MENU), float(picture.width), float(picture.height - TIME_PANEL))
     for place, (x0, y0, x1, y1) in _places(blueprint, _root(blueprint), area):
         view = views.get(place)

@@ -47,7 +47,8 @@ def report_converted(config: ConvertWorld, *, progress: Progress) -> Report:  # 
     from closedrooms.pipeline.world_files import beside, convert_world
 
     plan = convert_world(config.source, config.destination, config.to, level=config.level, force=config.force)
-    return _report(plan, config.destination, beside(config.destination, config.to))
+    files = beside(config.destination, config.to)
+    return _report(plan, files[0] if files else config.destination, files)
 
 
 def _report(plan: "FloorPlan", written: Path, files: Sequence[Path] = ()) -> Report:
@@ -57,4 +58,5 @@ def _report(plan: "FloorPlan", written: Path, files: Sequence[Path] = ()) -> Rep
     figures = {"rooms": len(plan.rooms), "doors": len(plan.doors), "closable rooms": len(closable_rooms(plan))}
     rows = [("figure", "value"), *((name, str(value)) for name, value in figures.items())]
     rows += [("file", str(file)) for file in files]
-    return Report(folder=written, title=plan.name, rows=rows, remarks=plan.remarks, figures=figures)
+    told = {**figures, "files": [str(file) for file in files or (written,)]}
+    return Report(folder=written, title=plan.name, rows=rows, remarks=plan.remarks, figures=told)

@@ -85,6 +85,9 @@ def _find_lack(error: BaseException) -> str:
         return "more open files than the system allows; expected a higher limit (ulimit -n)"
     if number == errno.EAGAIN or (isinstance(error, RuntimeError) and "can't start new thread" in text):
         return "more processes or threads than the system allows; expected a higher limit (ulimit -u)"
+    told = getattr(error, "strerror", "")
+    if number in {errno.ENAMETOOLONG, errno.ELOOP}:
+        return f"a name that the file system refuses ({told}); expected a shorter or plainer one"
     if number in {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}:
-        return f"cannot write ({error.strerror}); expected room on the disk"  # type: ignore[attr-defined]
+        return f"cannot write ({told}); expected room on the disk"
     return ""

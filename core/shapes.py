@@ -12,6 +12,8 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame
 
 Shape = Polygon | MultiPolygon
+# Corners so near to each other are one, where areas touch [m].
+SNAP = 1e-7
 
 
 def polygon_iou(a: BaseGeometry, b: BaseGeometry) -> float:
@@ -20,6 +22,17 @@ def polygon_iou(a: BaseGeometry, b: BaseGeometry) -> float:
     a, b = (shape if shape.is_valid else shapely.make_valid(shape) for shape in (a, b))
     union = a.union(b).area
     return float(a.intersection(b).area / union) if union else 0.0
+
+
+def take_away(shape: Shape, taken: Iterable[BaseGeometry]) -> BaseGeometry:
+    """Take areas away from a shape: a valid area, empty where nothing is left.
+
+    Of areas that touch but for a rounding error, what is left may come out as a shape with its neighbour as a hole
+    outside of it: such are taken away again with corners on a lattice of :data:`SNAP`.
+    """
+    whole = shapely.union_all(list(taken))
+    left = shape.difference(whole)
+    return left if left.is_valid else shape.difference(whole, grid_size=SNAP)
 
 
 def cells_inside(shape: Shape, frame: GridFrame) -> BoolArray:

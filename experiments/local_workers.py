@@ -11,7 +11,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing import spawn
 from typing import Any
 
-from closedrooms.core.runtime.stopping import SIGNALS
+from closedrooms.core.runtime.stopping import PR_SET_PDEATHSIG, SIGNALS
 from closedrooms.experiments.worker_process import GRACE, begin_worker
 
 SAFE_PATH = "PYTHONSAFEPATH"
@@ -48,9 +48,15 @@ def hire(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 _SPAWNED = spawn.get_command_line
-# A worker whose parent is gone before it has said what to do ends; Python's own words for that are a traceback.
+# A worker whose parent is gone before it has said what to do ends: the kernel sees to it from the first line on, long
+# before our own modules are imported, and where it is gone by then Python's own words would be a traceback.
 _QUIETLY = """\
-import pickle, sys
+import ctypes, os, pickle, sys
+ask = getattr(ctypes.CDLL(None), "prctl", None)
+if ask is not None:
+    ask({death}, {kill})
+if os.getppid() != {parent}:
+    os._exit(1)
 try:
     {program}
 except (EOFError, pickle.UnpicklingError):
@@ -62,7 +68,7 @@ def _command_line(**named: Any) -> list[str]:
     """Make the command that a worker begins with, as the standard library does, but quiet where its parent is gone."""
     words = list(_SPAWNED(**named))
     at = words.index("-c") + 1
-    words[at] = _QUIETLY.format(program=words[at])
+    words[at] = _QUIETLY.format(program=words[at], death=PR_SET_PDEATHSIG, kill=int(signal.SIGKILL), parent=os.getpid())
     return words
 
 

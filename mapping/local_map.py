@@ -6,6 +6,7 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.mapping.config import MapperConfig
+from closedrooms.mapping.free_space import FreeSpace
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 
@@ -20,12 +21,17 @@ class LocalMap:
 
     What was mapped before a long way round may have drifted away from what is seen now. It comes back into the field
     when a loop brings it near along the graph.
+
+    Attributes:
+        field: Their surfaces.
+        free: What they saw through.
     """
 
     def __init__(self, config: MapperConfig) -> None:
         self._config = config
         self._members: BoolArray = np.zeros(0, dtype=np.bool_)
         self.field = LikelihoodField(config.resolution, config.matcher)
+        self.free = FreeSpace(config)
 
     def update(self, keyframes: Sequence[Keyframe], path_lengths: FloatArray, distances: FloatArray) -> None:
         """Bring the field up to date after a new keyframe, the last one.
@@ -40,13 +46,16 @@ class LocalMap:
         members[: len(self._members)] = self._members
         if np.count_nonzero(members & near & (path_lengths > HYSTERESIS * horizon)) > STALE_MEMBERS:
             self.field.clear()
+            self.free.clear()
             members[:] = False
         entering = near & (path_lengths <= horizon) & ~members
-        chosen = (keyframes[i] for i in np.flatnonzero(entering).tolist())
-        self.field.add_scans([k.pose.transform(k.beams.points) for k in chosen])
+        chosen = [keyframes[i] for i in np.flatnonzero(entering).tolist()]
+        self.field.add_scans([k.pose.transform(k.surfaces) for k in chosen])
+        self.free.add([(k.beams, k.pose) for k in chosen])
         self._members = members | entering
 
     def clear(self) -> None:
         """Forget all, because poses were corrected."""
         self._members = np.zeros(0, dtype=np.bool_)
         self.field.clear()
+        self.free.clear()

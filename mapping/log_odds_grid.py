@@ -18,6 +18,11 @@ SUBCELL_BITS = 6
 """Fraction bits of OpenCV's fixed-point polygon corners: 1/64 cell."""
 CROSSED, CROSSED_SHARE = 3, 0.25
 """Scans that went through a surface, and how many more for each that saw it, from which on it counts as crossed."""
+GONE, GONE_SHARE = 2, 0.4
+"""Scans that went through a place, at least, and for each that saw a surface there, from which on what stood there has
+gone: the place of somebody who was seen from ten keyframes, and from four not, is free."""
+NOISE = 0.10
+"""Distance around a cell in which these are counted [m]."""
 LatticeWindow = tuple[int, int, int, int]
 """First row and column in the arrays, and number of rows and columns."""
 
@@ -45,12 +50,14 @@ class EvidenceGrid:
     """Occupancy after Moravec and Elfes as counts of hits and misses; log-odds are their weighted difference.
 
     A scan counts once per cell. Counts are sums, so a keyframe that moved is taken out at its old pose and put in at
-    its new one without drawing the others again.
+    its new one without drawing the others again. Where something stood that has gone only misses count: what moves
+    fades by its miss count, and does not take as many misses as it had hits.
     """
 
     def __init__(self, config: MapperConfig) -> None:
         self._config = config
         self._lattice = Lattice(config.resolution)
+        self._noise = math.ceil(NOISE / config.resolution)
         shape = self._lattice.frame.shape
         self._hits = np.zeros(shape, dtype=np.int32)
         # Whole numbers, exact up to 2^24: OpenCV adds a mask to floats five times as quickly as to integers.
@@ -153,8 +160,9 @@ class EvidenceGrid:
         if self._dirty is None and self._grid is not None:
             return self._grid
         if self._dirty is not None:
-            row, col, n_rows, n_cols = self._dirty
-            rows, cols = slice(row, row + n_rows), slice(col, col + n_cols)
+            # What is drawn of a cell depends on those around it.
+            window = self._wider(self._dirty, self._noise)
+            rows, cols = _slices(window)
             hits, misses = self._hits[rows, cols], self._misses[rows, cols]
             most_hits, most_misses = self._percent.shape
             if hits.max() >= most_hits or misses.max() >= most_misses:
@@ -163,6 +171,9 @@ class EvidenceGrid:
                 self._percent = self._probabilities(most_hits, most_misses)
             places = hits * self._percent.shape[1]
             places += misses.astype(np.int32)
+            # What has gone is free, however long it stood there.
+            gone = self._faded(window) & (misses > 0.0)
+            np.copyto(places, misses.astype(np.int32), where=gone)
             self._cells[rows, cols] = self._percent.ravel().take(places)
             self._redrawn, self._dirty = self._dirty, None
         cells = self._cells.copy()
@@ -170,25 +181,55 @@ class EvidenceGrid:
         self._grid = OccupancyGrid(self._lattice.frame, cells)
         return self._grid
 
-    def crossed(self, apart: float) -> tuple[int, int, BoolArray]:
+    def crossed(
+        self, apart: float, *, share: float = CROSSED_SHARE, within: tuple[FloatArray, FloatArray] | None = None
+    ) -> tuple[int, int, BoolArray]:
         """Mark the cells that scans went through, whether or not a surface was seen there.
 
         The noise of a wall is crossed, too: what is within ``apart`` [m] of a surface that is not crossed does not
-        count. Only what the last :meth:`grid` drew is looked at.
+        count.
 
         Args:
             apart: Reach of the noise of a surface [m].
+            share: Scans that went through a cell, beside ``CROSSED``, for each that saw a surface there.
+            within: Lower left and upper right corner of what is looked at, map frame, ``(x, y)`` [m]; without it only
+                what the last :meth:`grid` drew.
 
         Returns:
-            First row and column of the window that was drawn, on the lattice, and its cells.
+            First row and column of the window that was looked at, on the lattice, and its cells.
         """
+        lattice = self._lattice
         row, col, n_rows, n_cols = self._redrawn
+        if within is not None:
+            (row, last_row), (col, last_col) = (cells.tolist() for cells in lattice.cells(np.stack(within)))
+            n_rows, n_cols = last_row + 1 - row, last_col + 1 - col
         hits, misses = (a[row : row + n_rows, col : col + n_cols] for a in (self._hits, self._misses))
-        through = misses >= CROSSED + hits * np.float32(CROSSED_SHARE)
-        span = 2 * math.ceil(apart / self._lattice.resolution) + 1
+        through = misses >= CROSSED + hits * np.float32(share)
+        span = 2 * math.ceil(apart / lattice.resolution) + 1
         solid = ((hits > 0) & ~through).astype(np.uint8)
         through &= cv2.dilate(solid, np.ones((span, span), dtype=np.uint8)) == 0
-        return row + self._lattice.row0, col + self._lattice.col0, through
+        return row + lattice.row0, col + lattice.col0, through
+
+    def _faded(self, window: LatticeWindow) -> BoolArray:
+        """Mark the cells of a window in which something stood that has gone.
+
+        The noise of a wall was gone through, too, often, but the wall beside it was not: what counts are the hits
+        around a cell, and how many of them were gone through as often.
+        """
+        around = self._wider(window, self._noise)
+        hits, misses = self._hits[_slices(around)].astype(np.float32), self._misses[_slices(around)]
+        span = (2 * self._noise + 1, 2 * self._noise + 1)
+        most = cv2.dilate(np.where(hits > 0.0, misses, np.float32(0.0)), np.ones(span, dtype=np.uint8))
+        again = cv2.boxFilter(np.minimum(hits, misses), -1, span, normalize=False)
+        faded: BoolArray = (most >= GONE) & (again >= GONE_SHARE * cv2.boxFilter(hits, -1, span, normalize=False))
+        return faded[window[0] - around[0] :, window[1] - around[1] :][: window[2], : window[3]]
+
+    def _wider(self, window: LatticeWindow, reach: int) -> LatticeWindow:
+        """Widen a window by ``reach`` cells to all sides, as far as the arrays go."""
+        row, col = max(window[0] - reach, 0), max(window[1] - reach, 0)
+        last_row = min(window[0] + window[2] + reach, self._hits.shape[0])
+        last_col = min(window[1] + window[3] + reach, self._hits.shape[1])
+        return (row, col, last_row - row, last_col - col)
 
     def _probabilities(self, hits: int, misses: int) -> CellArray:
         """Tabulate the probability in percent for each number of hits (rows) and misses (columns): it is quicker."""
@@ -208,6 +249,11 @@ def _box(outline: FloatArray, points: FloatArray) -> tuple[tuple[float, float], 
     """Find the lower left and upper right corner of all, shapes (n, 2) and (m, 2), n > 0."""
     x, y = np.concatenate((outline, points)).T.copy()
     return (float(x.min()), float(y.min())), (float(x.max()), float(y.max()))
+
+
+def _slices(window: LatticeWindow) -> tuple[slice, slice]:
+    """Write a window as slices of rows and columns."""
+    return slice(window[0], window[0] + window[2]), slice(window[1], window[1] + window[3])
 
 
 def _union(a: LatticeWindow, b: LatticeWindow) -> LatticeWindow:

@@ -138,7 +138,10 @@ class Mapper:
             self._match(points, beams, scan.stamp, before, step)
         self._prediction.moved(before.inverse() @ self._pose)
         if self._wants_keyframe():
-            self._insert(Keyframe(len(self.keyframes), scan.stamp, self._pose, beams(), points, self._travelled))
+            ends = beams().points
+            surfaces = ends[self._local.free.stands_still(self._pose, ends)]
+            number = len(self.keyframes)
+            self._insert(Keyframe(number, scan.stamp, self._pose, beams(), points, surfaces, self._travelled))
         self._last_odometry = odometry
         latest = self.keyframes[-1]
         keyframe_T_robot = latest.pose.inverse() @ self._pose
@@ -213,7 +216,18 @@ class Mapper:
             self._take(match)
 
     def _match_from(self, guess: Pose2, points: FloatArray) -> Match | None:
-        """Match points, robot frame [m], from a guess of ``map_T_robot``; ``None`` where they fit nowhere near."""
+        """Match points, robot frame [m], from a guess of ``map_T_robot``; ``None`` where they fit nowhere near.
+
+        What moves (which only shows where the scan lies about right) is left out: where walls do not tell how far the
+        robot has come along them, it would take the robot with it.
+        """
+        match = self._match_all(guess, points)
+        if match is None:
+            return None
+        still = self._local.free.stands_still(match.pose, points)
+        return match if still.all() else self._match_all(guess, points[still]) or match
+
+    def _match_all(self, guess: Pose2, points: FloatArray) -> Match | None:
         config, reach = self._config.matcher, self._config.recovery.max_reach
         usual = self._usual_score
         return match_scan(self._local.field, points, guess, self._motion, usual_score=usual, config=config, reach=reach)

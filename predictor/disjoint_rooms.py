@@ -9,7 +9,7 @@ from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.door import Point as Place
 from closedrooms.core.room import Room
-from closedrooms.core.shapes import Shape
+from closedrooms.core.shapes import Shape, take_away
 
 # What two rooms may share [m2]: rounding.
 SHARED = 1e-9
@@ -58,7 +58,7 @@ def _rank(room: Room, doors: Mapping[str, Place]) -> tuple[float | str, ...]:
 def _find_rest(room: Room, taken: Sequence[Shape], doors: Mapping[str, Place]) -> Room | None:
     """Find the part of a room outside of what is taken that is still a room behind one of its doors, the largest."""
     best: tuple[float, Polygon, tuple[str, ...]] | None = None
-    for part in _find_wide_parts(room.polygon.difference(shapely.union_all(list(taken)))):
+    for part in _find_wide_parts(take_away(room.polygon, taken)):
         behind = tuple(
             door
             for door in room.doors

@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.grid import Bounds
 from closedrooms.sim.config import STEPS
 from closedrooms.sim.pybullet_process import check_display, import_pybullet, quiet
 from closedrooms.sim.solids import LEAF, RGBA, WALLS, MovingPart, volume
@@ -84,6 +85,20 @@ class PhysicsWorld:
         self.floor = bullet.createMultiBody(0.0, plane, physicsClientId=client)
         bullet.setCollisionFilterGroupMask(self.floor, -1, FLOOR, WHEELS, physicsClientId=client)
         bullet.changeDynamics(self.floor, -1, lateralFriction=1.0, physicsClientId=client)
+
+    def look_at(self, bounds: Bounds) -> None:
+        """Show ``(x_min, y_min, x_max, y_max)`` [m] from above in the window, without PyBullet's panels."""
+        if not self._window:
+            return
+        x0, y0, x1, y1 = bounds
+        self._bullet.configureDebugVisualizer(self._bullet.COV_ENABLE_GUI, 0, physicsClientId=self._client)
+        self._bullet.resetDebugVisualizerCamera(
+            cameraDistance=0.62 * max(x1 - x0, 1.4 * (y1 - y0)),
+            cameraYaw=0.0,
+            cameraPitch=-80.0,
+            cameraTargetPosition=((x0 + x1) / 2, (y0 + y1) / 2, 0.0),
+            physicsClientId=self._client,
+        )
 
     @property
     def bullet(self) -> Any:

@@ -33,6 +33,7 @@ from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.glazing import glazed
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start_pose import start_pose
+from closedrooms.worlds.truth import truth_bounds
 
 
 class Simulation:
@@ -72,6 +73,7 @@ class Simulation:
             wheels = self.config.body == "wheels"
             physics = stack.enter_context(PhysicsWorld(stepped=wheels, window=self.config.gui))
             self._building = Building(self.plan, self._closed, self.config, physics)
+            physics.look_at(truth_bounds(self.plan, Pose2(0.0, 0.0, 0.0)))
             start, robot = self.world_T_map, self.config.robot
             self._check_start()
             self._drive: DrivenRobot = (

@@ -43,7 +43,7 @@ class DoorRow:
                 self._field.classes("col-grow").props["data-door"] = name
                 self._field.on("change", self._renamed)
                 self._field.on("keydown.enter", js_handler="event => event.target.blur()")
-                plain_button("my_location", "select", self._selected)
+                plain_button("my_location", "select and show on the map", self._selected)
                 plain_button("rotate_left", "turn left", lambda: self._turned(TURN))
                 plain_button("rotate_right", "turn right", lambda: self._turned(-TURN))
                 plain_button("delete", "delete", self._deleted)

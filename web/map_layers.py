@@ -1,6 +1,9 @@
 """What a session holds, drawn on the map."""
 
+from collections.abc import Sequence
+
 import numpy as np
+from shapely.geometry import MultiPoint
 
 from closedrooms.core.grid import Bounds, OccupancyGrid
 from closedrooms.core.names import shown
@@ -15,6 +18,8 @@ from closedrooms.web.session import EditSession
 FILL = 0.35
 # Room around the map, as a share of its longer side: a room behind an outer wall still shows.
 AROUND = 0.08
+# What is shown around a door that is looked for, on every side [m].
+NEAR = 3.0
 
 
 class MapLayers:
@@ -38,9 +43,20 @@ class MapLayers:
     def show_all(self) -> None:
         """Fit the view to what is known and to the rooms that are predicted, with some room around them."""
         rooms = () if self._session.outcome is None else self._session.outcome.rooms
-        boxes = np.array([self._session.sheet.bounds, *(room.polygon.bounds for room in rooms)])
-        (x0, y0), (x1, y1) = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
-        around = AROUND * max(x1 - x0, y1 - y0)
+        self._show([self._session.sheet.bounds, *(room.polygon.bounds for room in rooms)], AROUND)
+
+    def show_door(self, name: str) -> None:
+        """Fit the view to a door and the room behind it, with their surroundings."""
+        session = self._session
+        door = MultiPoint(session.segment(session.document.door(name))).buffer(NEAR)
+        rooms = () if session.outcome is None else session.outcome.rooms
+        self._show([door.bounds, *(room.polygon.bounds for room in rooms if name in room.doors)], 2 * AROUND)
+
+    def _show(self, boxes: Sequence[Bounds], share: float) -> None:
+        """Fit the view to several bounds [m] and a share of their longer side around them."""
+        all_boxes = np.array(boxes)
+        (x0, y0), (x1, y1) = all_boxes[:, :2].min(axis=0), all_boxes[:, 2:].max(axis=0)
+        around = share * max(x1 - x0, y1 - y0)
         self._board.show((float(x0 - around), float(y0 - around), float(x1 + around), float(y1 + around)))
 
     def fade(self, share: float) -> None:

@@ -62,7 +62,7 @@ class EditPage:
                 self._pointer = ui.label("").classes("pointer").props("data-id=pointer")
             with ui.column().classes("side"):
                 self._status = ui.label("").props("data-id=status role=status aria-live=polite")
-                self._list = DoorList(session, self._done, self._select)
+                self._list = DoorList(session, self._done, self._show_door)
         self._keys = Keyboard(session, self._board, self._done, self._select, self._layers.show_all)
         ui.on("save", self._save_pressed)
 
@@ -133,6 +133,8 @@ class EditPage:
     async def _tour_switched(self) -> None:
         self._tour = None
         self._layers.draw_tour(self._tour)
+        if not self._busy:
+            self._say_outcome()
         await self._plan_tour()
 
     async def _uploaded(self, event: UploadEventArguments) -> None:
@@ -185,6 +187,12 @@ class EditPage:
     def _select(self, name: str | None) -> None:
         self._session.selected = name
         self.draw()
+
+    def _show_door(self, name: str | None) -> None:
+        """Select a door from the list, where nobody sees which one it is, and go to it on the map."""
+        self._select(name)
+        if name is not None:
+            self._layers.show_door(name)
 
     # What comes of it
 

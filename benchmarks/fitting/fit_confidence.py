@@ -2,11 +2,17 @@
 
     python benchmarks/fitting/fit_confidence.py FIT [FIT ...] [--methods best paper ...] [--every 1] [--held-out MODEL]
 
-FIT are folders of samples, as ``drawn_maps.py`` writes them; a building of another use is refused. The curve of
-confidence is fitted on what other buildings gave (five folds over groups of buildings), so that a regression that knows
-its own buildings too well does not pass for sure; the curve of cells is fitted on the buildings themselves. For the
-method ``learned`` MODEL, the folder that ``closedrooms train`` wrote, names the buildings that its network has not
-learned from: only those are looked at.
+FIT are folders of samples, as ``drawn_maps.py`` and ``closedrooms dataset`` write them; a building of another use is
+refused. Drawn maps are a kinder world than those of a robot: the rooms of every folder count the same altogether, and
+``--every`` takes a number for each folder, or one for all. The curve of confidence is fitted on what other buildings
+gave (five folds over groups of buildings), so that a regression that knows its own buildings too well does not pass for
+sure; the curve of cells is fitted on the buildings themselves. For the method ``learned`` MODEL, the folder that
+``closedrooms train`` wrote, names the buildings that its network has not learned from: only those are looked at.
+
+    python benchmarks/fitting/drawn_maps.py PLANS --use fit --maps 10 --generated 80 --bundled --out DRAWN
+    closedrooms dataset PLAN ... --repetitions 2 --max-closed 8 --out RUNS
+    python benchmarks/fitting/fit_confidence.py DRAWN RUNS --methods learned --every 6 2 --held-out MODEL
+    python benchmarks/fitting/fit_confidence.py DRAWN RUNS --methods best --every 20 2
 """
 
 import argparse
@@ -22,7 +28,7 @@ from typing import Any
 import numpy as np
 from sklearn.isotonic import IsotonicRegression
 from sklearn.linear_model import Ridge
-from sklearn.model_selection import GroupKFold, cross_val_predict
+from sklearn.model_selection import GroupKFold
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.files.outgoing import write_json
@@ -41,10 +47,14 @@ from closedrooms.predictor.confidence.shape_variants import FACTORS, RoomVariant
 from closedrooms.predictor.methods import METHODS, find_method
 from closedrooms.predictor.prediction import Prediction
 
-RIDGE, FOLDS, KNOTS = 30.0, 5, 11
+# A strong ridge: numbers of drawn maps must hold on maps of runs, and the other way round.
+RIDGE, FOLDS, KNOTS = 300.0, 5, 11
 # Every variant counts so often at least, as a share of all rooms of a kind: what was never seen may yet be.
 PRIOR = 0.02
 KINDS = ("independent", "dependent", "border", "none")
+# Of what is measured of the rooms of every method (``NAMES``), the first so many count for one; with more of it
+# confidence holds less well on maps of the other kind (``choose``).
+COUNTED = {"learned": 1}
 
 
 @dataclass
@@ -54,6 +64,7 @@ class Collected:
     features: list[FloatArray] = field(default_factory=list)
     ious: list[float] = field(default_factory=list)
     groups: list[str] = field(default_factory=list)
+    folders: list[int] = field(default_factory=list)
     nearest: list[tuple[float, bool]] = field(default_factory=list)
     cells: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
     variants: dict[str, list[FloatArray]] = field(default_factory=lambda: defaultdict(list))
@@ -82,7 +93,9 @@ def smooth(shares: list[FloatArray]) -> FloatArray:
     return np.asarray(total / total.sum())
 
 
-def learn_rooms(collected: Collected, sample: Sample, prediction: Prediction, beliefs: list[Belief]) -> None:
+def learn_rooms(
+    collected: Collected, folder: int, sample: Sample, prediction: Prediction, beliefs: list[Belief]
+) -> None:
     """Measure features and IoU of every room, and which of its shapes came nearest."""
     truth = {door: room.polygon for room in sample.rooms for door in room.doors}
     measured = measure_rooms(sample.observed, prediction.rooms, beliefs)
@@ -94,6 +107,7 @@ def learn_rooms(collected: Collected, sample: Sample, prediction: Prediction, be
         collected.features.append(features)
         collected.ious.append(own)
         collected.groups.append(group_of(sample.world))
+        collected.folders.append(folder)
         others = [polygon_iou(other.polygon, true) for other in belief.alternatives]
         best = max([own, *others])
         for other, iou in zip(belief.alternatives, others, strict=True):
@@ -123,9 +137,9 @@ def on_frame(values: FloatArray, frame: GridFrame, sample: Sample) -> FloatArray
     return out
 
 
-def knots(x: FloatArray, y: FloatArray) -> list[list[float]]:
+def knots(x: FloatArray, y: FloatArray, weights: FloatArray | None = None) -> list[list[float]]:
     """Fit a growing curve through a few knots: isotonic regression, read at equal shares of the values."""
-    curve = IsotonicRegression(out_of_bounds="clip").fit(x, y)
+    curve = IsotonicRegression(out_of_bounds="clip").fit(x, y, sample_weight=weights)
     edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, KNOTS)))
     if len(edges) < 2:
         edges = np.array([edges[0], edges[0] + 1e-6])
@@ -135,13 +149,21 @@ def knots(x: FloatArray, y: FloatArray) -> list[list[float]]:
     return [[round(a, 5), round(b, 5)] for a, b in zip(middle, np.maximum.accumulate(at), strict=True)]
 
 
-def fit(collected: Collected, variants: dict[str, FloatArray]) -> dict[str, Any]:
-    """Fit the numbers of one method."""
+def fit(collected: Collected, variants: dict[str, FloatArray], counted: int = len(NAMES)) -> dict[str, Any]:
+    """Fit the numbers of one method, for which so many of the features of every method count."""
     x, y = np.array(collected.features), np.array(collected.ious)
-    mean, scale = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-6)
-    model = Ridge(alpha=RIDGE)
-    held = cross_val_predict(model, (x - mean) / scale, y, groups=collected.groups, cv=GroupKFold(FOLDS))
-    model.fit((x - mean) / scale, y)
+    x[:, counted : len(NAMES)] = 0.0
+    # Every folder counts the same, a room once on average.
+    sizes = np.bincount(collected.folders)
+    each = len(y) / (np.count_nonzero(sizes) * sizes[collected.folders])
+    mean = np.average(x, axis=0, weights=each)
+    scale = np.maximum(np.sqrt(np.average((x - mean) ** 2, axis=0, weights=each)), 1e-6)
+    model, shifted = Ridge(alpha=RIDGE), (x - mean) / scale
+    held = np.zeros(len(y))
+    for known, asked in GroupKFold(FOLDS).split(x, groups=collected.groups):
+        model.fit(shifted[known], y[known], sample_weight=each[known])
+        held[asked] = model.predict(shifted[asked])
+    model.fit(shifted, y, sample_weight=each)
     shares, hits = (np.array(values, dtype=np.float64) for values in zip(*collected.nearest, strict=True))
     thought, free = (np.concatenate(values) for values in zip(*collected.cells, strict=True))
     curve = knots(thought[thought >= 0.01], free[thought >= 0.01])
@@ -150,7 +172,7 @@ def fit(collected: Collected, variants: dict[str, FloatArray]) -> dict[str, Any]
         "mean": [round(v, 5) for v in mean.tolist()],
         "weights": [round(v, 5) for v in (model.coef_ / scale).tolist()],
         "intercept": round(float(model.intercept_), 5),
-        "confidence": knots(held, y),
+        "confidence": knots(held, y, each),
         "nearest": knots(shares, hits),
         "cells": [[0.0, 0.0], *curve],
         "variants": {kind: [round(v, 5) for v in shares.tolist()] for kind, shares in variants.items()},
@@ -158,11 +180,13 @@ def fit(collected: Collected, variants: dict[str, FloatArray]) -> dict[str, Any]
 
 
 def predictions(
-    folders: list[Path], method: str, every: int, held_out: set[str] | None
-) -> Iterator[tuple[Sample, Prediction]]:
-    """Yield samples with the raw prediction of a method."""
+    folders: list[Path], method: str, every: list[int], held_out: set[str] | None
+) -> Iterator[tuple[int, Sample, Prediction]]:
+    """Yield the number of the folder, samples and the raw prediction of a method."""
     chosen = find_method(method)
-    for path in find_samples(folders)[::every]:
+    steps = every * len(folders) if len(every) == 1 else every
+    lots = [find_samples([folder])[::step] for folder, step in zip(folders, steps, strict=True)]
+    for folder, path in ((number, path) for number, paths in enumerate(lots) for path in paths):
         sample = read_sample(path)
         if held_out is not None and group_of(sample.world) not in held_out:
             continue
@@ -170,34 +194,34 @@ def predictions(
             sys.exit(f"{sample.world} is not of the use fit")
         config = chosen.config()
         shared = {"started": Starts(sample).of(config)[0]} if chosen.shares_faces else {}
-        yield sample, chosen.resolved_function(sample.observed, sample.doors, config, **shared)
+        yield folder, sample, chosen.resolved_function(sample.observed, sample.doors, config, **shared)
 
 
 def collect(
-    folders: list[Path], method: str, every: int, held_out: set[str] | None
+    folders: list[Path], method: str, every: list[int], held_out: set[str] | None
 ) -> tuple[Collected, dict[str, FloatArray]]:
     """Collect from every third sample how often each variant is right, from the others how sure to be then."""
     collected = Collected()
-    waiting: list[tuple[Sample, Prediction]] = []
+    waiting: list[tuple[int, Sample, Prediction]] = []
     variants: dict[str, FloatArray] = {}
-    for number, (sample, prediction) in enumerate(predictions(folders, method, every, held_out)):
+    for number, (folder, sample, prediction) in enumerate(predictions(folders, method, every, held_out)):
         if prediction.beliefs or not prediction.rooms:
-            learn_rooms(collected, sample, prediction, list(prediction.beliefs))
+            learn_rooms(collected, folder, sample, prediction, list(prediction.beliefs))
             learn_cells(collected, sample, list(prediction.beliefs))
         elif number % 3 == 0:
             learn_variants(collected, sample, prediction)
         else:
-            waiting.append((sample, replace(prediction, grid=sample.observed)))
+            waiting.append((folder, sample, replace(prediction, grid=sample.observed)))
     everything = [share for shares in collected.variants.values() for share in shares]
     for kind in KINDS:
         variants[kind] = smooth(collected.variants[kind] or everything)
-    for sample, prediction in waiting:
+    for folder, sample, prediction in waiting:
         doors = {door.id: door for door in sample.doors}
         beliefs = [
             RoomVariants(sample.observed, room, doors[room.doors[0]].midpoint).believe(variants[room.kind or "none"])
             for room in prediction.rooms
         ]
-        learn_rooms(collected, sample, prediction, beliefs)
+        learn_rooms(collected, folder, sample, prediction, beliefs)
         learn_cells(collected, sample, beliefs)
     return collected, variants
 
@@ -206,7 +230,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("fit", type=Path, nargs="+")
     parser.add_argument("--methods", nargs="+", default=list(METHODS))
-    parser.add_argument("--every", type=int, default=1)
+    parser.add_argument("--every", type=int, nargs="+", default=[1])
     parser.add_argument("--held-out", type=Path)
     args = parser.parse_args()
     held_out = None
@@ -214,7 +238,7 @@ def main() -> None:
         held_out = set(json.loads((args.held_out / "run.json").read_text())["buildings"]["held_out"])
     for method in args.methods:
         collected, variants = collect(args.fit, method, args.every, held_out)
-        own = fit(collected, variants)
+        own = fit(collected, variants, COUNTED.get(method, len(NAMES)))
         numbers = json.loads(FILE.read_text())["methods"] if FILE.is_file() else {}
         write_json(FILE, {"features": list(NAMES), "methods": numbers | {method: own}})
         print(method, len(collected.ious), round(float(np.mean(collected.ious)), 4), flush=True)

@@ -1,6 +1,6 @@
 """What bodies cost: processor time a simulated second, kinematic beside wheels beside bare ``stepSimulation``.
 
-    python benchmarks/speed/physics.py [WORLD ...] [--seconds S] [--rounds N] [--quick]
+    python benchmarks/speed/physics.py [WORLD ...] [--seconds S] [--rounds N] [--quick] [--sweeps] [--csv CSV]
 
 The robot drives the same commands in every row. Bare steps are those of the world with wheels, without commands,
 encoders or contacts being read. Rays are one sweep of 720 beams a tenth of a second. The bodies take turns, figures are
@@ -9,11 +9,15 @@ and turns at 2 rad/s instead, and says how far the mapper is off with instant an
 """
 
 import argparse
+import csv
 import math
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from itertools import pairwise
+from pathlib import Path
 from statistics import median
 from time import process_time
+from typing import TextIO
 
 import numpy as np
 
@@ -30,6 +34,9 @@ from closedrooms.worlds.plan import FloorPlan
 
 WORLDS = ("office-01", "office-07", "school-09")
 CLOSED = 5
+COST_HEAD = ("world", "doors", "body", "move [ms/s]", "rays [ms/s]", "us a step", "ours / best known")
+SWEEP_HEAD = ("world", "sweep", "straightened", "way [m]", "ATE [m]", "ATE [deg]")
+Row = tuple[str, ...]
 
 
 def main() -> None:
@@ -39,20 +46,35 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--quick", action="store_true", help="one world, 5 s, one round")
     parser.add_argument("--sweeps", action="store_true", help="errors of rolling sweeps instead of costs")
+    parser.add_argument("--csv", type=Path, help="write the table here, not to the screen")
     options = parser.parse_args()
     if options.quick:
         options.worlds, options.seconds, options.rounds = options.worlds[:1], 5.0, 1
+    plans = ((name, load_world(name)) for name in options.worlds)
     if options.sweeps:
-        for name in options.worlds:
-            compare_sweeps(name, load_world(name), options.seconds)
+        head, rows = SWEEP_HEAD, (row for plan in plans for row in compare_sweeps(*plan, options.seconds))
+    else:
+        head, rows = (
+            COST_HEAD,
+            (row for plan in plans for row in compare_bodies(*plan, options.seconds, options.rounds)),
+        )
+    if options.csv is None:
+        write_rows(sys.stdout, head, rows)
         return
-    heads = "".join(f"{head:>13}" for head in ("move [ms/s]", "rays [ms/s]", "us a step"))
-    print(f"{'world':<12}{'doors':>6}{'body':>11}{heads}{'ours / best known':>19}")
-    for name in options.worlds:
-        compare_bodies(name, load_world(name), options.seconds, options.rounds)
+    with options.csv.open("w", newline="") as file:
+        write_rows(file, head, rows)
 
 
-def compare_bodies(name: str, plan: FloorPlan, seconds: float, rounds: int) -> None:
+def write_rows(file: TextIO, head: Row, rows: Iterator[Row]) -> None:
+    """Write a table, each row as soon as it is measured."""
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(head)
+    for row in rows:
+        writer.writerow(row)
+        file.flush()
+
+
+def compare_bodies(name: str, plan: FloorPlan, seconds: float, rounds: int) -> Iterator[Row]:
     """Measure one row a body, and one for the steps alone."""
     closed = draw_closed(plan, min(CLOSED, len(closable_rooms(plan))), np.random.default_rng(0))
     taken: dict[str, list[tuple[float, float]]] = {"kinematic": [], "wheels": [], "bare steps": []}
@@ -72,11 +94,8 @@ def compare_bodies(name: str, plan: FloorPlan, seconds: float, rounds: int) -> N
     for body, times in taken.items():
         moved, rays = (median(column) for column in zip(*times, strict=True))
         step = f"{moved / STEPS * 1e6:.1f}" if body != "kinematic" else ""
-        print(
-            f"{name:<12}{len(plan.doors):>6}{body:>11}{1e3 * moved:>13.2f}{1e3 * rays:>13.2f}{step:>13}"
-            f"{moved / limit:>19.2f}",
-            flush=True,
-        )
+        beside = f"{moved / limit:.2f}"
+        yield (name, str(len(plan.doors)), body, f"{1e3 * moved:.2f}", f"{1e3 * rays:.2f}", step, beside)
 
 
 def cost(work: Callable[[], object]) -> float:
@@ -86,7 +105,7 @@ def cost(work: Callable[[], object]) -> float:
     return process_time() - begun
 
 
-def compare_sweeps(name: str, plan: FloorPlan, seconds: float) -> None:
+def compare_sweeps(name: str, plan: FloorPlan, seconds: float) -> Iterator[Row]:
     """Compare trajectory errors on one drive back and forth with turns on the spot, at 10 Hz."""
     for sweep, undistort in (("instant", True), ("rolling", False), ("rolling", True)):
         lidar = LidarConfig(sweep="rolling") if sweep == "rolling" else LidarConfig()
@@ -101,8 +120,8 @@ def compare_sweeps(name: str, plan: FloorPlan, seconds: float) -> None:
             mapper.finish()
             position, heading = ate(mapper.trajectory()[1], np.array(truth))
             way = sum(Pose2(*a).distance(Pose2(*b)) for a, b in pairwise(truth))
-            how = "straightened" if sweep == "rolling" and undistort else ""
-            print(f"{name:<12}{sweep:<8} {how:<13}{way:6.1f} m  ATE {position:.4f} m {math.degrees(heading):.3f} deg")
+            how = "" if sweep == "instant" else "yes" if undistort else "no"
+            yield (name, sweep, how, f"{way:.1f}", f"{position:.4f}", f"{math.degrees(heading):.3f}")
 
 
 def command(number: int, ranges: np.ndarray) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from typing import Literal, get_args
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import read_bytes, read_json
 from closedrooms.core.files.outgoing import write_bytes
+from closedrooms.worlds.generation.generator import GENERATOR_VERSION
 
 Use = Literal["fit", "choose", "report"]
 USES: tuple[Use, ...] = get_args(Use)
@@ -24,7 +25,8 @@ BUILDINGS, LEDGER = HERE / "buildings.json", HERE / "ledger.csv"
 COLUMNS = ("date", "commit", "method", "dataset", "figure", "value")
 # Seeds of the first generator from this on choose, those before fit.
 FIRST_CHOOSE = 1000
-GENERATED = re.compile(r"(?:office|school)-g(\d+)-(\d+)")
+# ``worlds generate`` leaves out the version of its generator: today's, as far as anybody can tell.
+GENERATED = re.compile(r"(?:office|school)-(?:g(\d+)-)?(\d+)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,17 +53,18 @@ def use_of(building: str) -> Use:
     """Look up what a building is used for.
 
     Args:
-        building: The name of its file without suffix, or ``<kind>-g<version>-<seed>`` of a generated world.
+        building: The name of its file without suffix, or ``<kind>-g<version>-<seed>`` or ``<kind>-<seed>`` of a
+            generated world.
 
     Raises:
         InvalidInputError: It is in no group: whoever adds a building decides once.
     """
-    generated = GENERATED.fullmatch(building)
-    if generated:
-        return generated_use(int(generated[1]), int(generated[2]))
     for group in read_groups():
         if building in group.buildings:
             return group.use
+    generated = GENERATED.fullmatch(building)
+    if generated:
+        return generated_use(int(generated[1] or GENERATOR_VERSION), int(generated[2]))
     raise InvalidInputError(f"the building {building!r} is in no group", expected=f"one of {BUILDINGS.name}")
 
 

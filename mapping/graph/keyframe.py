@@ -20,6 +20,8 @@ class Keyframe:
         pose: ``map_T_robot``, the current estimate.
         beams: The cleaned scan, robot frame.
         points: The points that are matched, robot frame, shape (n, 2) [m].
+        surfaces: Points of ``beams`` on what stood still, as far as it was known then, shape (m, 2) [m]: what later
+            scans are matched to.
         travelled: Distance travelled up to here [m].
         submap: Number of its submap: a new one begins where the robot was lost; a loop that joins two gives them one
             number.
@@ -35,6 +37,7 @@ class Keyframe:
     pose: Pose2
     beams: Beams
     points: FloatArray
+    surfaces: FloatArray
     travelled: float
     submap: int = 0
     shown: Beams | None = None

@@ -71,7 +71,7 @@ def find_loop(
     field = LikelihoodField(config.resolution, config.matcher)
     surroundings = (keyframes[i] for i in sorted(graph.within(older.index, loops.horizon)) if inconsistent[i])
     field.add_scans(
-        [k.pose.transform(k.beams.points) for k in surroundings if k.pose.distance(older.pose) < loops.surroundings]
+        [k.pose.transform(k.surfaces) for k in surroundings if k.pose.distance(older.pose) < loops.surroundings]
     )
     points = recent_points(keyframes, loops.recent_distance, config)
     window = SearchWindow(

@@ -16,6 +16,14 @@ from closedrooms.mapping.logs.recorded_run import RecordedRun
 GZIP, ZIP, SQLITE, MCAP = b"\x1f\x8b", b"PK\x03\x04", b"SQLite format 3", b"\x89MCAP0\r\n"
 OLD_BAG = re.compile(rb"#ROS(?:BAG|RECORD|LOG) V(\d+\.\d+)")
 ROSBAG = b"2.0"
+PACKED = {
+    b"\x28\xb5\x2f\xfd": "zstd",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ": "xz",
+    b"7z\xbc\xaf": "7-Zip",
+    b"\x04\x22\x4d\x18": "lz4",
+}
+"""What files begin with that other programs have packed whole; a folder of rosbag 2 says itself how its files are."""
 STORED = (".mcap", ".db3")
 """Names of the files in a rosbag 2 folder."""
 SAME_POSE = 1e-6
@@ -65,6 +73,10 @@ def _read(path: Path, options: BagOptions) -> RecordedRun:
         from closedrooms.mapping.logs.bags.rosbag import read_bag
 
         return read_bag(path, options)
+    packer = next((name for magic, name in PACKED.items() if head.startswith(magic)), None)
+    if packer:
+        what = "the file unpacked, or the folder with its metadata.yaml"
+        raise InvalidInputError(f"a file packed by {packer}", expected=what, where=path)
     _refuse_options(options, path)
     if head.startswith(ZIP):
         from closedrooms.mapping.logs.npz import read_scans

@@ -127,4 +127,5 @@ def _outside(panes: FloatArray, doors: Sequence[ClosedDoor]) -> FloatArray:
     leaves = shapely.union_all([shapely.LineString(door.segment) for door in doors if door.segment is not None])
     if leaves.is_empty or not len(panes):
         return panes
-    return panes[shapely.distance(shapely.points(panes.mean(axis=1)), leaves) > LEAF_REACH]
+    outside: FloatArray = panes[shapely.distance(shapely.points(panes.mean(axis=1)), leaves) > LEAF_REACH]
+    return outside

@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from closedrooms.core.files.incoming import is_there
+
 # The libraries whose version can change a result.
 LIBRARIES = (
     "closedrooms", "pybullet", "numpy", "scipy", "opencv-python-headless", "shapely", "scikit-learn", "scikit-image",
@@ -44,7 +46,7 @@ def resolved(config: Any, *, leave_out: tuple[str, ...] = ("out",)) -> dict[str,
 
 def input_path(given: str | Path) -> str:
     """Write an input as a run elsewhere finds it again: a file by its whole path, a name as it is."""
-    return str(Path(given).resolve()) if isinstance(given, Path) or Path(given).exists() else given
+    return str(Path(given).resolve()) if isinstance(given, Path) or is_there(Path(given)) else given
 
 
 def _plain(value: Any) -> Any:

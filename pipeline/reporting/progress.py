@@ -167,7 +167,22 @@ class Terminal:
 def _bars() -> Any:
     """Make bars for a terminal by rich, which is not imported where there is none."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        SpinnerColumn,
+        Task,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+    from rich.text import Text
+
+    class Remaining(TimeRemainingColumn):
+        """Time left; nothing where nobody knows, else the time gone by would read as that."""
+
+        def render(self, task: Task) -> Text:
+            return Text("") if task.time_remaining is None else super().render(task).append(" left")
 
     return Progress(
         SpinnerColumn(),
@@ -175,8 +190,7 @@ def _bars() -> Any:
         BarColumn(bar_width=24),
         TextColumn("{task.fields[note]}", markup=False),
         TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
+        Remaining(),
         console=Console(file=sys.stderr),
         transient=True,
     )

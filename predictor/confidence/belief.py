@@ -5,10 +5,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import shapely
 
-from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.grid import GridFrame
 from closedrooms.core.room import Alternative
+from closedrooms.core.shapes import Shape, cells_inside
 
 # Other shapes that a room is given. A further one that raises the expected IoU of the best guess by less than this, or
 # that overlaps a chosen one by more than this (IoU), says nothing new.
@@ -44,6 +46,12 @@ class Spread:
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         size = (frame.cols, frame.rows)
         return np.asarray(cv2.warpAffine(self.share.astype(np.float32), matrix, size, flags=flags, borderValue=0.0))
+
+    def inside(self, shape: Shape) -> BoolArray:
+        """Mark the cells whose centre lies in a shape of the map frame, shape of ``share``."""
+        axes = np.array([self.along, [-self.along[1], self.along[0]]])
+        own = shapely.transform(shape, lambda points: (points - self.origin) @ axes.T)
+        return cells_inside(own, GridFrame(self.resolution, 0.0, 0.0, *self.share.shape))
 
     def bounds(self, least: float) -> tuple[float, float, float, float] | None:
         """Bound all cells of a share of at least ``least``, map frame [m]; ``None`` where none has it."""

@@ -36,7 +36,7 @@ def predict_learned(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: Le
     rater = Rater(load_model(config.model), keep=config.shortlist)
     prediction = predict_best(grid, doors, replace(config, shortlist=max(config.rated, config.shortlist)), rate=rater)
     beliefs = tuple(
-        believe_cells(belief, [rater.heard[door] for door in room.doors])
+        believe_cells(belief, room.polygon, [rater.heard[door] for door in room.doors])
         for belief, room in zip(prediction.beliefs, prediction.rooms, strict=True)
     )
     trace = prediction.trace

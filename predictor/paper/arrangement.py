@@ -10,14 +10,13 @@ import shapely
 from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.shapes import SNAP
 from closedrooms.predictor.paper.lines import Line
 
 # An array of shapely geometries.
 Geometries = npt.NDArray[Any]
 # Slanted lines that meet nearly in a point leave slivers; smaller faces and shorter edges mean nothing [m2, m].
 MIN_FACE, MIN_EDGE = 1e-6, 1e-4
-# Corners closer than this are one where a union comes out wrong [m].
-SNAP = 1e-7
 
 
 @dataclass(frozen=True, slots=True, eq=False)

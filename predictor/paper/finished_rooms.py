@@ -4,6 +4,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from closedrooms.core.room import Room, RoomKind
+from closedrooms.core.shapes import take_away
 from closedrooms.predictor.config import PaperConfig
 from closedrooms.predictor.disjoint_rooms import NO_ROOM, part_rooms
 from closedrooms.predictor.paper.arrangement import unite_faces
@@ -51,7 +52,7 @@ def _gather_shapes(start: InitialFaces, growth: Growth, border: dict[int, Border
     """Unite the faces of each layout; border rooms take what is left beside them, the shallowest first (3.6)."""
     shapes = {room: unite(growth, room) for room in range(len(start.entrances)) if room not in border}
     for room in sorted(border, key=lambda r: (border[r].depth, start.entrances[r].door.midpoint)):
-        free = border[room].polygon().difference(shapely.union_all(list(shapes.values())))
+        free = take_away(border[room].polygon(), shapes.values())
         shapes[room] = max(shapely.get_parts(free).tolist(), key=lambda part: part.area, default=Polygon())
     return shapes
 

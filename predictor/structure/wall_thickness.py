@@ -11,6 +11,7 @@ from shapely.geometry import LineString, Polygon
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.grid import UNKNOWN, OccupancyGrid, is_free, is_occupied
+from closedrooms.core.shapes import take_away
 
 # Thicker than this is no wall but a shaft or something built in [m].
 MAX_WALL = 0.95
@@ -128,7 +129,7 @@ def free_interior(room: Polygon, grid: OccupancyGrid, thickness: float) -> Polyg
         depth = _depth(start, end, grid, thickness)
         if depth > 1e-9:
             walls.append(LineString((start, end)).buffer(depth, cap_style="square"))
-    left = room.difference(shapely.union_all(walls))
+    left = take_away(room, walls)
     parts = [part for part in shapely.get_parts(left).tolist() if isinstance(part, Polygon) and not part.is_empty]
     return max(parts, key=lambda part: part.area) if parts else room
 

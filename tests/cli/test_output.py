@@ -1,5 +1,6 @@
 """What comes back: one JSON object, more or less on the terminal, exit statuses."""
 
+import io
 import json
 import os
 import signal
@@ -60,6 +61,31 @@ def test_verbose_prints_every_step(capsys):
         terminal.advance(1)
         terminal.advance(2)
     assert capsys.readouterr().err.splitlines()[:2] == ["sweep ...", "sweep: 1 of 3"]
+
+
+class _Screen(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(("total", "left"), [(100.0, True), (None, False)])
+def test_on_a_terminal_a_bar_says_what_remains_where_that_is_known(total, left, monkeypatch):
+    screen = _Screen()
+    monkeypatch.setattr("sys.stderr", screen)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    now = 0.0
+    with progress.Terminal() as terminal:
+        terminal._bars.get_time = lambda: now
+        terminal.stage("samples", total)
+        for done in (10, 20, 30):
+            now += 5.0
+            terminal.advance(done, f"{done} done")
+        terminal._bars.refresh()
+    said = screen.getvalue()
+    assert "30 done" in said
+    assert ("0:00:35 left" in said) == left
+    assert ("left" in said) == left
 
 
 def test_off_a_terminal_a_line_every_30_seconds_says_what_remains(monkeypatch, capsys):

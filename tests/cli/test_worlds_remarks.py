@@ -46,3 +46,15 @@ def test_a_guess_is_said_and_is_no_loss(tmp_path: Path, capsys: pytest.CaptureFi
     capsys.readouterr()
     assert main(["worlds", "show", str(tmp_path / "map.yaml"), "--out", str(tmp_path / "map-plan.png")]) == 0
     assert "guessed doors: no list of doors beside the map" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("to", ["json", "rosmap", "sdf", "stage", "urdf", "obj"])
+def test_what_is_said_to_be_written_is_there_and_is_all_that_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], to: str
+) -> None:
+    assert main(["worlds", "convert", "office-01", str(tmp_path / "office"), "--to", to]) == 0
+    written = Path(capsys.readouterr().out.splitlines()[-1].removeprefix("written to "))
+    assert written.stat().st_size > 0
+    assert main(["worlds", "convert", "office-01", str(tmp_path / "office"), "--to", to, "--force", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["figures"]["files"]
+    assert {str(path) for path in tmp_path.iterdir()} == set(told)

@@ -24,6 +24,7 @@ from closedrooms.core.errors import InvalidInputError, OutputError, blaming, rea
         (BlockingIOError(errno.EAGAIN, "no"), "more processes or threads than the system allows"),
         (RuntimeError("can't start new thread"), "more processes or threads than the system allows"),
         (OSError(errno.EFBIG, "File too large"), "cannot write (File too large); expected room on the disk"),
+        (OSError(errno.ENAMETOOLONG, "File name too long"), "a name that the file system refuses (File name too long)"),
         (OSError(errno.ENOSPC, "No space left on device"), "cannot write (No space left on device); expected room"),
     ],
 )

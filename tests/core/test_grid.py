@@ -61,6 +61,12 @@ def test_known_bounds_are_tight() -> None:
     assert OccupancyGrid(frame, cells).known_bounds() == (2, 3, 4, 7)
 
 
+@pytest.mark.parametrize(("rows", "cols"), [(0, 2), (2, 0), (-1, 2), (2, -1)])
+def test_a_frame_without_cells_is_refused(rows: int, cols: int) -> None:
+    with pytest.raises(InvalidInputError, match=f"grid of {rows} x {cols} cells"):
+        GridFrame(0.05, 0.0, 0.0, rows, cols)
+
+
 def test_rejects_cells_of_another_shape_and_another_lattice() -> None:
     frame = GridFrame(0.05, 0.0, 0.0, 2, 2)
     with pytest.raises(InvalidInputError, match="shape"):

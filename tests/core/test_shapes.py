@@ -1,11 +1,13 @@
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shapely import affinity
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame
-from closedrooms.core.shapes import cells_inside, fill_shape, mark_doorways, trace_outline
+from closedrooms.core.shapes import cells_inside, fill_shape, mark_doorways, take_away, trace_outline
 
 # Quarters of a cell, so that sides and corners often lie on centres of cells.
 PLACES = st.integers(-20, 60).map(lambda quarter: quarter / 4)
@@ -76,3 +78,22 @@ def test_a_doorway_reaches_as_far_before_its_leaf_as_behind_and_no_farther_than_
     rows, cols = np.nonzero(mark_doorways(doors, GridFrame(1.0, 0.0, 0.0, 12, 12), reach=2.0))
     assert set(rows) == {3, 4, 5, 6}
     assert set(cols) == {3, 4, 5, 6}
+
+
+@pytest.mark.parametrize("turn", [0.0, 90.0, 180.0, 270.0])
+@pytest.mark.parametrize("also", [[], [shapely.box(20.0, 20.0, 21.0, 21.0)]], ids=["alone", "with another"])
+def test_what_touches_but_for_a_rounding_error_takes_nothing_away(turn, also):
+    # Of a border room of ``rose`` and the room beside it.
+    near, far = (8.863835047922466, 5.453211228960716), (8.869068529203474, 0.1182744490709728)
+    room = shapely.Polygon([near, (3.528898268032723, 5.447977747679708), (3.534131749313731, 0.1130409677899653), far])
+    top = [(11.983888751182251, 5.456271948014277), (13.896623678413464, 5.458148308100666)]
+    low = [(11.98870064582352, 0.5510946244945938), (11.98912223246326, 0.1213351681245338)]
+    beside = shapely.Polygon([*top, *low, (far[0], 0.1182744490709732), near])
+    if turn == 0.0:
+        assert not room.difference(beside).is_valid
+    room, beside = (affinity.rotate(shape, turn, origin=(0, 0)) for shape in (room, beside))
+    left = take_away(room, [beside, *also])
+    assert left.is_valid
+    assert left.area == pytest.approx(room.area, abs=1e-5)
+    assert take_away(room, [room, *also]).is_empty
+    assert take_away(room, []).equals(room)

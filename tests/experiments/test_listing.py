@@ -61,6 +61,12 @@ def test_a_dataset_is_read_as_its_manifest_lists_it(tmp_path: Path) -> None:
     assert (sample.world, sample.repetition, sample.closed, sample.rooms_seen) == ("house", 0, 2, 1)
 
 
+def test_a_sample_of_a_name_that_no_file_system_takes_is_missing(tmp_path: Path) -> None:
+    entries = [{"id": f"train/{'x' * 4000}", "status": "ok"}]
+    (sample,) = find_samples([write_dataset(tmp_path / "data", samples=entries)])
+    assert "missing" in sample.problem
+
+
 def evaluated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, dict[str, str]]:
     """Status, messages and failures of the evaluation of ``tmp_path / data``."""
     out = tmp_path / "out"

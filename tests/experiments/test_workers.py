@@ -4,6 +4,7 @@ import _thread
 import json
 import math
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -238,3 +239,29 @@ def test_a_worker_whose_parent_is_gone_ends_quietly() -> None:
     done = subprocess.run(command, pass_fds=[reading], capture_output=True, check=False)
     os.close(reading)
     assert (done.returncode, done.stdout, done.stderr) == (1, b"", b"")
+
+
+def test_a_worker_that_was_told_nothing_yet_ends_with_its_parent() -> None:
+    # Its pipe stays open here: what ends it is the kernel, before it has read a word.
+    code = (
+        "import subprocess, sys, time\n"
+        "from closedrooms.experiments.local_workers import _command_line\n"
+        "pipe = int(sys.argv[1])\n"
+        "words = _command_line(tracker_fd=pipe, pipe_handle=pipe)\n"
+        "subprocess.Popen(words, pass_fds=[pipe], stderr=subprocess.DEVNULL)\n"
+        "print('begun', flush=True)\n"
+        "time.sleep(600)\n"
+    )
+    reading, writing = os.pipe()
+    with subprocess.Popen(
+        [sys.executable, "-c", code, str(reading)], pass_fds=[reading], stdout=subprocess.PIPE, text=True
+    ) as parent:
+        os.close(reading)
+        assert parent.stdout is not None
+        assert parent.stdout.readline() == "begun\n"
+        parent.kill()
+        # The worker holds the other end of it for as long as it lives.
+        gone, _, _ = select.select([parent.stdout], [], [], 120.0)
+        os.close(writing)
+        assert gone
+        assert parent.stdout.read() == ""

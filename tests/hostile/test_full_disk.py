@@ -42,7 +42,7 @@ GO_ON = {
 RECORDING = {"run", "record", "map"}
 # These simulate for long.
 SIMULATING = {"run", "robustness"}
-PATIENCE = 120
+PATIENCE = 600
 CASES = [
     pytest.param(command, room, id=f"{command}-{room}", marks=[pytest.mark.slow] if command in SIMULATING else [])
     for command, (_, rooms) in (COMMANDS | GO_ON).items()

@@ -46,7 +46,7 @@ def check(kind: str, folder: Path, content: bytes) -> bool:
     path = folder / FORMATS[kind].name
     (folder / "map.png").write_bytes(inputs.picture(24))
     path.write_bytes(content)
-    begin = time.monotonic()
+    begin = time.process_time()
     try:
         FORMATS[kind].read(path)
     except ClosedroomsError as error:
@@ -56,7 +56,7 @@ def check(kind: str, folder: Path, content: bytes) -> bool:
         raise_defect(error)
         return True
     finally:
-        assert time.monotonic() - begin < PATIENCE
+        assert time.process_time() - begin < PATIENCE
     return False
 
 

@@ -21,7 +21,7 @@ FORMATS, MUTATIONS = inputs.FORMATS, inputs.MUTATIONS
 # In no format can these be read.
 REFUSED = {*inputs.PLACES, "empty", "zeros", "brackets", "tags"}
 # Every single answer comes within this time of the processor, and where it only waits, within the other one [s].
-PATIENCE, WAITING = 20, 120
+PATIENCE, WAITING = 20, 600
 
 
 @contextmanager
@@ -266,6 +266,7 @@ def twice(folder: Path) -> None:
 PREDICT = COMMANDS["predict"][1]
 OVER = ["doors", "map.yaml", "--out", "out.geojson", "--picture", "map.png", "--force"]
 LEARN = [*PREDICT, "--method", "x" * 5000]
+LONG_NAME = "x" * 300
 # What was badly answered when it was invented: how the folder is prepared, the command, what the line says.
 INVENTED = {
     "a circle of links as output": (circle, PREDICT, "out"),
@@ -277,6 +278,7 @@ INVENTED = {
     "the picture of the map as output": (lambda _: None, OVER, "a file that was read"),
     "a key that stands twice": (twice, PREDICT, "the key 'resolution' twice"),
     "a name of 5000 letters": (lambda _: None, LEARN, "expected one of"),
+    "a dataset of 300 letters": (lambda _: None, ["evaluate", LONG_NAME, "--out", "out"], "no such folder"),
     "transparent colours of a palette": (palette, PREDICT, ""),
 }
 

@@ -12,7 +12,7 @@ DOOR = ((3.0, 1.0), (3.0, 1.9))
 
 
 def keyframe(index: int, pose: Pose2) -> Keyframe:
-    return Keyframe(index, 0.0, pose, Beams(NOTHING, NOTHING, np.zeros(2)), NOTHING, 0.0)
+    return Keyframe(index, 0.0, pose, Beams(NOTHING, NOTHING, np.zeros(2)), NOTHING, NOTHING, 0.0)
 
 
 def sighted(frame: Keyframe, robot: Pose2 | None = None, *, shift: float = 0.0, swap: bool = False) -> None:

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -90,7 +91,9 @@ def test_the_grid_grows_and_keeps_what_it_knew() -> None:
 
 def test_percentages_follow_from_the_counts_of_hits_and_passes() -> None:
     evidence, config = EvidenceGrid(MapperConfig()), MapperConfig()
-    wall, beyond = np.array([[1.02, 0.02]]), np.array([[2.02, 0.02]])
+    # What stands beside the place is met by every scan: it is no place that something has gone from.
+    beside = np.column_stack((np.full(4, 1.07), np.arange(4) * 0.05 - 0.06))
+    wall, beyond = np.vstack(([[1.02, 0.02]], beside)), np.vstack(([[2.02, 0.02]], beside))
     outline = np.array([[0.0, -0.3], [3.0, -0.3], [3.0, 0.3], [0.0, 0.3]])
     hits, misses = 0, 0
     for hit in (False, True, True, False, False, False, False, True) * 6:
@@ -110,3 +113,50 @@ def test_a_map_that_did_not_change_is_the_same_one() -> None:
     assert evidence.grid() is before
     evidence.add(square(), Pose2(1.0, 0.0, 0.0))
     assert evidence.grid() is not before
+
+
+def seen(grid: EvidenceGrid, thing: np.ndarray, times: int, *, beyond: float = 3.0) -> None:
+    """Count a scan that met a thing, and else went on, ``times`` times."""
+    outline = np.array([[0.0, -1.0], [beyond, -1.0], [beyond, 1.0], [0.0, 1.0]])
+    for _ in range(times):
+        grid.add(Beams(thing, outline, np.zeros(2)), Pose2())
+
+
+PERSON = np.array([[1.02 + 0.05 * i, 0.02 + 0.05 * j] for i in range(3) for j in range(3) if (i, j) != (2, 1)])
+
+
+@pytest.mark.parametrize(
+    ("there", "gone", "is_occupied"), [(10, 1, True), (10, 3, True), (10, 4, False), (40, 16, False)]
+)
+def test_the_place_of_somebody_who_stood_there_is_free_after_few_misses(
+    there: int, gone: int, is_occupied: bool
+) -> None:
+    evidence = EvidenceGrid(MapperConfig())
+    seen(evidence, PERSON, there)
+    seen(evidence, PERSON[:0], gone)
+    grid = evidence.grid()
+    rows, cols = grid.frame.to_cells(PERSON).T
+    assert grid.occupied[rows, cols].all() == is_occupied
+    assert grid.free[rows, cols].all() != is_occupied
+
+
+def test_a_wall_stays_with_its_noise_however_often_that_is_missed() -> None:
+    evidence = EvidenceGrid(MapperConfig())
+    wall = np.column_stack((np.full(20, 2.02), np.arange(20) * 0.05 - 0.48))
+    noise = wall[::2] - (0.05, 0.0)
+    seen(evidence, np.vstack((wall, noise)), 2)
+    seen(evidence, wall, 20)
+    grid = evidence.grid()
+    rows, cols = grid.frame.to_cells(wall).T
+    assert grid.occupied[rows, cols].all()
+
+
+def test_the_place_that_somebody_left_is_seen_as_free_though_the_rest_was_drawn_long_before() -> None:
+    evidence = EvidenceGrid(MapperConfig())
+    seen(evidence, PERSON, 5)
+    assert evidence.grid().occupied.any()
+    for _ in range(3):
+        seen(evidence, PERSON[:0], 1)
+        grid = evidence.grid()
+    rows, cols = grid.frame.to_cells(PERSON).T
+    assert grid.free[rows, cols].all()

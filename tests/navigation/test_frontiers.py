@@ -1,3 +1,4 @@
+import cv2
 import numpy as np
 import pytest
 
@@ -88,3 +89,14 @@ def test_a_frontier_is_known_once_the_cells_beyond_are_seen() -> None:
 
 def test_an_empty_map_has_no_frontier() -> None:
     assert len(frontiers_of(np.full((40, 40), -1, dtype=np.int8))[1].points) == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_of_each_cell_of_a_frontier_is_told_the_same_alone_as_with_all_others(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    # Patches of unknown, so that the share around a cell is now below, now above what counts.
+    grid = grid_of(np.where(cv2.blur(rng.random((200, 200)), (5, 5)) > 0.56, -1, 0).astype(np.int8))
+    points = rng.uniform(1.5, 8.5, (200, 2))
+    alone = [still_unknown(grid, point[None], CONFIG) for point in points]
+    assert 0 < np.count_nonzero(alone) < len(points)
+    assert still_unknown(grid, points, CONFIG) == pytest.approx(sum(alone))

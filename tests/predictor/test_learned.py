@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from shapely import affinity
 
 from closedrooms.core.door import ClosedDoor
@@ -17,6 +18,7 @@ from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.shapes import cells_inside
 from closedrooms.predictor.best.scene import prepare
 from closedrooms.predictor.config import BestConfig, LearnedConfig
+from closedrooms.predictor.learned.mask_belief import believe_cells
 from closedrooms.predictor.learned.method import predict_learned
 from closedrooms.predictor.learned.model import SHIPPED, load_model, seal
 from closedrooms.predictor.learned.patches import ASIDE, BEHIND, CELL, SIZE, cut_patches
@@ -117,6 +119,25 @@ def test_the_network_changes_what_is_chosen_and_its_words_are_in_the_trace(mappe
         terms = weighed.terms
         assert terms["network: sides"][0] == pytest.approx(said[weighed.chosen, 0], abs=1e-6)
         assert sum(term[0] for term in terms.values()) == pytest.approx(weighed.joint[weighed.chosen], abs=1e-6)
+
+
+def test_how_much_of_a_room_the_mask_shows_is_evidence(mapped):
+    scene = mapped(closed=CLOSED)
+    prediction = predict_learned(scene.grid, scene.doors, LearnedConfig())
+    patches = cut_patches(prepared(scene))
+    heard = zip(patches, load_model(None).look(patches), strict=True)
+    said = dict(zip([door.id for door in scene.doors], heard, strict=True))
+    for room, belief in zip(prediction.rooms, prediction.beliefs, strict=True):
+        patch, seen = said[room.doors[0]]
+        # The same on a raster of the patch's own cells, where known space takes nothing away.
+        centres = (np.indices((SIZE, SIZE))[::-1].transpose(1, 2, 0) + 0.5) * CELL
+        points = patch.corner + centres @ np.array([patch.along, patch.inward])
+        inside = shapely.contains_xy(room.polygon, points[..., 0], points[..., 1])
+        shown = seen.mask * (seen.unknown > 0.5)
+        overlap = shown[inside].sum() / (inside.sum() + shown[~inside].sum())
+        assert belief.evidence[-1] == pytest.approx(overlap, abs=0.1)
+        moved = believe_cells(belief, affinity.translate(room.polygon, *(3.0 * patch.along)), [said[room.doors[0]]])
+        assert moved.evidence[-1] < belief.evidence[-1] - 0.1
 
 
 def test_an_area_beyond_the_patch_is_rated_like_its_edge(mapped):

@@ -25,9 +25,11 @@ from closedrooms.sim.simulation import Simulation
 from closedrooms.visualization import colours
 from closedrooms.visualization.no_recording import no_recording
 from closedrooms.visualization.rerun import drawables
+from closedrooms.visualization.rerun.blueprint import make_blueprint
 from closedrooms.visualization.rerun.drawn_sureness import NOTHING_YET, probability_map
 from closedrooms.visualization.rerun.recorder import Recorder
 from closedrooms.visualization.rerun.stream import Stage
+from closedrooms.visualization.rerun.views import plot_curves
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom, Wall
 
 FRAME = GridFrame(0.1, -1.0, -1.0, 80, 120)
@@ -391,6 +393,30 @@ def test_curves_have_many_values_over_time_and_one_a_stage(recording: Path) -> N
     assert [row["stage"] for row in by_stage] == sorted({int(stage) for stage in Stage})
     errors = rows(recording, "/metrics/position_error/estimate")
     assert {row["stage"] for row in errors if row.get("stage") is not None} == {int(stage) for stage in Stage}
+
+
+def test_a_curve_that_stays_at_its_largest_value_runs_below_the_frame(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arranged: list[dict[str, float]] = []
+    monkeypatch.setattr(
+        "closedrooms.visualization.rerun.recorder.make_blueprint",
+        lambda holds, bounds, tops=None: arranged.append(dict(tops or {})) or make_blueprint(holds, bounds, tops or {}),
+    )
+    grid = a_map()
+    area = float(np.count_nonzero(grid.known)) * grid.frame.resolution**2
+    with Recorder(tmp_path / "map.rrd", name="map", bounds=(0.0, 0.0, 8.0, 5.0)) as recorder:
+        recorder.map(grid, 0.0)
+        recorder.map(grid, 10.0)
+    assert arranged[-1] == {"known_area": pytest.approx(area)}
+    low, high = (
+        plot_curves("known_area", "Known area [m²]", top=area)
+        .properties["ScalarAxis"]
+        .range.as_arrow_array()[0]
+        .as_py()
+    )
+    assert low == 0.0
+    assert high > 1.1 * area
 
 
 def test_how_well_a_room_is_predicted_is_told_level_by_level(tmp_path: Path) -> None:

@@ -305,7 +305,9 @@ def test_a_name_that_is_being_typed_and_the_focus_outlive_a_prediction(
         visitor.page.wait_for_function("document.querySelector('[data-door=d00]')?.value === 'd00'")
 
 
-def test_a_room_beyond_the_view_is_shown_by_a_key(corridor: Path, serve: Serve, chromium: Any) -> None:
+def test_a_room_beyond_the_view_is_shown_by_a_key_and_a_door_by_the_list(
+    corridor: Path, serve: Serve, chromium: Any
+) -> None:
     server = serve(corridor)
     with visiting(chromium, server.address) as visitor:
         visitor.click(*CLICKS[0])
@@ -316,6 +318,18 @@ def test_a_room_beyond_the_view_is_shown_by_a_key(corridor: Path, serve: Serve, 
         visitor.page.wait_for_function("() => document.querySelector('.handle-note').getBoundingClientRect().x < 0")
         visitor.page.locator("body").press("0")
         visitor.page.wait_for_function("() => document.querySelector('.handle-note').getBoundingClientRect().x > 0")
+        wide = visitor.pixel(1.0, 0.0)[0] - visitor.pixel(0.0, 0.0)[0]
+        visitor.page.get_by_label("select and show on the map").click()
+        visitor.page.wait_for_function(
+            """wide => { const box = document.querySelector('.leaflet-container');
+            const map = getElement(Number(box.id.slice(1))).map;
+            return map.latLngToContainerPoint([0, 1]).x - map.latLngToContainerPoint([0, 0]).x > 1.2 * wide; }""",
+            arg=wide,
+        )
+        x, y = visitor.pixel(*CLICKS[0])
+        box = visitor.page.locator(".leaflet-container").bounding_box()
+        assert box["x"] < x < box["x"] + box["width"]
+        assert box["y"] < y < box["y"] + box["height"]
 
 
 def test_the_tour_the_completed_map_and_another_method_can_be_chosen(
@@ -330,6 +344,10 @@ def test_the_tour_the_completed_map_and_another_method_can_be_chosen(
         assert visitor.behind()[1] == "it lies outside the known map"
         visitor.page.get_by_label("completed map").click()
         visitor.page.wait_for_function("document.querySelectorAll('.leaflet-image-layer').length === 2")
+        visitor.page.get_by_label("tour").click()
+        visitor.wait("tour [0-9.]+ m$")
+        visitor.page.get_by_label("tour").click()
+        visitor.wait("^1 room behind 2 doors, [0-9.]+ s$")
         visitor.page.get_by_label("tour").click()
         visitor.wait("tour [0-9.]+ m$")
         visitor.page.locator("[data-id=method]").click()

@@ -1,5 +1,8 @@
 """How a recording opens: one tab a stage, in the order in which a run goes through them."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import rerun.blueprint as rrb
 
 from closedrooms.core.grid import Bounds
@@ -24,14 +27,17 @@ from closedrooms.visualization.rerun.views import show_log
 DEFAULT_BOUNDS: Bounds = (-20.0, -20.0, 20.0, 20.0)
 
 
-def make_blueprint(holds: Contents, bounds: Bounds | None) -> rrb.Blueprint:
+def make_blueprint(
+    holds: Contents, bounds: Bounds | None, tops: Mapping[str, float] = MappingProxyType({})
+) -> rrb.Blueprint:
     """Build the blueprint of a recording.
 
     Args:
         holds: What the recording holds.
         bounds: What a map seen from above shows.
+        tops: Largest values of the plots by name, once all values are known; until then plots fit what they hold.
     """
-    layout = Layout(holds, bounds or DEFAULT_BOUNDS)
+    layout = Layout(holds, bounds or DEFAULT_BOUNDS, tops)
     tabs: list[rrb.Container | rrb.View] = []
     if holds.building:
         tabs.append(building_tab(layout))

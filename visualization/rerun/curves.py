@@ -16,7 +16,12 @@ ROW = 11
 
 
 class Curves:
-    """Store of what is plotted as curves, sent as whole columns: many times cheaper than one call a value."""
+    """Store of what is plotted as curves, sent as whole columns: many times cheaper than one call a value.
+
+    Attributes:
+        corrected: Stamps [s] and poses of the trajectory after the last optimisation.
+        tops: Largest value of each plot, by its name, in its unit.
+    """
 
     def __init__(self, stream: RecordingStream) -> None:
         self._stream = stream
@@ -25,6 +30,7 @@ class Curves:
         self._styled: set[str] = set()
         self._by_stage: dict[str, dict[int, float]] = {}
         self.corrected: tuple[FloatArray, FloatArray] | None = None
+        self.tops: dict[str, float] = {}
 
     def __len__(self) -> int:
         return len(self._poses)
@@ -75,6 +81,7 @@ class Curves:
         if stamp is not None:
             self._stream.columns(path, rr.Scalars.columns(scalars=[value]), stamps=np.array([stamp]))
         self._by_stage.setdefault(path, {})[int(stage)] = value
+        self._raise_top(path, value)
 
     def add_iou(
         self, iou: Mapping[str, float], palette: Mapping[str, colours.Colour], *, stamp: float | None, stage: int
@@ -121,11 +128,17 @@ class Curves:
         drift = _apart(odometry[given], truth[given])
         self._send("metrics/odometry_error/position", stamps[given], drift, "odometry", colours.ODOMETRY)
 
+    def _raise_top(self, path: str, value: float) -> None:
+        """Note the largest value of a plot, of ``metrics/<plot>/<curve>``."""
+        plot = path.split("/")[1]
+        self.tops[plot] = max(self.tops.get(plot, 0.0), value)
+
     def _send(self, path: str, stamps: FloatArray, values: FloatArray, name: str, colour: colours.Colour) -> None:
         """Send a whole curve over its stamps [s]; over the stages its first and last value stand for it."""
         self._stream.log(path, rr.SeriesLines(colors=[colour], names=[name], widths=[1.5]), static=True)
         self._stream.columns(path, rr.Scalars.columns(scalars=values), stamps=stamps)
         if len(values):
+            self._raise_top(path, float(values.max()))
             self._by_stage[path] = {Stage.BUILDING: float(values[0]), Stage.MAPPING: float(values[-1])}
 
 

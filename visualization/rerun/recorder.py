@@ -99,7 +99,7 @@ class Recorder:
                 self._curves.send_errors()
                 self._curves.send_stages(self._last_stage())
                 self._hold(reference=self._curves.has_reference)
-                self._stream.arrange(make_blueprint(self._holds, self._bounds))
+                self._stream.arrange(make_blueprint(self._holds, self._bounds, self._curves.tops))
         finally:
             self._stream.__exit__(kind, error, trace)
 

@@ -1,7 +1,7 @@
 """The tabs of a recording, a function each."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import rerun.blueprint as rrb
 
@@ -58,10 +58,16 @@ class Layout:
     Attributes:
         holds: Parts of the recording.
         bounds: ``x_min, y_min, x_max, y_max`` in the map frame [m].
+        tops: Largest values of the plots by name, once all values are known.
     """
 
     holds: Contents
     bounds: Bounds
+    tops: Mapping[str, float] = field(default_factory=dict)
+
+    def plot(self, name: str, title: str) -> rrb.View:
+        """Plot curves from 0 up to their largest value."""
+        return plot_curves(name, title, top=self.tops.get(name))
 
 
 def building_tab(layout: Layout) -> rrb.Container:
@@ -107,8 +113,8 @@ def mapping_tab(layout: Layout) -> rrb.Container:
     }
     titles = errors if layout.holds.reference else {}
     side = rrb.Vertical(
-        *(plot_curves(name, title) for name, title in titles.items()),
-        plot_curves("known_area", "Known area [m²]"),
+        *(layout.plot(name, title) for name, title in titles.items()),
+        layout.plot("known_area", "Known area [m²]"),
         rrb.TextDocumentView(origin="/legend", name="Colours"),
         row_shares=[3] * (len(titles) + 1) + [4],
     )
@@ -214,7 +220,7 @@ def rooms_tab(layout: Layout) -> rrb.Container:
     maps = (rrb.Vertical if wide else rrb.Horizontal)(*views)
     if not holds.mapping:
         return rrb.Horizontal(maps, name="Rooms")
-    curves = [plot_curves("known_area", "Known area [m²]"), show_log()]
+    curves = [layout.plot("known_area", "Known area [m²]"), show_log()]
     if holds.room_iou:
         curves.insert(0, plot_curves("room_iou", "IoU with the true room, by door [0..1]", top=1.0))
     return rrb.Horizontal(maps, rrb.Vertical(*curves), column_shares=[2, 1], name="Rooms")
@@ -262,7 +268,7 @@ def driving_tab(layout: Layout) -> rrb.Container:
         ],
         aspect=1.3,
     )
-    views = [plot_curves("known_area", "Known area [m²]"), show_log()]
+    views = [layout.plot("known_area", "Known area [m²]"), show_log()]
     if layout.holds.door_states:
         views.insert(0, rrb.StateTimelineView(origin="/door_states", name="Closed doors, over sim_time [s]"))
     return rrb.Horizontal(view, rrb.Vertical(*views), column_shares=[2, 1], name="Driving")

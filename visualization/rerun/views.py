@@ -11,6 +11,8 @@ from closedrooms.core.grid import Bounds
 from closedrooms.visualization import colours
 
 BACKGROUND = [colours.UNKNOWN] * 3
+# How far a plot reaches, by its largest value: a curve along the frame is not seen.
+HEADROOM = 1.15
 # The viewer's default vertical field of view is 55 degrees.
 HALF_VIEW = math.radians(55.0) / 2
 
@@ -23,13 +25,19 @@ def show_log() -> rrb.View:
 
 
 def plot_curves(name: str, title: str, *, top: float | None = None) -> rrb.View:
-    """Plot curves over the whole run, whatever the cursor; along the axis time [s], or the stage where it is shown."""
+    """Plot curves over the whole run, whatever the cursor; along the axis time [s], or the stage where it is shown.
+
+    Args:
+        name: Entity of the curves below ``metrics``.
+        title: What is plotted, with its unit.
+        top: Largest value; without one the viewer fits the axis.
+    """
     always = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
     return rrb.TimeSeriesView(
         origin=f"/metrics/{name}",
         name=f"{title} over sim_time [s], or stage",
         axis_x=rrb.TimeAxis(view_range=always),
-        axis_y=None if top is None else rrb.ScalarAxis(range=(0.0, 1.05 * top)),
+        axis_y=None if not top else rrb.ScalarAxis(range=(0.0, HEADROOM * top)),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
     )
 

@@ -5,7 +5,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.incoming import read_text
+from closedrooms.core.files.incoming import is_file, is_folder, read_text
 from closedrooms.core.files.output_folders import MANIFEST
 from closedrooms.core.numbers import repr_of
 from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
@@ -26,7 +26,7 @@ def find_samples(datasets: Sequence[Path | Url]) -> list[SamplePath]:
     """
     found: dict[str, SamplePath] = {}
     for dataset in datasets:
-        if isinstance(dataset, Path) and not dataset.is_dir():
+        if isinstance(dataset, Path) and not is_folder(dataset):
             raise InvalidInputError("no such folder", expected="a dataset", where=dataset)
         samples = list(_samples_of(dataset))
         if not samples:
@@ -42,7 +42,7 @@ def find_samples(datasets: Sequence[Path | Url]) -> list[SamplePath]:
 
 def _samples_of(dataset: Path | Url) -> Iterator[SamplePath]:
     """Yield the samples of a dataset: of shards, as its manifest lists them, or every folder that looks like one."""
-    if isinstance(dataset, Path) and not (dataset / DATASET_MANIFEST).is_file():
+    if isinstance(dataset, Path) and not is_file(dataset / DATASET_MANIFEST):
         yield from _folders(dataset)
         return
     from closedrooms.experiments.dataset.layout import read_manifest
@@ -82,7 +82,7 @@ def _digests(dataset: Path) -> dict[str, str]:
     from closedrooms.experiments.dataset.layout import SUMS
 
     path = dataset / SUMS
-    if not path.is_file():
+    if not is_file(path):
         return {}
     lines = [line.split("  ", 1) for line in read_text(path, what="checksums").splitlines()]
     return {line[1]: line[0] for line in lines if len(line) == 2}
@@ -98,7 +98,7 @@ def _entry(dataset: Path, entry: Any, number: int, digests: dict[str, str]) -> S
     problem = ""
     if entry.get("status", "ok") != "ok":
         problem = f"failed when the dataset was made: {entry.get('reason') or 'no reason given'}"
-    elif not folder.is_dir():
+    elif not is_folder(folder):
         problem = f"listed in {DATASET_MANIFEST} but missing"
     repetition = entry.get("repetition", -1)
     if isinstance(repetition, bool) or not isinstance(repetition, int) or not -1 <= repetition <= MAX_REPETITION:

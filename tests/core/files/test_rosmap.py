@@ -307,3 +307,12 @@ def test_greys_that_no_map_server_writes_are_refused(tmp_path: Path, values: np.
     (tmp_path / "m.yaml").write_text("image: m.tif\nresolution: 0.05\norigin: [0, 0, 0]\n")
     with pytest.raises(InvalidInputError, match="expected greys or colours of 8 or 16 bits"):
         read_map(tmp_path / "m.yaml")
+
+
+def test_greys_of_sixteen_bits_are_those_of_eight(tmp_path: Path) -> None:
+    eight = np.array([[0, 60, 205, 254, 255], [89, 90, 150, 206, 204]], dtype=np.uint8)
+    wanted = read_map(save(tmp_path, eight)).cells
+    assert len(np.unique(wanted)) == 3
+    for sixteen in (eight.astype(np.uint16) * 257, (eight.astype(np.uint16) << 8), eight.astype(np.uint16)):
+        Image.fromarray(sixteen).save(tmp_path / "m.png")
+        assert (read_map(tmp_path / "m.yaml").cells == wanted).all()

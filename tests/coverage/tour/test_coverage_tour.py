@@ -278,3 +278,30 @@ def test_senseless_bounds_are_refused(field, value):
 def test_the_gap_is_what_a_tour_is_longer_than_the_bound_as_a_share_of_it(length, bound, gap):
     tour = replace(solve_tour(_random_graph(1, 5, 2)), length=length, lower_bound=bound)
     assert tour.gap == pytest.approx(gap)
+
+
+@pytest.mark.parametrize("patience", [25, 60])
+def test_the_search_ends_so_many_perturbations_after_the_last_one_that_helped(monkeypatch, patience):
+    distances = _distances(_points(3, 60))
+    lengths = []
+    repair = LocalSearch.improve
+
+    def improve(self, queue):
+        repair(self, queue)
+        lengths.append(self.length())
+
+    improve_fully = LocalSearch.improve_fully
+
+    def begin(self):
+        improve_fully(self)
+        lengths[:] = [self.length()]
+
+    monkeypatch.setattr(LocalSearch, "improve", improve)
+    monkeypatch.setattr(LocalSearch, "improve_fully", begin)
+    _, status = search_tour(distances, list(range(60)), lower_bound=0.0, kicks=5000, patience=patience)
+    assert status == "converged"
+    best = np.minimum.accumulate(lengths)
+    helped = np.flatnonzero(np.diff(best) < -1e-9) + 1
+    assert len(helped) > 0
+    assert len(lengths) - 1 == helped[-1] + patience
+    assert np.diff([0, *helped]).max() <= patience

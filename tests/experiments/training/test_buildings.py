@@ -11,7 +11,15 @@ from shapely.geometry.base import BaseGeometry
 from closedrooms.core.arrays import BoolArray
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.rosmap import read_map
-from closedrooms.experiments.training.buildings import COLUMNS, LEDGER, USES, note_report, read_groups, use_of
+from closedrooms.experiments.training.buildings import (
+    COLUMNS,
+    LEDGER,
+    USES,
+    may_train,
+    note_report,
+    read_groups,
+    use_of,
+)
 from closedrooms.worlds.library import bundled_names, read_world
 
 SHARED = Path(__file__).parents[4] / "shared" / "data"
@@ -33,10 +41,19 @@ def test_the_bundled_worlds_were_tuned_on_and_never_choose_or_report() -> None:
 
 @pytest.mark.parametrize(
     ("name", "use"),
-    [("office-g1-0", "fit"), ("school-g1-1000", "choose"), ("office-g2-0", "report"), ("Sabadell3_updated", "report")],
+    [
+        ("office-g1-0", "fit"),
+        ("school-g1-1000", "choose"),
+        ("office-g2-0", "report"),
+        ("Sabadell3_updated", "report"),
+        # As ``worlds generate`` names them.
+        ("office-0", "fit"),
+        ("school-1000", "choose"),
+    ],
 )
 def test_what_a_building_is_used_for(name: str, use: str) -> None:
     assert use_of(name) == use
+    assert may_train(name) == (use == "fit")
 
 
 def test_a_building_that_nobody_sorted_is_refused() -> None:

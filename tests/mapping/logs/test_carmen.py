@@ -1,4 +1,6 @@
+import bz2
 import gzip
+import lzma
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -387,3 +389,11 @@ def test_the_clock_of_a_line_counts_and_the_loggers_where_it_is_zero(
         f"ROBOTLASER1 0 -1.5708 3.14159 0.0174533 30.0 0.01 0 181 {ranges} 0 {pose} 0 0 0 0 0 {clock} host 9.25",
     ):
         assert read_run(write(tmp_path, line)).scans[0].stamp == stamp
+
+
+@pytest.mark.parametrize("pack", [bz2.compress, lzma.compress])
+def test_a_log_that_another_program_packed_is_named(tmp_path: Path, pack: Callable[[bytes], bytes]) -> None:
+    path = tmp_path / "log"
+    path.write_bytes(pack(b"FLASER 1 1.0"))
+    with pytest.raises(InvalidInputError, match=r"a file packed by (bzip2|xz); expected the file unpacked"):
+        read_run(path)

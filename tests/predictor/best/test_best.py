@@ -226,6 +226,9 @@ def test_a_trace_holds_each_room_by_itself_and_together() -> None:
     assert prediction.trace is not None
     assert [level.k for level in prediction.trace.levels] == [0, 1]
     assert set(prediction.trace.levels[1].layouts) == {"d1a", "d2a"}
+    scores = {door: room.score for room in prediction.rooms for door in room.doors}
+    assert prediction.trace.levels[1].scores == scores
+    assert all(scores.values())
 
 
 def test_the_terms_of_a_trace_sum_up_to_the_scores() -> None:

@@ -2,6 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -57,3 +58,8 @@ def test_a_turned_raster_lies_where_it_is_in_the_map(angle):
     points = np.array([3.0, 1.0]) + [u * along + v * across for u in (2.0, 5.0) for v in (1.0, 3.0)]
     assert (x0, y0) == pytest.approx(tuple(points.min(axis=0)))
     assert (x1, y1) == pytest.approx(tuple(points.max(axis=0)))
+    corners = [(2.0, 1.0), (5.0, 1.0), (5.0, 3.0), (2.0, 3.0)]
+    shape = shapely.Polygon([np.array([3.0, 1.0]) + u * along + v * across for u, v in corners])
+    assert spread.inside(shape).sum() == (share > 0).sum()
+    assert spread.inside(shape)[12:28, 22:48].all()
+    assert not spread.inside(shapely.Point(3.0, 1.0).buffer(0.5))[10:, 20:].any()

@@ -134,12 +134,23 @@ def test_a_border_room_is_a_square_behind_its_edge():
     assert square.symmetric_difference(shapely.box(-3.0, 15.0, 3.0, 21.0)).area < 1e-9
 
 
-def test_a_border_room_takes_the_other_side_where_the_border_cuts_its_edge():
-    arrangement = _arrangement(xs=(16.0,), ys=(0.0, 7.0))
+@pytest.mark.parametrize(
+    ("xs", "ys", "behind", "before", "room"),
+    [
+        ((16.0,), (0.0, 7.0), (18.0, 3.0), (18.0, -3.0), (16.0, 0.0, 23.0, 7.0)),
+        ((-16.0,), (0.0, 7.0), (-18.0, 3.0), (-18.0, -3.0), (-23.0, 0.0, -16.0, 7.0)),
+        ((16.0,), (0.0, 7.0), (18.0, 3.0), (18.0, 10.0), (16.0, 0.0, 23.0, 7.0)),
+        ((-16.0,), (0.0, 7.0), (-18.0, 3.0), (-18.0, 10.0), (-23.0, 0.0, -16.0, 7.0)),
+        ((0.0, 5.0), (17.0,), (3.0, 18.0), (-3.0, 18.0), (0.0, 17.0, 5.0, 22.0)),
+        ((0.0, 5.0), (-17.0,), (3.0, -18.0), (8.0, -18.0), (0.0, -22.0, 5.0, -17.0)),
+    ],
+)
+def test_a_border_room_takes_the_other_side_where_the_border_cuts_its_edge(xs, ys, behind, before, room):
+    arrangement = _arrangement(xs=xs, ys=ys)
     unknown = np.ones(len(arrangement.faces), dtype=np.bool_)
-    growth = Growth(arrangement, unknown, [_entrance(arrangement, "d", (18.0, 3.0), (18.0, -3.0))])
+    growth = Growth(arrangement, unknown, [_entrance(arrangement, "d", behind, before)])
     square = border_rooms(growth, CONFIG)[0].polygon()
-    assert square.symmetric_difference(shapely.box(16.0, 0.0, 23.0, 7.0)).area < 1e-9
+    assert square.symmetric_difference(shapely.box(*room)).area < 1e-9
 
 
 @pytest.mark.parametrize(("average", "depths"), [(True, (5.0, 5.0)), (False, (6.0, 4.0))])

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,12 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.robot import RobotConfig
 from closedrooms.pipeline.bounds import check_width
 from closedrooms.sim.config import SimConfig, noise_level
+from closedrooms.sim.robot.drive_calibration import SETTLE, calibrate_drive
+from closedrooms.sim.robot.driven_robot import Motion
 from closedrooms.sim.robot.robot_model import make_model
 from closedrooms.sim.robot.robot_urdf import read_robot
 from closedrooms.sim.robot.urdf_description import check_loads
+from closedrooms.sim.robot.wheeled_robot import WheeledRobot
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.plan import FloorPlan
 
@@ -164,6 +168,26 @@ def test_a_missing_file_a_folder_and_unknown_wheels_are_refused(tmp_path: Path, 
     ):
         with pytest.raises(InvalidInputError, match=why):
             read_robot(own(bundled / "husky/husky.urdf", wheels))
+
+
+def test_a_robot_stands_still_before_each_part_of_the_drive_that_calibrates_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    stood: list[float] = []
+    advance = WheeledRobot.advance
+
+    def watched(robot: WheeledRobot, v: float, w: float, seconds: float, note: Callable[[Motion], None]) -> None:
+        before = (robot.x, robot.y)
+        advance(robot, v, w, seconds, note)
+        if seconds == SETTLE:
+            stood.append(math.dist(before, (robot.x, robot.y)))
+
+    monkeypatch.setattr(WheeledRobot, "advance", watched)
+    limits = RobotConfig(radius=0.25)
+    calibrate_drive(make_model(limits, 0.3), limits, tmp_path / "robot.urdf")
+    # It begins at rest; from half its speed it brakes within a hand's breadth.
+    assert stood[0] < 0.01
+    assert 0.01 < stood[1] < 0.2
 
 
 def test_a_car_is_refused_with_the_reason(bundled: Path) -> None:

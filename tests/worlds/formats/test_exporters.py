@@ -92,6 +92,19 @@ def test_stage_gets_a_bitmap_cut_at_the_walls(tmp_path: Path) -> None:
     assert text.count("[") == text.count("]")
 
 
+@pytest.mark.parametrize(
+    ("name", "written"),
+    [("office-01", "office-01"), ("a_b", "a_b"), ("Küche 2", "Küche_2"), ("a/b$c", "a_b_c"), ("<x>", "_x_")],
+)
+def test_the_world_of_sdf_keeps_what_letters_a_topic_takes(
+    small: FloorPlan, tmp_path: Path, name: str, written: str
+) -> None:
+    write_sdf(tmp_path / "w.sdf", replace(small, name=name))
+    world = ElementTree.parse(tmp_path / "w.sdf").getroot().find("world")
+    assert world is not None
+    assert world.get("name") == written
+
+
 def test_sdf_names_are_unique_and_numbers_make_sense(small: FloorPlan, tmp_path: Path) -> None:
     kinds = ("hinged", "double", "sliding")
     for kind in kinds:

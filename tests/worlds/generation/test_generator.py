@@ -3,14 +3,16 @@ import pytest
 import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from shapely.geometry import box
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.formats.native import plan_text
 from closedrooms.worlds.generation.bundled import MOST_CLOSED, RECIPES, bundled_plan
-from closedrooms.worlds.generation.corridors import SHAPES
+from closedrooms.worlds.generation.corridors import SHAPES, Run, Skeleton
 from closedrooms.worlds.generation.generator import GENERATOR_VERSION, KINDS, SIZES, VERSIONS, generate
+from closedrooms.worlds.generation.sketch import sketch_rooms
 from closedrooms.worlds.geometry import room_interior, wall_area
 from closedrooms.worlds.library import DEFAULT_WORLD, PLANS, bundled_names, load_world
 from closedrooms.worlds.plan import FloorPlan
@@ -122,3 +124,12 @@ def test_the_default_world_measures_about_40_by_30_metres() -> None:
     x0, y0, x1, y1 = wall_area(plan).bounds
     assert np.hypot(x1 - x0 - 40.0, y1 - y0 - 30.0) < 3.0
     assert len(closable_rooms(plan)) >= 5
+
+
+@pytest.mark.parametrize(("length", "rooms"), [(1.9, False), (2.1, True), (12.0, True)])
+def test_along_less_than_two_metres_of_a_corridor_there_are_no_rooms(length: float, rooms: bool) -> None:
+    runs = (Run((0.0, 0.0), 0.0, 1, length, 5.0, deepest=6.0),)
+    skeleton = Skeleton(box(0.0, -2.0, length, 0.0), runs, (), 2.0)
+    for seed in range(5):
+        sketch = sketch_rooms(np.random.default_rng(seed), "office", skeleton)
+        assert (len(sketch.labels) > 1) == rooms

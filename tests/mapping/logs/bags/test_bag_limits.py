@@ -38,3 +38,12 @@ def test_metadata_without_end_is_refused_before_it_is_parsed(bag_maker: Any, tmp
     (path / "metadata.yaml").write_text(f"rosbag2_bagfile_information: [{'1,' * 1_000_000}1]")
     with pytest.raises(InvalidInputError, match=r"a file of 20000\d\d bytes"):
         read_run(path)
+
+
+def test_a_file_out_of_a_compressed_bag_is_named(bag_maker: Any, tmp_path: Path) -> None:
+    path = bag_maker(tmp_path / "bag", "mcap").drive().transform("base_link", "laser").write("file")
+    (file,) = path.glob("*.zstd")
+    with pytest.raises(
+        InvalidInputError, match=r"a file packed by zstd; expected .*the folder with its metadata\.yaml"
+    ):
+        read_run(file)
