@@ -7,7 +7,6 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import is_folder
 from closedrooms.core.remarks import Remark
-from closedrooms.mapping.logs.bags.rosbag import opened_bag
 
 POINT = "geometry_msgs/msg/PointStamped"
 BAGS = {".mcap", ".db3", ".bag"}
@@ -32,6 +31,9 @@ def read_clicked_points(path: Path, *, remarks: list[Remark] | None = None) -> l
         InvalidInputError: ``rosbags`` is not installed, a broken bag, no points or several topics of them, points of
             another frame than the map's.
     """
+    # Every list of doors asks whether it is a bag; only a bag needs its readers.
+    from closedrooms.mapping.logs.bags.rosbag import opened_bag
+
     places: list[tuple[float, float]] = []
     broken = 0
     with opened_bag(path) as reader:
