@@ -179,7 +179,7 @@ class Eraser:
         if not np.array_equal(ranges, self._ranges[number], equal_nan=True):
             scan = replace(scan, ranges=ranges)
         beams, pose = clean(scan, max_range=survey.mapper.max_range), Pose2(*survey.poses[number])
-        keyframe = Keyframe(number, scan.stamp, pose, beams, np.zeros((0, 2)), beams.points, 0.0)
+        keyframe = Keyframe(number, scan.stamp, pose, beams, np.zeros((0, 2)), np.zeros((0, 2)), 0.0)
         for name in doors:
             keyframe.remember(self._sighting(name, number), Pose2())
         imprint = self._grid.imprint(beams, pose)

@@ -105,8 +105,11 @@ def test_cut_rays_carry_the_noise_of_the_sensor() -> None:
                 true = sim.true_ranges(sim.world_T_map @ Pose2(*survey.keyframe_true_poses[index]))
                 errors += list((scan.ranges - true)[cut])
     assert len(errors) > 300
-    assert np.std(errors) == pytest.approx(survey.sim.noise.range_sd, rel=0.15)
-    assert abs(np.mean(errors)) < 0.01
+    # A beam that meets the very end of a leaf may go past it in one of the two.
+    near = [error for error in errors if abs(error) < 0.2]
+    assert len(near) >= len(errors) - 3
+    assert np.std(near) == pytest.approx(survey.sim.noise.range_sd, rel=0.15)
+    assert abs(np.mean(near)) < 0.01
 
 
 @pytest.mark.simulation
