@@ -6,7 +6,7 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.free_space import FreeSpace
+from closedrooms.mapping.crossed_space import CrossedSpace
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 
@@ -24,14 +24,14 @@ class LocalMap:
 
     Attributes:
         field: Their surfaces.
-        free: What they saw through.
+        crossed: What they saw through.
     """
 
     def __init__(self, config: MapperConfig) -> None:
         self._config = config
         self._members: BoolArray = np.zeros(0, dtype=np.bool_)
         self.field = LikelihoodField(config.resolution, config.matcher)
-        self.free = FreeSpace(config)
+        self.crossed = CrossedSpace(config)
 
     def update(self, keyframes: Sequence[Keyframe], path_lengths: FloatArray, distances: FloatArray) -> None:
         """Bring the field up to date after a new keyframe, the last one.
@@ -46,16 +46,16 @@ class LocalMap:
         members[: len(self._members)] = self._members
         if np.count_nonzero(members & near & (path_lengths > HYSTERESIS * horizon)) > STALE_MEMBERS:
             self.field.clear()
-            self.free.clear()
+            self.crossed.clear()
             members[:] = False
         entering = near & (path_lengths <= horizon) & ~members
         chosen = [keyframes[i] for i in np.flatnonzero(entering).tolist()]
         self.field.add_scans([k.pose.transform(k.surfaces) for k in chosen])
-        self.free.add([(k.beams, k.pose) for k in chosen])
+        self.crossed.add([(k.beams, k.pose) for k in chosen])
         self._members = members | entering
 
     def clear(self) -> None:
         """Forget all, because poses were corrected."""
         self._members = np.zeros(0, dtype=np.bool_)
         self.field.clear()
-        self.free.clear()
+        self.crossed.clear()

@@ -139,7 +139,7 @@ class Mapper:
         self._prediction.moved(before.inverse() @ self._pose)
         if self._wants_keyframe():
             ends = beams().points
-            surfaces = ends[self._local.free.stands_still(self._pose, ends)]
+            surfaces = ends[self._local.crossed.stands_still(self._pose, ends)]
             number = len(self.keyframes)
             self._insert(Keyframe(number, scan.stamp, self._pose, beams(), points, surfaces, self._travelled))
         self._last_odometry = odometry
@@ -224,7 +224,7 @@ class Mapper:
         match = self._match_all(guess, points)
         if match is None:
             return None
-        still = self._local.free.stands_still(match.pose, points)
+        still = self._local.crossed.stands_still(match.pose, points)
         return match if still.all() else self._match_all(guess, points[still]) or match
 
     def _match_all(self, guess: Pose2, points: FloatArray) -> Match | None:

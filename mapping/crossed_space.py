@@ -27,7 +27,7 @@ MOST = 0.2
 or the map has drifted (as :class:`~closedrooms.mapping.config.RecoveryConfig` has it)."""
 
 
-class FreeSpace:
+class CrossedSpace:
     """Cells that several keyframes of the local map saw through, and that are not beside a surface.
 
     Two people who walked beside a robot along a corridor, where walls do not tell how far it is, pulled it 2.6 m back:

@@ -7,16 +7,16 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import clean
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.free_space import FreeSpace
+from closedrooms.mapping.crossed_space import CrossedSpace
 from closedrooms.mapping.mapper import Mapper
 from tests.conftest import SegmentWorld, box
 
 HERE = Pose2(0.0, 0.0, 0.4)
 
 
-def seen_through(world: SegmentWorld, times: int) -> FreeSpace:
+def seen_through(world: SegmentWorld, times: int) -> CrossedSpace:
     """Free space of a few scans from about one place."""
-    free = FreeSpace(MapperConfig())
+    free = CrossedSpace(MapperConfig())
     poses = [Pose2(0.1 * i, 0.0, 0.3 * i) for i in range(times)]
     free.add([(clean(world.scan(pose, beams=720), max_range=25.0), pose) for pose in poses])
     return free
