@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -23,7 +24,7 @@ MAX_CELLS = 400_000_000
 # 1000 times (8000 at one bit a pixel), maps of buildings 20 to 300 times.
 UNSUSPICIOUS_CELLS, MAX_CELLS_A_BYTE = 30_000_000, 1000
 FORMATS = ("PNG", "PPM", "BMP", "TIFF", "JPEG", "GIF", "WEBP")
-# Rows that are copied at once.
+# Rows that are converted at once.
 STRIP = 256
 SCHEME = re.compile(r"(?i)(file|package|model|https?)://")
 
@@ -132,29 +133,31 @@ def _greys(image: Any, path: Path) -> tuple[npt.NDArray[np.uint8], BoolArray | N
     """Convert a picture to greys, 0 to 255, and where it is not transparent (``None`` where it cannot be)."""
     if "A" in image.getbands() or "transparency" in image.info:
         # By way of RGBA: of a palette with transparent colours Pillow makes no greys without a warning.
-        rgba = np.asarray(image.convert("RGBA"))
-        return _mean_of_colours(rgba[..., :3]), rgba[..., 3] > 0
+        opaque = _by_strips(image, lambda part: np.asarray(part.convert("RGBA").getchannel("A")))
+        return _by_strips(image, lambda part: _mean_of_colours(part.convert("RGBA"))), opaque > 0
     if image.mode in {"I", "I;16", "I;16B", "I;16L"}:
         return _sixteen_bits(image, path), None
-    if image.mode in {"L", "1", "LA"}:
-        return _copy(image if image.mode == "L" else image.convert("L")), None
-    return _mean_of_colours(np.asarray(image.convert("RGB"))), None
+    if image.mode in {"L", "1"}:
+        return _by_strips(image, lambda part: np.asarray(part.convert("L"))), None
+    return _by_strips(image, lambda part: _mean_of_colours(part.convert("RGB"))), None
 
 
-def _copy(image: Any) -> npt.NDArray[np.uint8]:
-    """Copy a picture of greys, some rows at a time: at once Pillow holds the whole three times."""
+def _by_strips(image: Any, convert: Callable[[Any], npt.NDArray[np.uint8]]) -> npt.NDArray[np.uint8]:
+    """Convert a picture some rows at a time: at once Pillow holds the whole three times, colours even more often."""
     width, height = image.size
     # From the bottom up, as the cells of a grid lie.
-    greys = np.empty((height, width), dtype=np.uint8)
+    values = np.empty((height, width), dtype=np.uint8)
     for top in range(0, height, STRIP):
         low = min(top + STRIP, height)
-        greys[height - low : height - top] = np.asarray(image.crop((0, top, width, low)))[::-1]
-    return greys[::-1]
+        values[height - low : height - top] = convert(image.crop((0, top, width, low)))[::-1]
+    return values[::-1]
 
 
-def _mean_of_colours(colours: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    """Average red, green and blue, shape (..., 3), as map_server does: how bright eyes find a colour does not count."""
-    return np.asarray(np.rint(colours.sum(axis=-1, dtype=np.uint16) / 3.0), dtype=np.uint8)
+def _mean_of_colours(image: Any) -> npt.NDArray[np.uint8]:
+    """Average red, green and blue as map_server does: how bright eyes find a colour does not count."""
+    total = np.asarray(image)[..., :3].sum(axis=-1, dtype=np.uint16)
+    # Rounded: thirds are never halves.
+    return np.asarray((2 * total + 3) // 6, dtype=np.uint8)
 
 
 def _sixteen_bits(image: Any, path: Path) -> npt.NDArray[np.uint8]:
