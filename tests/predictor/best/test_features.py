@@ -70,9 +70,7 @@ def _sides(box):
 def test_shares_of_sides_are_counted_along_them(name):
     found = _found()
     for number, box in enumerate(BOXES.tolist()):
-        right, left, back = (
-            _on(name, side, at, low, high) / (high - low) for side, at, low, high, _ in _sides(box)
-        )
+        right, left, back = (_on(name, side, at, low, high) / (high - low) for side, at, low, high, _ in _sides(box))
         assert found[f"sides {name}"][number] == pytest.approx(right + left)
         assert found[f"back {name}"][number] == pytest.approx(back)
 
@@ -106,8 +104,7 @@ def test_a_wall_that_begins_before_the_doors_wall_is_a_stub_and_two_make_a_passa
     found = _found()
     for number, box in enumerate(BOXES.tolist()):
         right, left = (
-            1.0
-            - math.exp(-(_on("same", side, at, low - 60, low) + _on("tight", side, at, low - 60, low)) * CELL / 0.5)
+            1.0 - math.exp(-(_on("same", side, at, low - 60, low) + _on("tight", side, at, low - 60, low)) * CELL / 0.5)
             for side, at, low, _, _ in _sides(box)[:2]
         )
         assert found["sides stub"][number] == pytest.approx(right + left)
