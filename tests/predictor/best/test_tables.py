@@ -229,6 +229,6 @@ def test_sizes_of_rooms_seen_are_usual_and_corridors_say_nothing(width, depth):
         # Symmetric, and falling with the distance.
         assert rate[usual - 4 : usual] == pytest.approx(rate[usual + 4 : usual : -1])
     assert rates["depth"][40] == 0.0
-    # A count of so many rows: three rooms as deep as they are, the five-fold kernel's middle, half of the largest and 1.
+    # Counted by rows: three rooms as deep as they are; the kernel's middle, half of the largest and 1.
     smooth = 3 * depth * np.array([5, 4, 3, 2, 1]) / 5.0
     assert rates["width"][width : width + 5] == pytest.approx(smooth / (smooth + smooth[0] / 2 + 1.0))
