@@ -45,3 +45,9 @@ def test_a_report_is_printed_whole_for_programs():
 @pytest.mark.parametrize(("number", "text"), [(0, "0 doors"), (1, "1 door"), (2, "2 doors")])
 def test_several_things_take_an_s(number, text):
     assert counted(number, "door") == text
+
+
+def test_a_table_is_as_wide_as_its_head():
+    assert report(rows=[("a", "b", "c"), ("1",), ("1", "2")]).table() == [
+        ("a", "b", "c"), ("1", "", ""), ("1", "2", ""),
+    ]  # fmt: skip

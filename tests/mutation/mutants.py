@@ -233,6 +233,8 @@ def lots(source: str, mutant: Mutant, tests: Sequence[Reach]) -> list[list[str]]
     reaching = {test.test for test in tests if place in test.functions}
     if not inside or not reaching:
         reaching = {test.test for test in tests if any(f.startswith(f"{mutant.module}:") for f in test.functions)}
+    # What a module without functions says is met by any test that uses it, and by none that is seen to.
+    reaching = reaching or {test.test for test in tests}
     files = {test.partition("::")[0] for test in reaching}
     quickest = sorted(tests, key=lambda test: test.seconds)
     # Heads of functions, as all that is outside of them, are held to rules.

@@ -61,3 +61,9 @@ def test_listing_methods_imports_nothing_heavy():
     code = "import sys; from closedrooms.predictor.methods import METHODS; list(METHODS); print('numpy' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"
+
+
+def test_only_the_baselines_predict_each_room_for_itself_and_all_but_rectangles_begin_with_faces():
+    assert {name for name, method in METHODS.items() if not method.disjoint} == {"line-of-sight", "geometric"}
+    faces = {name for name, method in METHODS.items() if method.shares_faces}
+    assert faces == {"paper", "rose", "line-of-sight", "geometric"}

@@ -264,3 +264,19 @@ def test_importing_the_predictor_pulls_in_nothing_slow():
     code = f"import sys, closedrooms.predictor.methods as _; print([m for m in {slow} if m in sys.modules])"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("joint", [True, False])
+def test_a_trace_draws_whole_lines_and_ends_with_the_joint_layout(mapped, joint):
+    one = mapped()
+    trace = predict(one.grid, one.doors, "paper", PaperConfig(joint_layout=joint), trace=True).trace
+    steps = [level.k for level in trace.levels]
+    assert steps[0] == 0
+    assert steps == sorted(set(steps))
+    assert (steps[-1] == PaperConfig().max_level + 1) == joint
+    # Every line that has no end reaches from one side of the box to another.
+    x0, y0, x1, y1 = np.array([face.bounds for face in trace.faces]).T
+    sides = np.array([x0.min(), y0.min(), x1.max(), y1.max()])
+    for line in trace.lines:
+        for x, y in (line[:2], line[2:]):
+            assert np.abs([x, y, x, y] - sides).min() < 1e-3

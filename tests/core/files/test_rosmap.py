@@ -316,3 +316,20 @@ def test_greys_of_sixteen_bits_are_those_of_eight(tmp_path: Path) -> None:
     for sixteen in (eight.astype(np.uint16) * 257, (eight.astype(np.uint16) << 8), eight.astype(np.uint16)):
         Image.fromarray(sixteen).save(tmp_path / "m.png")
         assert (read_map(tmp_path / "m.yaml").cells == wanted).all()
+
+
+@pytest.mark.parametrize(("origin", "name"), [("[1.1e8, 0, 0]", "x"), ("[0, -1.1e8, 0]", "y"), ("[0, .inf, 0]", "y")])
+def test_an_origin_beyond_any_map_is_refused_by_its_axis(tmp_path: Path, origin: str, name: str) -> None:
+    path = save(tmp_path, np.zeros((1, 1), dtype=np.uint8), f"resolution: 0.05\norigin: {origin}\n")
+    with pytest.raises(InvalidInputError, match=rf"^map origin {name} .* from -1e\+08 to 1e\+08 m: .*m\.yaml$"):
+        read_map(path)
+
+
+@pytest.mark.parametrize(("resolution", "read"), [("0.001", True), ("10", True), ("0.00099", False), ("10.1", False)])
+def test_cells_measure_a_millimetre_to_ten_metres(tmp_path: Path, resolution: str, read: bool) -> None:
+    path = save(tmp_path, np.zeros((1, 1), dtype=np.uint8), f"resolution: {resolution}\norigin: [0, 0, 0]\n")
+    if read:
+        assert read_map(path).frame.resolution == float(resolution)
+    else:
+        with pytest.raises(InvalidInputError, match=r"^map resolution .* from 0.001 to 10 m"):
+            read_map(path)

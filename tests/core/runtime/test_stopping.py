@@ -84,3 +84,25 @@ def test_a_process_whose_library_waits_for_ever_ends_all_the_same_with_its_statu
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stdout) == (3, "said")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel of Linux alone does it")
+def test_a_process_ends_with_its_parent_and_at_once_where_that_has_ended_before() -> None:
+    # The child says its number and waits; its parent ends as soon as it is told to.
+    code = (
+        "import os, signal, subprocess, sys; from closedrooms.core.runtime.stopping import ending_with\n"
+        "subprocess.Popen([sys.executable, '-c', 'import os, time; print(os.getpid(), flush=True); time.sleep(600)'],"
+        " preexec_fn=ending_with(os.getpid(), signal.SIGKILL)); sys.stdin.read()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as parent:
+        assert parent.stdout is not None
+        assert int(parent.stdout.readline()) != parent.pid
+        assert parent.stdin is not None
+        parent.stdin.close()
+        # The pipe ends when the child, which writes to it too, is gone.
+        assert parent.stdout.read() == ""
+    assert parent.returncode == 0
+    code = "from closedrooms.core.runtime.stopping import ending_with; ending_with(1 << 30, 9)()"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 1

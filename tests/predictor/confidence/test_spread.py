@@ -115,3 +115,17 @@ def test_belief_goes_to_the_nearest_shape_and_to_the_earlier_of_two():
     tie = np.array([[1.0, 0.5, 0.5], [0.5, 1.0, 0.5], [0.5, 0.5, 1.0]])
     assert share_nearest(tie, np.array([0.2, 0.3, 0.5]), [0, 1]) == pytest.approx([0.7, 0.3])
     assert share_nearest(tie, np.array([0.2, 0.3, 0.5]), [1, 0]) == pytest.approx([0.8, 0.2])
+
+
+def test_what_lies_between_the_lattice_of_the_map_is_joined_whole():
+    frame = GridFrame(0.5, 0.0, 0.0, 4, 4)
+    whole, joint = join_spreads(frame, [Belief(0.5, (), _spread(np.ones((2, 3)), origin=(0.25, 0.75)))])
+    x0, y0, x1, y1 = whole.bounds
+    assert x0 <= 0.25
+    assert y0 <= 0.75
+    assert x1 >= 1.75
+    assert y1 >= 1.75
+    # From 0.25 to 1.75 and from 0.75 to 1.75: a cell that is covered to a half has a half.
+    assert joint[0].tolist() == pytest.approx([0.25, 0.5, 0.5, 0.25], abs=0.02)
+    assert joint[1].tolist() == pytest.approx([0.5, 1.0, 1.0, 0.5], abs=0.02)
+    assert joint[2].tolist() == pytest.approx([0.25, 0.5, 0.5, 0.25], abs=0.02)

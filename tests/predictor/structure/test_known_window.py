@@ -54,8 +54,8 @@ def test_finer_cells_show_the_same_walls_where_they_were():
     # The middles of walls and of free space stay, on either side alike.
     assert (fine.cells[20:22, 10:50] == OCCUPIED).all()
     assert (fine.cells[10:18, 10:22] == FREE).all()
-    assert (fine.cells[:, ::-1] == at_resolution(grid_of(cells[:, ::-1], 0.1), 0.05).cells).all()
-    assert (fine.cells.T == at_resolution(grid_of(cells.T, 0.1), 0.05).cells).all()
+    assert np.array_equal(at_resolution(grid_of(cells[:, ::-1], 0.1), 0.05).cells, fine.cells[:, ::-1])
+    assert np.array_equal(at_resolution(grid_of(cells.T, 0.1), 0.05).cells, fine.cells.T)
     assert (fine.cells[:6] == UNKNOWN).all()
 
 

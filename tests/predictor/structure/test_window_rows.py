@@ -9,7 +9,7 @@ from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyG
 from closedrooms.predictor.structure.window_rows import Niche, find_window_rows
 
 
-def hall(depth, angle=0.0):
+def hall(depth):
     """Free space of so much depth below a wall along y = 0."""
     frame = GridFrame(0.05, -2.0, -10.0, 220, 700)
     points = frame.to_points(np.stack(np.indices(frame.shape), axis=-1))
