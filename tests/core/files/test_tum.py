@@ -37,5 +37,5 @@ def test_a_coordinate_beyond_any_place_is_refused_and_one_at_the_bound_is_read(t
 @pytest.mark.parametrize("line", ["0 1 2 0 0 0 1", "0 1 2 0 0 0 0 1 1", "nan 0 0 0 0 0 0 1", "0 0 0 0 0 0 2.1 0"])
 def test_a_line_of_other_than_eight_honest_numbers_is_refused(tmp_path: Path, line: str) -> None:
     (tmp_path / "t.tum").write_text(line + "\n")
-    with pytest.raises(InvalidInputError, match="^line 1;"):
+    with pytest.raises(InvalidInputError, match=r"^line 1;"):
         read_trajectory(tmp_path / "t.tum")
