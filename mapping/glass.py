@@ -62,7 +62,12 @@ class Panes:
     def __init__(self, resolution: float) -> None:
         self._resolution = resolution
         self._glimpses: list[Glimpse] = []
-        self._met = MetSurfaces(resolution)
+        self._views: dict[int, View] = {}
+        self.start_again()
+
+    def start_again(self) -> None:
+        """Forget what was found, but not what the scans met: what was found early was found from less."""
+        self._met = MetSurfaces(self._resolution)
         self._places: FloatArray = np.zeros((0, 2))
         self._normals: FloatArray = np.zeros((0, 2))
         self._asked: IntArray = np.zeros(0, dtype=np.int64)
@@ -70,7 +75,6 @@ class Panes:
         self._said: npt.NDArray[np.int8] = np.zeros((0, 0), dtype=np.int8)
         self._said_from: list[Pose2] = []
         self._sensors: FloatArray = np.zeros((0, 2))
-        self._views: dict[int, View] = {}
         self.segments: FloatArray = np.zeros((0, 2, 2))
 
     def glimpse(self, glimpse: Glimpse) -> None:

@@ -396,9 +396,13 @@ class Mapper:
         return np.array([((a.x, a.y), (b.x, b.y)) for a, b in ends], dtype=np.float64).reshape(-1, 2, 2)
 
     def finish(self) -> None:
-        """Run the final pose-graph optimisation, over all keyframes."""
+        """Run the final pose-graph optimisation, over all keyframes, and look for glass in all that they saw."""
         if self._graph.optimise():
             self._poses_moved()
+        self._panes.start_again()
+        for keyframe in self.keyframes:
+            keyframe.shown = None
+        self._drawn = 0
 
 
 def _outdated(keyframe: Keyframe) -> bool:

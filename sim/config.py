@@ -1,5 +1,6 @@
 """What the simulated robot is like: its lidar, its drive, its noise, and how doors move."""
 
+import ctypes
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -28,7 +29,10 @@ def _finite(*values: float) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class LidarConfig:
-    """A planar laser scanner that looks horizontally."""
+    """A planar laser scanner that looks horizontally.
+
+    Its angles and times between beams are single-precision numbers, as sensor_msgs/LaserScan carries them.
+    """
 
     beams: int = 720
     """Rays of one sweep."""
@@ -64,21 +68,26 @@ class LidarConfig:
     def angle_increment(self) -> float:
         """Angle from one beam to the next [rad]."""
         if self.field_of_view > FULL_TURN - 1e-6:
-            return FULL_TURN / self.beams
-        return self.field_of_view / max(self.beams - 1, 1)
+            return _single(FULL_TURN / self.beams)
+        return _single(self.field_of_view / max(self.beams - 1, 1))
 
     @property
     def beam_times(self) -> tuple[float, float]:
         """When the first and the last beam are measured, against the end of the sweep [s]."""
         if self.sweep == "instant":
             return (0.0, 0.0)
-        took = self.angle_increment * (self.beams - 1) / FULL_TURN / self.rate
+        took = _single(self.angle_increment / FULL_TURN / self.rate) * (self.beams - 1)
         return (-took, 0.0) if self.turns == "left" else (0.0, -took)
 
     @property
     def angle_min(self) -> float:
         """Angle of the first beam [rad]."""
-        return -self.field_of_view / 2.0
+        return _single(-self.field_of_view / 2.0)
+
+
+def _single(value: float) -> float:
+    """Round to single precision (this module imports nothing heavy)."""
+    return ctypes.c_float(value).value
 
 
 # Figures of the makers' data sheets: field of view, angular step, distances and sweeps a second.

@@ -150,8 +150,8 @@ class Lidar:
             ranges,
             config.angle_min,
             config.angle_increment,
-            config.range_max,
-            config.range_min,
+            float(np.float32(config.range_max)),
+            float(np.float32(config.range_min)),
             stamp,
             config.mount,
             config.beam_times[1] - config.beam_times[0],
@@ -159,20 +159,26 @@ class Lidar:
         return scan, np.where(measured, bodies, -1)
 
     def _disturbed(self, distances: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Disturb the ranges [m]; says which of them are measurements of what the ray hit."""
+        """Disturb the ranges [m], rounded to single precision; says which are measurements of what the ray hit."""
         noise, config = self._noise, self.config
         ranges = distances
         if noise.range_sd > 0:
             ranges = distances + noise.range_sd * self._range_noise.standard_normal(config.beams)
-        ranges = np.where(ranges < config.range_min, math.nan, ranges)
-        ranges = np.where(ranges >= config.range_max, math.inf, ranges)
+        ranges = _single(ranges)
+        ranges = np.where(ranges < np.float32(config.range_min), math.nan, ranges)
+        ranges = np.where(ranges >= np.float32(config.range_max), math.inf, ranges)
         measured = np.isfinite(ranges)
         if noise.outliers > 0:
             chance, place = self._outliers.random((2, config.beams))
             wrong = chance < noise.outliers
-            uniform = config.range_min + place * (config.range_max - config.range_min)
+            uniform = _single(config.range_min + place * (config.range_max - config.range_min))
             ranges, measured = np.where(wrong, uniform, ranges), measured & ~wrong
         if noise.dropouts > 0:
             silent = self._dropouts.random(config.beams) < noise.dropouts
             ranges, measured = np.where(silent, math.nan, ranges), measured & ~silent
         return ranges, measured
+
+
+def _single(ranges: FloatArray) -> FloatArray:
+    """Round to what a message carries, so that a recorded scan is the scan that was mapped."""
+    return ranges.astype(np.float32).astype(np.float64)

@@ -114,6 +114,17 @@ def test_the_same_seed_gives_the_same_files(runs: tuple[Path, Path]) -> None:
 
 
 @pytest.mark.slow
+def test_what_the_robot_sensed_is_mapped_again_to_the_same_map(tmp_path: Path) -> None:
+    words = ["--sim.lidar.sweep", "rolling", "--sim.glass", "0.1", "--sim.people", "2", "--no-record", "--keep-scans"]
+    assert main(["run", "office-01", *words, "--bag", "--out", str(tmp_path / "run")]) in (0, 3)
+    for log in ("sensed", "scans.npz"):
+        out = tmp_path / f"from-{log}"
+        assert main(["map", str(tmp_path / "run" / log), "--no-record", "--out", str(out)]) == 0
+        for name in ("map.png", "map.yaml"):
+            assert (out / name).read_bytes() == (tmp_path / "run" / name).read_bytes(), log
+
+
+@pytest.mark.slow
 def test_a_run_without_closed_doors_says_so_and_completes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "office-01", "--close", "0", "--no-record", "--out", str(tmp_path / "out")]) == 0
     assert "no door was closed" in capsys.readouterr().out

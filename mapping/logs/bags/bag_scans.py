@@ -62,13 +62,20 @@ def sector_of(message: Any, beams: int) -> tuple[float, float, str]:
     raise InvalidInputError("a scan of more than a turn, or of none", expected="angles in radians")
 
 
-def scan_of(message: Any, ranges: FloatArray, mount: Mount) -> LaserScan:
+def sweep_of(message: Any) -> float:
+    """Read the time from the first beam of a LaserScan or MultiEchoLaserScan to the last [s], below 0 backwards."""
+    sweep = float(message.time_increment) * (len(message.ranges) - 1)
+    return sweep if math.isfinite(sweep) else 0.0
+
+
+def scan_of(message: Any, ranges: FloatArray, mount: Mount, sweep: float = 0.0) -> LaserScan:
     """Convert a message to a sweep, counter-clockwise from above.
 
     Args:
         message: LaserScan or MultiEchoLaserScan.
         ranges: Its ranges, shape (n,) [m].
         mount: Where the lidar sits.
+        sweep: Time from the first range to the last [s], 0 where it is not known.
 
     Raises:
         InvalidInputError: Angles or limits of no sense, or no ranges.
@@ -78,11 +85,12 @@ def scan_of(message: Any, ranges: FloatArray, mount: Mount) -> LaserScan:
     if mount.upside_down:
         start, step = -start, -step
     if step < 0.0:
-        start, step, ranges = start + step * (ranges.size - 1), -step, ranges[::-1]
-    if abs(step * ranges.size - 2.0 * math.pi) < step / 2.0:
+        start, step, ranges, sweep = start + step * (ranges.size - 1), -step, ranges[::-1], -sweep
+    if abs(step * ranges.size - 2.0 * math.pi) < step / 2.0 and sweep == 0.0:
         # All around, the sweep begins behind the robot: how the lidar is turned does not decide which beams are taken.
         turned = round((wrap_angle(start + mount.pose.theta + math.pi + step / 2.0) - step / 2.0) / step)
-        start, ranges = wrap_angle(start - turned * step), np.roll(ranges, turned)
+        if turned:
+            start, ranges = wrap_angle(start - turned * step), np.roll(ranges, turned)
     # Zero and what lies below range_min is no measurement (REP-117).
     ranges = np.where(ranges < max(shortest, 1e-6), np.nan, ranges)
-    return LaserScan(ranges, start, step, longest, shortest, robot_T_sensor=mount.pose.as_tuple())
+    return LaserScan(ranges, start, step, longest, shortest, robot_T_sensor=mount.pose.as_tuple(), sweep=sweep)

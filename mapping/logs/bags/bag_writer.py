@@ -37,7 +37,8 @@ def write_bag(path: Path, run: RecordedRun) -> None:
     """Write what a robot sensed as a rosbag 2: a folder with one MCAP file and ``metadata.yaml``.
 
     ``/scan`` holds sensor_msgs/LaserScan, ``/odom`` nav_msgs/Odometry, ``/tf`` the same as odom to base_link, and
-    ``/tf_static`` where the lidar sits. Stamps begin at :data:`START`. Ranges are single-precision numbers there.
+    ``/tf_static`` where the lidar sits. Stamps begin at :data:`START`. A LaserScan's numbers are of single precision,
+    its stamp is that of the first beam, where the run's is that of the latest.
 
     Args:
         path: The folder; it must not be there yet.
@@ -114,8 +115,9 @@ class _Messages:
         angles = scan.angle_min, end, scan.angle_increment
         limits = scan.range_min, scan.range_max
         none = np.empty(0, dtype=np.float32)
-        header = self._header(stamp, LIDAR)
-        return self._make("sensor_msgs/msg/LaserScan", header, *angles, 0.0, 0.0, *limits, ranges, none)
+        header = self._header(stamp - max(scan.sweep, 0.0), LIDAR)
+        times = scan.sweep / max(ranges.size - 1, 1), abs(scan.sweep)
+        return self._make("sensor_msgs/msg/LaserScan", header, *angles, *times, *limits, ranges, none)
 
     def odometry(self, stamp: float, odom_T_robot: Pose2) -> Any:
         zero = self._make("geometry_msgs/msg/Vector3", 0.0, 0.0, 0.0)

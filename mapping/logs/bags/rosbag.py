@@ -4,6 +4,7 @@ import contextlib
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,6 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import check_regular, is_file, is_folder, read_head, reading
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
-from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.logs.bags.bag_limits import limited
 from closedrooms.mapping.logs.bags.bag_messages import (
     MAX_SCANS,
@@ -24,7 +24,7 @@ from closedrooms.mapping.logs.bags.bag_messages import (
     stamp_of,
 )
 from closedrooms.mapping.logs.bags.bag_options import BagOptions
-from closedrooms.mapping.logs.bags.bag_scans import ranges_of, scan_of, sector_of
+from closedrooms.mapping.logs.bags.bag_scans import ranges_of, scan_of, sector_of, sweep_of
 from closedrooms.mapping.logs.bags.transform_tree import Mount, TransformTree, clean_name
 from closedrooms.mapping.logs.clocks import Times, forward, scan_and_odometry_times
 from closedrooms.mapping.logs.recorded_odometry import bridge_jumps, jump_remarks, odometry_at
@@ -32,6 +32,8 @@ from closedrooms.mapping.logs.recorded_run import RecordedRun
 
 SUFFIXES = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite": ".db3"}
 """What the files of a bag begin with, and how their names should end."""
+LONGEST_SWEEP = 1.1
+"""Time from the first beam of a sweep to its last against that from one sweep to the next: more cannot be."""
 
 
 def read_bag(path: Path, options: BagOptions) -> RecordedRun:
@@ -109,7 +111,11 @@ def _resolved(messages: BagMessages, options: BagOptions, remarks: list[Remark])
     scan_times = Times(*np.array([(stamp_of(message), at) for message, at in messages.scans]).T)
     times = None if track is None else Times(track[:, 0], track[:, 1])
     stamps, odometry_stamps, clock_remarks = scan_and_odometry_times(scan_times, times)
-    remarks += [*found, *mount_remarks, *clock_remarks, *_put_in_order(messages, stamps)]
+    sweeps, sweep_remarks = _sweeps(messages, stamps)
+    # A message's stamp is that of its first beam, a scan's that of its latest.
+    stamps += np.maximum(sweeps, 0.0)
+    order_remarks, sweeps = _put_in_order(messages, stamps, sweeps)
+    remarks += [*found, *mount_remarks, *clock_remarks, *sweep_remarks, *order_remarks]
     if track is None:
         poses, known = np.zeros((len(stamps), 3)), np.ones(len(stamps), dtype=np.bool_)
     else:
@@ -118,18 +124,32 @@ def _resolved(messages: BagMessages, options: BagOptions, remarks: list[Remark])
         moved, jumps = bridge_jumps(odometry_stamps, moved)
         poses, known, lost = odometry_at(np.column_stack((odometry_stamps, moved)), stamps)
         remarks += [*jump_remarks(jumps), *lost]
-    return _run(messages, known, poses, stamps, mounts, remarks, has_odometry=track is not None)
+    return _run(messages, known, poses, stamps, sweeps, mounts, remarks, has_odometry=track is not None)
 
 
-def _put_in_order(messages: BagMessages, stamps: FloatArray) -> list[Remark]:
-    """Sort the scans, and their stamps in place, by time: networks deliver some of them late."""
+def _sweeps(messages: BagMessages, stamps: FloatArray) -> tuple[FloatArray, list[Remark]]:
+    """Read how long each sweep took [s]; 0 for all where that is more than there is from one to the next."""
+    sweeps = np.array([sweep_of(message) for message, _ in messages.scans])
+    steps = np.diff(np.sort(stamps))
+    longer = (
+        int((np.abs(sweeps) > LONGEST_SWEEP * np.median(steps)).sum()) if steps.size else int((sweeps != 0.0).sum())
+    )
+    if 2 * longer <= sweeps.size:
+        return sweeps, []
+    why = "longer than from one scan to the next; the scans are taken to be of one instant each"
+    return np.zeros(sweeps.size), [Remark(action="repaired", what="times between beams", why=why, count=longer)]
+
+
+def _put_in_order(messages: BagMessages, stamps: FloatArray, sweeps: FloatArray) -> tuple[list[Remark], FloatArray]:
+    """Sort the scans, their stamps in place and how long each took by time: networks deliver some of them late."""
     late = int((np.diff(stamps) < 0.0).sum())
     if not late:
-        return []
+        return [], sweeps
     order = np.argsort(stamps, kind="stable")
     stamps[:] = stamps[order]
     messages.scans[:] = [messages.scans[i] for i in order.tolist()]
-    return [Remark(action="repaired", what="scans", why="recorded out of order; sorted by their time", count=late)]
+    why = "recorded out of order; sorted by their time"
+    return [Remark(action="repaired", what="scans", why=why, count=late)], sweeps[order]
 
 
 def _run(
@@ -137,6 +157,7 @@ def _run(
     known: Any,
     poses: FloatArray,
     stamps: FloatArray,
+    sweeps: FloatArray,
     mounts: dict[str, Mount],
     remarks: list[Remark],
     *,
@@ -149,7 +170,7 @@ def _run(
         message = messages.scans[i][0]
         try:
             ranges, dropped = ranges_of(message)
-            scan = scan_of(message, ranges, mounts[clean_name(message.header.frame_id)])
+            scan = scan_of(message, ranges, mounts[clean_name(message.header.frame_id)], float(sweeps[i]))
             repair = sector_of(message, ranges.size)[2]
         except InvalidInputError:
             broken += 1
@@ -167,10 +188,7 @@ def _run(
     if echoes:
         remarks.append(Remark(action="dropped", what="echoes", why="the first of each beam is mapped", count=echoes))
     forwards, backwards = forward(stamps[np.flatnonzero(known)[rows]] if rows else np.zeros(0))
-    swept = tuple(
-        LaserScan(s.ranges, s.angle_min, s.angle_increment, s.range_max, s.range_min, float(stamp), s.robot_T_sensor)
-        for s, stamp in zip(scans, forwards, strict=True)
-    )
+    swept = tuple(replace(scan, stamp=float(stamp)) for scan, stamp in zip(scans, forwards, strict=True))
     return RecordedRun(swept, poses[rows].reshape(-1, 3), None, (*remarks, *backwards), has_odometry)
 
 

@@ -1,19 +1,24 @@
 """A run written as a rosbag 2 and read back."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.scan import LaserScan
+from closedrooms.mapping.logs.bags.bag_messages import stamp_of
 from closedrooms.mapping.logs.bags.bag_options import BagOptions
 from closedrooms.mapping.logs.bags.bag_writer import START, write_bag
 from closedrooms.mapping.logs.bags.clicked_points import is_bag, read_clicked_points
 from closedrooms.mapping.logs.bags.rosbag import read_bag
 from closedrooms.mapping.logs.recorded_run import RecordedRun
+from closedrooms.sim.config import LIDAR_PRESETS
 
 rosbags = pytest.importorskip("rosbags", reason="the optional extra 'bags' is not installed")
+AnyReader = pytest.importorskip("rosbags.highlevel").AnyReader
 MOUNT = (0.12, -0.03, 0.4)
 
 
@@ -44,6 +49,54 @@ def test_a_run_is_read_back_as_it_was_sensed(tmp_path: Path) -> None:
         assert one.angles == pytest.approx(other.angles, abs=1e-5)
         assert one.robot_T_sensor == pytest.approx(MOUNT)
         assert (one.range_min, one.range_max) == pytest.approx((0.05, 10.0))
+
+
+@pytest.mark.parametrize("sweep", ["instant", "rolling"])
+@pytest.mark.parametrize("lidar", list(LIDAR_PRESETS))
+def test_what_the_simulated_lidar_says_is_read_back_to_the_last_bit(tmp_path: Path, lidar: str, sweep: Any) -> None:
+    """A LaserScan carries single precision: the sensor says no more than that."""
+    config = replace(LIDAR_PRESETS[lidar], sweep=sweep)
+    rng = np.random.default_rng(2)
+    limits = float(np.float32(config.range_max)), float(np.float32(config.range_min))
+    ranges = rng.uniform(limits[1], limits[0], (5, config.beams)).astype(np.float32).astype(np.float64)
+    took = config.beam_times[1] - config.beam_times[0]
+    angles = config.angle_min, config.angle_increment
+    scans = tuple(LaserScan(row, *angles, *limits, 0.25 * i, sweep=took) for i, row in enumerate(ranges))
+    poses = np.arange(5)[:, None] * np.array([[0.125, 0.25, 0.0]])
+    write_bag(tmp_path / "sensed", RecordedRun(scans, poses))
+    read = read_bag(tmp_path / "sensed", BagOptions())
+    assert not read.remarks
+    assert np.asarray(read.odometry) == pytest.approx(poses, abs=1e-8)
+    for one, other in zip(read.scans, scans, strict=True):
+        assert one.stamp - read.scans[0].stamp == pytest.approx(other.stamp, abs=1e-8)
+        assert (one.angle_min, one.angle_increment, one.sweep) == (other.angle_min, other.angle_increment, other.sweep)
+        assert (one.range_max, one.range_min) == limits
+        np.testing.assert_array_equal(one.ranges, other.ranges)
+
+
+def test_a_scan_stands_at_its_latest_beam_and_a_message_at_its_first(tmp_path: Path) -> None:
+    for name, sweep in (("left", 0.0625), ("right", -0.0625)):
+        scans = tuple(LaserScan(np.full(5, 2.0), -1.0, 0.5, 8.0, 0.0, 0.25 * i, sweep=sweep) for i in range(4))
+        poses = np.arange(4)[:, None] * np.array([[0.5, 0.0, 0.0]])
+        write_bag(tmp_path / name, RecordedRun(scans, poses))
+        with AnyReader([tmp_path / name]) as reader:
+            (topic,) = [connection for connection in reader.connections if connection.topic == "/scan"]
+            messages = [reader.deserialize(data, topic.msgtype) for _, _, data in reader.messages([topic])]
+        assert [stamp_of(message) for message in messages] == pytest.approx(
+            [START + 0.25 * i - max(sweep, 0.0) for i in range(4)]
+        )
+        assert messages[0].time_increment == sweep / 4
+        read = read_bag(tmp_path / name, BagOptions())
+        assert np.asarray(read.odometry)[:, 0] == pytest.approx(poses[:, 0], abs=1e-6)
+
+
+def test_times_between_beams_that_cannot_be_are_not_believed(tmp_path: Path) -> None:
+    scans = tuple(LaserScan(np.full(5, 2.0), -1.0, 0.5, 8.0, 0.0, 0.25 * i, sweep=0.5) for i in range(4))
+    write_bag(tmp_path / "sensed", RecordedRun(scans, np.zeros((4, 3))))
+    read = read_bag(tmp_path / "sensed", BagOptions())
+    # The first two messages are of a time before the odometry begins.
+    assert [scan.sweep for scan in read.scans] == [0.0] * 2
+    assert ("repaired", "times between beams", 4) in [(r.action, r.what, r.count) for r in read.remarks]
 
 
 def test_a_folder_that_is_there_is_one_clear_error(tmp_path: Path) -> None:
