@@ -5,7 +5,8 @@
 All is as in ``closedrooms dataset --format shards`` (jobs handed out, parts written, shards filled, tables), only a
 sample is 2 kB of nothing. Each size is a process of its own. CPU time is that of the command and of its workers; memory
 is the largest that the command has, and the largest of its workers. The last column is "ours / best known": CPU time a
-sample against the smallest size, above 1 is more.
+sample against the smallest size, above 1 is more. Called again with the same ``--csv``, it keeps the
+sizes that are there.
 """
 
 import argparse
@@ -48,6 +49,7 @@ def make_nothing(job: Task | Part | Filling) -> TaskResult:
         "closed": list(variant.closed),
         "map": {"bytes": bytes(1000), "path": "map.png"},
         "truth": {"bytes": bytes(1000), "path": "truth.png"},
+        "run_json": json.dumps({"exploration": {"status": "complete"}}),
     }
     content = as_bytes(pa.RecordBatch.from_pylist([row], schema=sample_schema(scans=False)))
     write_file(open_store(config.out), part_name(variant.world.split, job.index), content)
@@ -77,6 +79,15 @@ def measure(samples: int, workers: int) -> dict[str, Any]:
     }
 
 
+def read_before(path: Path | None) -> tuple[list[str], list[tuple[Any, ...]]]:
+    """Read the notes and the rows of an earlier call, none where there is no file."""
+    if path is None or not path.exists():
+        return [], []
+    lines = path.read_text().splitlines(keepends=True)
+    notes = [line for line in lines if line.startswith("#")]
+    return notes, [tuple(row) for row in csv.reader(lines[len(notes) + 1 :])]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sizes", type=int, nargs="+", default=[1_000, 10_000, 100_000])
@@ -88,20 +99,26 @@ def main() -> None:
     if options.one:
         print(json.dumps(measure(options.one, options.workers)))
         return
-    rows = []
+    notes, rows = read_before(options.csv)
     print("".join(f"{name:>19}" for name in HEAD))
+    for row in rows:
+        print("".join(f"{value:>19}" for value in row), flush=True)
+    there = {int(row[0]) for row in rows}
     for size in [200, 1_000] if options.quick else options.sizes:
+        if size in there:
+            continue
         line = [sys.executable, __file__, "--one", str(size), "--workers", str(options.workers)]
         found = json.loads(subprocess.run(line, check=True, capture_output=True, text=True).stdout)
         cost = 1e3 * found["cpu"] / found["samples"]
-        first = rows[0][2] if rows else round(cost, 3)
+        first = float(rows[0][2]) if rows else round(cost, 3)
         values = (found["samples"], found["shards"], round(cost, 3), round(found["wall"], 1), round(found["own"], 1),
                   round(found["worker"], 1), round(cost / first, 2))  # fmt: skip
         rows.append(values)
         print("".join(f"{value:>19}" for value in values), flush=True)
-    if options.csv:
-        with options.csv.open("w", newline="") as file:
-            csv.writer(file, lineterminator="\n").writerows([HEAD, *rows])
+        if options.csv:
+            with options.csv.open("w", newline="") as file:
+                file.writelines(notes)
+                csv.writer(file, lineterminator="\n").writerows([HEAD, *rows])
 
 
 if __name__ == "__main__":
