@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
+from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.driving.met_obstacles import BARRIER_STEP, barrier
+from closedrooms.navigation.driving.met_obstacles import BARRIER_STEP, TOUCHING, barrier, touching_points
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
 METRES = st.floats(-20.0, 20.0)
@@ -41,3 +42,16 @@ def test_a_barrier_stands_across_the_way_to_the_end_of_the_path(
 def test_without_a_way_to_go_the_barrier_stands_where_the_robot_looks(ahead: np.ndarray) -> None:
     pose = Pose2(1.0, 2.0, 0.7)
     check(barrier(pose, ahead, CONFIG), pose, np.array([math.cos(0.7), math.sin(0.7)]))
+
+
+def test_what_touches_is_what_stands_close_to_the_footprint_and_what_presses() -> None:
+    pose, near = Pose2(1.0, 2.0, math.pi / 2), CONFIG.required_clearance + TOUCHING
+    for distance, count in ((near - 0.01, 8), (near + 0.01, 0)):
+        scan = LaserScan(np.full(8, distance), -math.pi, math.pi / 4, 20.0)
+        points = touching_points(pose, scan, CONFIG)
+        assert len(points) == count
+        assert np.hypot(*(points - (1.0, 2.0)).T) == pytest.approx([distance] * count)
+    # Pressed from ahead and from the left: ahead is up on the map, left is towards smaller x.
+    felt = touching_points(pose, LaserScan(np.full(8, 3.0), -math.pi, math.pi / 4, 20.0), CONFIG, (0.0, math.pi / 2))
+    radius = CONFIG.robot.radius
+    assert np.allclose(felt, [(1.0, 2.0 + radius), (1.0 - radius, 2.0)])

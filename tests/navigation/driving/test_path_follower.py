@@ -9,7 +9,16 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.driving.path_follower import FollowedPath, free_distance, limit_speed, near_points, steer
+from closedrooms.navigation.driving.path_follower import (
+    FollowedPath,
+    Steering,
+    free_distance,
+    horizon,
+    limit_speed,
+    near_points,
+    steer,
+    turn_rate,
+)
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
 
@@ -101,3 +110,90 @@ def test_drop_outs_and_no_return_are_no_obstacles() -> None:
     ranges = np.full(720, np.inf)
     ranges[::2] = np.nan
     assert len(near_points(LaserScan(ranges, -math.pi, 2 * math.pi / 720, 20.0), CONFIG)) == 0
+
+
+BENT = FollowedPath.of(np.array([(0.0, 0.0), (3.0, 0.0), (3.0, 0.0), (3.0, 4.0)]))
+
+
+@pytest.mark.parametrize(
+    ("distance", "point"),
+    [(0.0, (0, 0)), (0.75, (0.75, 0)), (3.0, (3, 0)), (4.0, (3, 1)), (7.0, (3, 4)), (9.0, (3, 4))],
+)
+def test_a_place_along_a_path_with_a_corner_given_twice(distance: float, point: tuple[float, float]) -> None:
+    assert BENT.length == 7.0
+    assert BENT.at(distance) == pytest.approx(point, abs=1e-12)
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(st.floats(-2.0, 5.0), st.floats(-2.0, 6.0), st.floats(0.0, 6.9), st.floats(0.1, 8.0))
+def test_the_nearest_place_is_that_of_a_search_over_the_window(x: float, y: float, start: float, window: float) -> None:
+    found = BENT.project((x, y), start, window)
+    assert start <= found <= min(start + window, BENT.length) + 1e-9
+    tried = [math.dist(BENT.at(s), (x, y)) for s in np.linspace(start, min(start + window, BENT.length), 400)]
+    assert math.dist(BENT.at(found), (x, y)) <= min(tried) + 1e-6
+
+
+def test_turning_is_as_quick_as_the_error_asks_between_its_bounds() -> None:
+    assert turn_rate(0.2, CONFIG) == pytest.approx(0.6)
+    assert turn_rate(-0.2, CONFIG) == pytest.approx(-0.6)
+    assert turn_rate(0.01, CONFIG) == pytest.approx(0.3)
+    assert turn_rate(-3.0, CONFIG) == -CONFIG.robot.max_turn_rate
+
+
+def test_the_arc_of_pure_pursuit_goes_through_its_target() -> None:
+    # On the line, half a radian off it: the target is the look-ahead away, and the speed falls with cos2 of the error.
+    command = steer(FollowedPath.of(np.array([(0.0, 0.0), (9.0, 0.0)])), Pose2(2.0, 0.0, -0.5), 1.8, CONFIG)
+    assert (command.progress, command.remaining) == pytest.approx((2.0, 7.0))
+    curvature = command.w / command.v
+    assert curvature == pytest.approx(2.0 * math.sin(0.5) / CONFIG.lookahead)
+    assert command.v == pytest.approx(
+        min(CONFIG.robot.max_speed * math.cos(0.5) ** 2, CONFIG.robot.max_turn_rate / curvature)
+    )
+
+
+def test_the_robot_can_stop_at_the_end_of_its_path() -> None:
+    command = steer(FollowedPath.of(np.array([(0.0, 0.0), (4.0, 0.0)])), Pose2(3.95, 0.0, 0.0), 3.9, CONFIG)
+    assert command.v == pytest.approx(min(CONFIG.robot.max_speed, math.sqrt(2.0 * CONFIG.deceleration * 0.05)))
+    assert command.w == 0.0
+
+
+def test_a_wide_robot_looks_farther() -> None:
+    assert horizon(CONFIG) == 1.0
+    wide = NavigationConfig().for_robot(RobotConfig(radius=0.7))
+    assert horizon(wide) == pytest.approx(0.7 + 0.03 + 0.5)
+
+
+def test_points_are_where_the_beams_end_seen_from_the_robot() -> None:
+    # All round at 0.5 m, from a sensor ahead of the robot's centre that looks to the left.
+    scan = LaserScan(np.full(8, 0.5), -math.pi, math.pi / 4, 20.0, robot_T_sensor=(0.1, 0.0, math.pi / 2))
+    points = near_points(scan, CONFIG)
+    bearings = -math.pi / 2 + math.pi / 4 * np.arange(8)
+    assert np.allclose(points, np.column_stack((0.1 + 0.5 * np.cos(bearings), 0.5 * np.sin(bearings))))
+
+
+def test_what_stands_at_the_horizon_is_left_out() -> None:
+    for distance, count in ((0.99, 8), (1.0, 0), (1.01, 0)):
+        scan = LaserScan(np.full(8, distance), -math.pi, math.pi / 4, 20.0)
+        assert len(near_points(scan, CONFIG)) == count
+
+
+def test_a_speed_from_which_the_robot_just_stops() -> None:
+    wall = np.array([(0.5, y) for y in np.arange(-1.0, 1.0, 0.02)])
+    distance = free_distance(wall, 9.0, 0.0, CONFIG)
+    assert 0.2 < distance < 0.35
+    slow = limit_speed(Steering(9.0, 0.0, 1.0, 2.0), wall, CONFIG)
+    assert slow.v**2 / (2.0 * CONFIG.deceleration) == pytest.approx(distance)
+    assert (slow.progress, slow.remaining) == (1.0, 2.0)
+    turning = Steering(0.0, 1.0, 1.0, 2.0)
+    assert limit_speed(turning, wall, CONFIG) is turning
+
+
+def test_an_arc_to_the_left_meets_what_stands_at_the_left() -> None:
+    post = np.array([(0.4, 0.4)])
+    # A quarter of a circle of 0.4 m leads to the post, the same to the right away from it.
+    left, right = free_distance(post, 0.4, 1.0, CONFIG), free_distance(post, 0.4, -1.0, CONFIG)
+    assert left < right == pytest.approx(horizon(CONFIG) - CONFIG.required_clearance)
+    touching = CONFIG.robot.radius + 0.3 * CONFIG.clearance_margin
+    # Chord from the place on the arc to the post: 2 r sin(rest / 2r).
+    exact = 0.4 * (math.pi / 2 - 2.0 * math.asin(touching / 0.8))
+    assert exact - 0.051 <= left <= exact
