@@ -72,12 +72,14 @@ class CrossedSpace:
         Returns:
             Shape (n,): all, where too few or too many do not.
         """
-        rows, cols = self._lattice.cells(pose.transform(points))
-        n_rows, n_cols = self._free.shape
-        near = np.hypot(*points.T) < REACH
-        near &= (rows >= 0) & (rows < n_rows) & (cols >= 0) & (cols < n_cols)
         moves = np.zeros(len(points), dtype=np.bool_)
-        moves[near] = self._free[rows[near], cols[near]]
+        near = np.flatnonzero(np.hypot(points[:, 0], points[:, 1]) < REACH)
+        if len(near) < LEAST * len(points):
+            return ~moves
+        rows, cols = self._lattice.cells(pose.transform(points[near]))
+        n_rows, n_cols = self._free.shape
+        inside = (rows >= 0) & (rows < n_rows) & (cols >= 0) & (cols < n_cols)
+        moves[near[inside]] = self._free[rows[inside], cols[inside]]
         if not LEAST * len(points) <= np.count_nonzero(moves) <= MOST * len(points):
             moves[:] = False
         return ~moves

@@ -1,5 +1,6 @@
 """Closed doors in the map frame from what was seen of them at the keyframes."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,30 +19,36 @@ def fuse_doors(keyframes: Sequence[Keyframe]) -> list[ClosedDoor]:
     The jambs are weighted medians over the sightings: a heading error moves a far door more than a near one, so a
     sighting weighs inversely to its squared distance, and a few wrong poses move nothing.
     """
-    seen: dict[str, list[tuple[FloatArray, float]]] = {}
-    for keyframe in keyframes:
-        for name, (segment, distance) in keyframe.sightings.items():
-            ends = keyframe.pose.transform(np.array(segment))
-            seen.setdefault(name, []).append((ends, max(distance, NEAR) ** -2))
-    return [_fused(name, seen[name]) for name in sorted(seen)]
+    sighted = [(name, k.pose, *seen) for k in keyframes for name, seen in k.sightings.items()]
+    if not sighted:
+        return []
+    segments = np.array([segment for _, _, segment, _ in sighted])
+    turns = [(math.cos(pose.theta), math.sin(pose.theta)) for _, pose, _, _ in sighted]
+    # All sightings at once; as Pose2.transform.
+    rotations = np.array([((c, s), (-s, c)) for c, s in turns])
+    ends = segments @ rotations + np.array([(pose.x, pose.y) for _, pose, _, _ in sighted])[:, None]
+    weights = np.array([max(distance, NEAR) ** -2 for *_, distance in sighted])
+    of: dict[str, list[int]] = {}
+    for number, (name, *_) in enumerate(sighted):
+        of.setdefault(name, []).append(number)
+    return [_fused(name, ends[of[name]], weights[of[name]]) for name in sorted(of)]
 
 
-def _fused(name: str, sightings: list[tuple[FloatArray, float]]) -> ClosedDoor:
-    """Fuse the sightings of one door, ends in the map frame [m] with their weights: the median of each jamb."""
-    first = max(sightings, key=lambda s: s[1])[0]
-    ends = np.array([_ordered(segment, first) for segment, _ in sightings])  # (n, 2, 2)
-    weights = np.array([weight for _, weight in sightings])
+def _fused(name: str, ends: FloatArray, weights: FloatArray) -> ClosedDoor:
+    """Fuse the sightings of one door: the median of each jamb.
+
+    Args:
+        name: The door's id.
+        ends: Of the sightings, in either order, map frame, shape (n, 2, 2) [m].
+        weights: Of the sightings, shape (n,).
+    """
+    first, swapped = ends[np.argmax(weights)], ends[:, ::-1]
+    as_is = np.abs(ends - first).sum(axis=(1, 2)) <= np.abs(swapped - first).sum(axis=(1, 2))
+    ends = np.where(as_is[:, None, None], ends, swapped)
     jambs = np.array([[_weighted_median(ends[:, i, j], weights) for j in range(2)] for i in range(2)])
     a, b = ((float(x), float(y)) for x, y in jambs)
     width = float(np.hypot(*(jambs[1] - jambs[0])))
     return ClosedDoor(name, ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2), (a, b), width if width > 0.0 else None)
-
-
-def _ordered(segment: FloatArray, like: FloatArray) -> FloatArray:
-    """Order the ends of a segment as those of ``like``."""
-    same = np.abs(segment - like).sum()
-    swapped = np.abs(segment[::-1] - like).sum()
-    return segment if same <= swapped else segment[::-1]
 
 
 def _weighted_median(values: FloatArray, weights: FloatArray) -> float:

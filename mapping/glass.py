@@ -7,22 +7,25 @@ normal and none of the others; what moves returns the same beams now and not the
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.graph.keyframe import Keyframe
+from closedrooms.mapping.lattice import grown
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
 from closedrooms.mapping.met_surfaces import Glimpse, MetSurfaces
 from closedrooms.mapping.scan_view import View
 
 NEAR, OBLIQUE = math.radians(9.0), math.radians(22.0)
 """Incidence up to which a pane returns every beam, and from which on it returns none [rad]."""
+ASKEW = math.radians(30.0)
+"""Incidence from which on a beam that ends there tells a wall [rad]: normals are known to some 8 degrees."""
 DEPTH = 0.15
 """Distance from a place up to which a beam that ends there hits it [m]: three cells; twice as far it went past."""
 REACH = 12.0
@@ -53,19 +56,6 @@ CHANGED = 0.10
 HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE = 1, 2, 3, 4
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Said:
-    """What a keyframe says about the places in doubt.
-
-    Attributes:
-        pose: From where.
-        codes: One of the four above, 0 for nothing, shape (places that are asked about,).
-    """
-
-    pose: Pose2
-    codes: np.ndarray[tuple[int], np.dtype[np.int8]]
-
-
 class Panes:
     """The panes found so far, map frame."""
 
@@ -81,7 +71,10 @@ class Panes:
         self._places: FloatArray = np.zeros((0, 2))
         self._normals: FloatArray = np.zeros((0, 2))
         self._asked: IntArray = np.zeros(0, dtype=np.int64)
-        self._said: dict[int, _Said] = {}
+        # What keyframes (rows) say about the places that are asked about (columns): one of the codes above, or 0.
+        self._said: npt.NDArray[np.int8] = np.zeros((0, 0), dtype=np.int8)
+        self._said_from: list[Pose2] = []
+        self._sensors: FloatArray = np.zeros((0, 2))
         self.segments: FloatArray = np.zeros((0, 2, 2))
 
     def glimpse(self, glimpse: Glimpse) -> None:
@@ -105,14 +98,13 @@ class Panes:
         self._met.add(new, [keyframes[glimpse.keyframe].pose for glimpse in new])
         # What was met near its normal, and scans went through it all the same.
         places, normals = self._met.near_normal(*evidence.crossed(SOLID), OBLIQUE)
-        self._places = np.concatenate((self._places, places))
-        self._normals = np.concatenate((self._normals, normals))
-        doubted = self._in_question()
-        self._asked = np.concatenate((self._asked, np.setdiff1d(doubted, self._asked)))
+        if len(places):
+            self._places = np.concatenate((self._places, places))
+            self._normals = np.concatenate((self._normals, normals))
+            self._asked = np.concatenate((self._asked, np.setdiff1d(self._in_question(), self._asked)))
         if not len(self._asked):
             return self.segments[:0]
-        for keyframe in keyframes:
-            self._ask(keyframe)
+        self._ask(keyframes)
         before, found = self.segments, self._find(evidence.grid())
         # A pane that is as before keeps its ends, so that nothing is drawn anew for it.
         kept = [_like(line, before) for line in found]
@@ -126,23 +118,41 @@ class Panes:
         """List the places that could be on a pane, or where one could go on: few are so many side by side."""
         reach = FARTHEST + FRAME
         near = np.zeros(len(self._places), dtype=np.bool_)
-        for group in _touching(self._places, self._resolution) if len(near) else []:
-            low, high = group.min(axis=0), group.max(axis=0)
-            if len(group) >= FEWEST and math.dist(low, high) >= LENGTH:
-                near |= ((self._places > low - reach) & (self._places < high + reach)).all(axis=1)
+        groups = _groups(self._places, self._resolution)
+        order = np.argsort(groups, kind="stable")
+        firsts = np.flatnonzero(np.diff(groups[order], prepend=-1))
+        lows = np.minimum.reduceat(self._places[order], firsts, axis=0)
+        highs = np.maximum.reduceat(self._places[order], firsts, axis=0)
+        large = np.diff(firsts, append=len(groups)) >= FEWEST
+        large &= np.hypot(*(highs - lows).T) >= LENGTH
+        for low, high in zip(lows[large], highs[large], strict=True):
+            near |= ((self._places > low - reach) & (self._places < high + reach)).all(axis=1)
         return np.flatnonzero(near)
 
-    def _ask(self, keyframe: Keyframe) -> None:
-        """Bring up to date what a keyframe says about the places."""
-        said = self._said.get(keyframe.index)
-        count = 0 if said is None or said.pose != keyframe.pose else len(said.codes)
-        new = self._asked[count:]
-        if not len(new):
-            return
-        codes = self._codes(keyframe, self._places[new], self._normals[new])
-        if said is not None and count:
-            codes = np.concatenate((said.codes, codes))
-        self._said[keyframe.index] = _Said(keyframe.pose, codes)
+    def _ask(self, keyframes: Sequence[Keyframe]) -> None:
+        """Bring up to date what the keyframes say about the places: new ones about all, the others about new ones."""
+        rows, cols = self._said.shape
+        self._said = grown(self._said, ((0, len(keyframes) - rows), (0, len(self._asked) - cols)))
+        poses = [keyframe.pose for keyframe in keyframes]
+        anew = [k for k, (pose, said) in enumerate(zip(poses, self._said_from, strict=False)) if pose is not said]
+        anew += range(rows, len(keyframes))
+        self._said_from = poses
+        self._sensors = np.concatenate((self._sensors, np.zeros((len(keyframes) - rows, 2))))
+        for k in anew:
+            self._sensors[k] = poses[k].transform(keyframes[k].beams.origin[None])[0]
+        self._ask_some(keyframes, anew, 0)
+        if cols < len(self._asked):
+            self._ask_some(keyframes, np.setdiff1d(np.arange(rows), anew).tolist(), cols)
+
+    def _ask_some(self, keyframes: Sequence[Keyframe], chosen: Sequence[int], first: int) -> None:
+        """Find what some keyframes, by their indices, say about the places from the ``first`` one asked about on."""
+        asked = self._asked[first:]
+        places, normals = self._places[asked], self._normals[asked]
+        self._said[chosen, first:] = 0
+        middle, reach = (places.min(axis=0) + places.max(axis=0)) / 2.0, np.ptp(places, axis=0) / 2.0 + REACH
+        in_reach = (np.abs(self._sensors[chosen] - middle) < reach).all(axis=1)
+        for k in np.asarray(chosen)[in_reach].tolist():
+            self._said[k, first:] = self._codes(keyframes[k], places, normals)
 
     def _view(self, keyframe: Keyframe) -> View:
         if keyframe.index not in self._views:
@@ -160,20 +170,23 @@ class Panes:
         self, keyframe: Keyframe, places: FloatArray, normals: FloatArray
     ) -> np.ndarray[tuple[int], np.dtype[np.int8]]:
         codes = np.zeros(len(places), dtype=np.int8)
-        sensor = keyframe.pose.transform(keyframe.beams.origin[None])[0]
-        offsets = places - sensor
+        offsets = places - self._sensors[keyframe.index]
         away = np.hypot(*offsets.T)
         near = np.flatnonzero(away < REACH)
         if not len(near):
             return codes
-        beyond = self._view(keyframe).beyond(keyframe.pose.inverse().transform(places[near]))
+        view, local = self._view(keyframe), keyframe.pose.inverse().transform(places[near])
+        beyond = view.beyond(local)
         met = np.abs((offsets[near] * normals[near]).sum(axis=1)) / np.maximum(away[near], 1e-9)
         incidence = np.arccos(np.minimum(met, 1.0))
         with np.errstate(invalid="ignore"):
             hit, past = np.abs(beyond) <= DEPTH, beyond > 2.0 * DEPTH
+        # Of a place that is near, so many beams are beside it that some meet the pane near its normal.
+        askew = np.flatnonzero(hit & (incidence >= ASKEW))
+        hit[askew] = np.abs(view.beyond(local[askew], 0.0)) <= DEPTH
         found = np.zeros(len(near), dtype=np.int8)
         found[hit & (incidence < OBLIQUE)] = HIT_NEAR
-        found[hit & (incidence >= OBLIQUE)] = HIT_OBLIQUE
+        found[hit & (incidence >= ASKEW)] = HIT_OBLIQUE
         found[past & (incidence < NEAR)] = PAST_NEAR
         found[past & (incidence >= OBLIQUE)] = PAST_OBLIQUE
         codes[near] = found
@@ -183,9 +196,8 @@ class Panes:
         # In the order in which they were met, not in that in which they were asked about.
         order = np.argsort(self._asked)
         places, normals = self._places[self._asked[order]], self._normals[self._asked[order]]
-        said = np.stack([said.codes for said in self._said.values()])[:, order]
         codes = (HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE)
-        hit, askew, past, through = (np.count_nonzero(said == code, axis=0) for code in codes)
+        hit, askew, past, through = (np.count_nonzero(self._said == code, axis=0)[order] for code in codes)
         hit = np.maximum(hit, 1)  # a glimpse between two keyframes at least
         glass = (past <= DOUBT * hit) & (through >= SEEN_THROUGH) & (askew <= DOUBT * through)
         no_pane = (past > 1) & (past > hit)
@@ -239,14 +251,19 @@ def _lines(places: FloatArray, normals: FloatArray, resolution: float) -> list[F
 
 
 def _touching(places: FloatArray, resolution: float) -> list[FloatArray]:
-    """Part places into groups that hang together over gaps of at most four cells."""
+    """Part places into groups that hang together, see :func:`_groups`."""
+    groups = _groups(places, resolution)
+    return [places[groups == number] for number in np.unique(groups)]
+
+
+def _groups(places: FloatArray, resolution: float) -> IntArray:
+    """Number places, shape (n,), by groups that hang together over gaps of at most four cells."""
     cells = np.floor(places / resolution).astype(np.int64)
     cells -= cells.min(axis=0) - 3
     mask = np.zeros(cells.max(axis=0) + 4, dtype=np.uint8)
     mask[cells[:, 0], cells[:, 1]] = 1
-    count, labels = cv2.connectedComponents(cv2.dilate(mask, np.ones((5, 5), dtype=np.uint8)), connectivity=8)
-    of = np.asarray(labels)[cells[:, 0], cells[:, 1]]
-    return [places[of == number] for number in range(1, count)]
+    _, labels = cv2.connectedComponents(cv2.dilate(mask, np.ones((5, 5), dtype=np.uint8)), connectivity=8)
+    return np.asarray(labels)[cells[:, 0], cells[:, 1]].astype(np.int64)
 
 
 def _line(places: FloatArray) -> FloatArray | None:

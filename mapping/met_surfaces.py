@@ -99,6 +99,8 @@ class MetSurfaces:
             Mean places in the cells, shape (n, 2) [m], and mean unit normals of either sign, (n, 2), map frame.
         """
         cells = self._open_cells(row, col, asked)
+        if not len(cells):
+            return np.zeros((0, 2)), np.zeros((0, 2))
         numbers, owners = self._points_of(cells)
         points, angles = self._near(numbers, limit)
         near = ~np.isnan(angles)

@@ -44,6 +44,7 @@ from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.truth import true_rooms
 
 if TYPE_CHECKING:
+    from closedrooms.visualization.rerun.live import LiveViewer
     from closedrooms.visualization.rerun.recorder import Recorder
 
 DEFAULT_CLOSED = 5
@@ -127,7 +128,7 @@ def run(config: RunConfig, *, progress: Progress | None = None) -> Report:
 
 
 @contextlib.contextmanager
-def _watched(config: RunConfig, progress: Progress) -> Iterator[str | None]:
+def _watched(config: RunConfig, progress: Progress) -> Iterator["LiveViewer | None"]:
     """Open a viewer to stream to, on demand."""
     if not (config.live or config.web):
         yield None

@@ -70,7 +70,7 @@ def join_hypotheses(parts: Sequence[Hypotheses]) -> Hypotheses:
     return Hypotheses(*own, first.angle, first.quarter, first.u, first.v, measured[order])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Proposals:
     """The rectangles of every door, and of every set of doors that may lead to one room.
 

@@ -44,7 +44,8 @@ class WheeledRobot(DrivenRobot):
         steps = int(self._owed + 1e-6)
         self._owed -= steps
         for number in range(1, steps + 1):
-            self._command(v, w)
+            if self._commanded != (v, w):
+                self._command(v, w)
             self._physics.step()
             if number % TICK == 0 or number == steps:
                 sink(self._count_wheels())
@@ -67,12 +68,10 @@ class WheeledRobot(DrivenRobot):
         return 2.0 * mass * GRAVITY * self.model.wheel_radius / len(self._joints)
 
     def _command(self, v: float, w: float) -> None:
-        """Take one step of the ramp; the motors are told when it changes anything."""
+        """Take one step of the ramp, and tell the motors."""
         limits = self.config
         self.v = towards(self.v, v, limits.max_acceleration / STEPS)
         self.w = towards(self.w, w, limits.max_turn_acceleration / STEPS)
-        if (self.v, self.w) == self._commanded:
-            return
         self._commanded = (self.v, self.w)
         model, bullet = self.model, self._physics.bullet
         half = self.w * model.track / 2.0

@@ -20,3 +20,23 @@ def test_losses_come_first_in_tables():
 def test_rejects_a_remark_about_nothing():
     with pytest.raises(InvalidInputError, match="at least 1"):
         Remark(action="dropped", what="doors", why="-", count=0)
+
+
+@pytest.mark.parametrize(
+    ("number", "named"), [(1, "1 doors (d0)"), (6, "6 doors (d0, d1, d2, d3, d4, d5)"), (0, "doors")]
+)
+def test_up_to_six_names_are_told_and_one_thing_is_not_counted(number, named):
+    names = tuple(f"d{i}" for i in range(number))
+    remark = Remark(action="repaired", what="doors", why="turned", names=names, count=max(number, 1))
+    assert str(remark) == f"repaired {named}: turned"
+
+
+def test_a_remark_is_kept_whole_in_a_run():
+    remark = Remark(action="guessed", what="scale", why="doors", names=("a",), count=3, loss=True)
+    assert remark.as_json() == {
+        "action": "guessed", "what": "scale", "why": "doors", "names": ["a"], "count": 3, "loss": True,
+    }  # fmt: skip
+    assert Remark(action="guessed", what="scale", why="doors").as_json()["count"] == 1
+    assert str(Remark(action="dropped", what="doors", why="far", count=2)) == "dropped 2 doors: far"
+    with pytest.raises(TypeError):
+        Remark("guessed", "scale", "doors")

@@ -27,3 +27,20 @@ def test_rejects_ranges_of_wrong_shape_and_impossible_limits() -> None:
         LaserScan(np.zeros((2, 2)), 0.0, 0.1, 10.0)
     with pytest.raises(InvalidInputError, match="range_min"):
         LaserScan(np.zeros(2), 0.0, 0.1, 0.0)
+
+
+def test_a_range_is_a_hit_from_the_shortest_up_to_but_without_the_longest() -> None:
+    scan = LaserScan(np.array([0.5, 0.4999, 9.9999, 10.0, -np.inf]), 0.0, 0.1, 10.0, range_min=0.5)
+    assert scan.hits.tolist() == [True, False, True, False, False]
+    assert scan.angles == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4])
+
+
+def test_a_scan_says_nothing_of_time_and_place_unless_told() -> None:
+    scan = LaserScan(np.zeros(2), 0.0, 0.1, 10.0)
+    assert (scan.range_min, scan.stamp, scan.robot_T_sensor, scan.sweep) == (0.0, 0.0, (0.0, 0.0, 0.0), 0.0)
+
+
+@pytest.mark.parametrize(("least", "most"), [(1.0, 1.0), (-0.1, 1.0), (2.0, 1.0), (0.0, np.nan), (np.nan, 1.0)])
+def test_rejects_limits_in_the_wrong_order(least: float, most: float) -> None:
+    with pytest.raises(InvalidInputError, match=r"^scan ranges from .* m; expected 0 <= range_min < range_max$"):
+        LaserScan(np.zeros(2), 0.0, 0.1, most, range_min=least)

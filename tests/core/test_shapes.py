@@ -7,7 +7,15 @@ from shapely import affinity
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame
-from closedrooms.core.shapes import cells_inside, fill_shape, mark_doorways, take_away, trace_outline
+from closedrooms.core.shapes import (
+    cells_inside,
+    fill_shape,
+    fill_shapes,
+    mark_doorways,
+    polygon_iou,
+    take_away,
+    trace_outline,
+)
 
 # Quarters of a cell, so that sides and corners often lie on centres of cells.
 PLACES = st.integers(-20, 60).map(lambda quarter: quarter / 4)
@@ -97,3 +105,56 @@ def test_what_touches_but_for_a_rounding_error_takes_nothing_away(turn, also):
     assert left.area == pytest.approx(room.area, abs=1e-5)
     assert take_away(room, [room, *also]).is_empty
     assert take_away(room, []).equals(room)
+
+
+def test_overlap_is_what_two_areas_share_of_what_they_hold_together() -> None:
+    a, b = shapely.box(0, 0, 2, 2), shapely.box(1, 0, 4, 2)
+    assert polygon_iou(a, b) == pytest.approx(2 / 8)
+    assert polygon_iou(b, a) == pytest.approx(2 / 8)
+    assert polygon_iou(a, a) == 1.0
+    assert polygon_iou(a, shapely.box(2, 0, 3, 2)) == 0.0
+    assert polygon_iou(shapely.Polygon(), shapely.Polygon()) == 0.0
+    # An outline that crosses itself: two triangles of area 1, both in the square of area 4.
+    bow = shapely.Polygon([(0, 0), (2, 2), (2, 0), (0, 2)])
+    assert polygon_iou(bow, a) == polygon_iou(a, bow) == pytest.approx(2 / 4)
+
+
+def test_cells_on_the_edge_of_a_frame_are_filled_and_none_beyond() -> None:
+    frame = GridFrame(1.0, 0.0, 0.0, 3, 4)
+    assert cells_inside(shapely.box(-9, -9, 9, 9), frame).all()
+    assert np.argwhere(cells_inside(shapely.box(3, 2, 4, 3), frame)).tolist() == [[2, 3]]
+    assert np.argwhere(cells_inside(shapely.box(-1, -1, 1, 1), frame)).tolist() == [[0, 0]]
+    for outside in (
+        shapely.box(4, 0, 9, 3),
+        shapely.box(-9, 0, 0, 3),
+        shapely.box(0, 3, 4, 9),
+        shapely.box(0, -9, 4, 0),
+    ):
+        assert not cells_inside(outside, frame).any()
+    assert not cells_inside(shapely.Polygon(), frame).any()
+
+
+def test_holes_stay_empty_and_areas_that_overlap_count_once() -> None:
+    frame = GridFrame(0.5, 0.0, 0.0, 10, 10)
+    ring = shapely.box(0, 0, 5, 5).difference(shapely.box(1, 1, 4, 4))
+    mask = np.zeros(frame.shape, dtype=np.bool_)
+    fill_shapes([ring, shapely.box(0, 0, 3, 0.5), shapely.MultiPolygon([shapely.box(2, 2, 2.5, 2.5)])], frame, mask)
+    assert mask.sum() == (25 - 9) / 0.25 + 1
+    assert mask[4, 4]
+    reverse = np.zeros(frame.shape, dtype=np.bool_)
+    fill_shapes([shapely.Polygon(ring.exterior.coords[::-1], [ring.interiors[0].coords[::-1]])], frame, reverse)
+    assert (reverse == cells_inside(ring, frame)).all()
+
+
+def test_an_outline_is_closed_one_cell_wide_and_clipped_to_its_frame() -> None:
+    frame = GridFrame(0.5, 0.0, 0.0, 8, 8)
+    mask = np.zeros(frame.shape, dtype=np.bool_)
+    trace_outline(shapely.box(0.6, 0.6, 2.9, 2.4), frame, mask)
+    rows, cols = np.nonzero(mask)
+    assert (rows.min(), rows.max(), cols.min(), cols.max()) == (1, 4, 1, 5)
+    assert mask.sum() == 2 * 4 + 2 * 5 - 4
+    outside = np.zeros(frame.shape, dtype=np.bool_)
+    trace_outline(shapely.box(-9.0, 1.2, 99.0, 99.0), frame, outside)
+    assert np.argwhere(outside).tolist() == [[2, col] for col in range(8)]
+    trace_outline(shapely.box(1.1, 1.1, 3.4, 3.4).difference(shapely.box(1.6, 1.6, 2.9, 2.9)), frame, outside)
+    assert outside[3, 3:6].all()

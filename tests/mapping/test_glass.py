@@ -105,6 +105,15 @@ def test_a_doorway_that_was_seen_from_the_front_stays_open_beside_a_pane() -> No
     assert occupied_share(grid, map_T_world, (4.25, 6.0, 4.75, 6.0)) == 0.0
 
 
+def test_a_pane_is_found_from_close_by() -> None:
+    # Half a metre away, beams to either side of what is met askew meet the pane near its normal.
+    pane, beside = (3.5, 6.0, 4.5, 6.0), [(0.0, 6.0, 3.5, 6.0), (4.5, 6.0, 8.0, 6.0)]
+    route = [(1.0, 4.0), (3.7, 5.5), (4.4, 5.5), (3.7, 5.5), (4.4, 5.5), (7.0, 4.0)]
+    grid, map_T_world = mapped(GlassWorld([wall for wall in HALL if wall[1::2] != (6.0, 6.0)] + beside, pane), route)
+    assert known_share(grid, map_T_world, ROOM_BEHIND) < 0.05
+    assert occupied_share(grid, map_T_world, pane) > 0.95
+
+
 def test_somebody_who_stood_there_and_left_is_no_pane() -> None:
     person = [(3.8, 3.0, 4.2, 3.0), (3.8, 3.4, 4.2, 3.4), (3.8, 3.0, 3.8, 3.4), (4.2, 3.0, 4.2, 3.4)]
     route = [(1.0, 1.5), (1.0, 4.6), (4.0, 4.6), (6.0, 4.6), (6.0, 2.0)]

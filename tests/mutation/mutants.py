@@ -235,7 +235,9 @@ def lots(source: str, mutant: Mutant, tests: Sequence[Reach]) -> list[list[str]]
         reaching = {test.test for test in tests if any(f.startswith(f"{mutant.module}:") for f in test.functions)}
     files = {test.partition("::")[0] for test in reaching}
     quickest = sorted(tests, key=lambda test: test.seconds)
-    first = [*([] if inside else [OF_SOURCES]), *(test.test for test in quickest if test.test in reaching)]
+    # Heads of functions, as all that is outside of them, are held to rules.
+    ruled = not inside or any(mutant.line < node.body[0].lineno for node in inside if isinstance(node, ast.FunctionDef))
+    first = [*([OF_SOURCES] if ruled else []), *(test.test for test in quickest if test.test in reaching)]
     others = [
         test.test
         for test in quickest

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
@@ -20,8 +21,21 @@ LEAVE = 3.0
 PATIENCE = 30.0
 
 
+@dataclass(frozen=True, slots=True)
+class LiveViewer:
+    """A viewer that listens.
+
+    Attributes:
+        address: Where recordings are streamed to.
+        give_up: Ends a viewer that was closed or no longer takes what it is sent, and says so.
+    """
+
+    address: str
+    give_up: Callable[[], None]
+
+
 @contextlib.contextmanager
-def open_viewer(*, web: bool, tell: Callable[[str], None]) -> Iterator[str]:
+def open_viewer(*, web: bool, tell: Callable[[str], None]) -> Iterator[LiveViewer]:
     """Start a viewer that listens on this machine alone.
 
     Args:
@@ -30,7 +44,7 @@ def open_viewer(*, web: bool, tell: Callable[[str], None]) -> Iterator[str]:
         tell: Told where to look, in one line.
 
     Yields:
-        Where recordings are streamed to.
+        The viewer.
 
     Raises:
         InvalidInputError: The viewer does not start: it is not installed, or there is no screen for its window.
@@ -42,10 +56,15 @@ def open_viewer(*, web: bool, tell: Callable[[str], None]) -> Iterator[str]:
     if not web and sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise InvalidInputError("no screen for the viewer's window", expected="--web, which serves it to a browser")
     viewer = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+
+    def give_up() -> None:
+        tell("the viewer was closed or hangs; the recording is in the file all the same")
+        _end(viewer)
+
     try:
         _wait_for(viewer, page if web else port)
         tell(f"watch at http://{HOST}:{page}/?url={quote(target, safe='')}" if web else "watch in the viewer's window")
-        yield target
+        yield LiveViewer(target, give_up)
     except BaseException:
         _end(viewer)
         raise

@@ -9,12 +9,13 @@ from closedrooms.core.robot import RobotConfig
 from closedrooms.visualization.no_recording import no_recording
 
 if TYPE_CHECKING:
+    from closedrooms.visualization.rerun.live import LiveViewer
     from closedrooms.visualization.rerun.recorder import Recorder
 
 
 @contextlib.contextmanager
 def open_recording(
-    path: Path | None, robot: RobotConfig, *, name: str, viewer: str | None = None
+    path: Path | None, robot: RobotConfig, *, name: str, viewer: "LiveViewer | None" = None
 ) -> Iterator["Recorder"]:
     """Open the recorder of one run in a building.
 
@@ -22,7 +23,7 @@ def open_recording(
         path: The file to write (``.rrd``), or ``None`` for a recorder that does nothing.
         robot: As it is drawn.
         name: Of the recording.
-        viewer: Where it is streamed to while it is written.
+        viewer: It is streamed to while it is written.
     """
     if path is None:
         yield no_recording()

@@ -26,6 +26,7 @@ from closedrooms.visualization.rerun.documents import LEGEND, configuration_text
 from closedrooms.visualization.rerun.drawn_prediction import draw_doors, draw_input, draw_rooms, draw_trace
 from closedrooms.visualization.rerun.drawn_sureness import draw_nothing_yet, draw_sureness
 from closedrooms.visualization.rerun.drawn_tours import draw_tours
+from closedrooms.visualization.rerun.live import LiveViewer
 from closedrooms.visualization.rerun.recorded_robot import RecordedRobot
 from closedrooms.visualization.rerun.stream import RecordingStream, Stage
 from closedrooms.visualization.rerun.tabs import Contents
@@ -59,7 +60,7 @@ class Recorder:
         name: str,
         bounds: Bounds | None = None,
         robot_radius: float = 0.2,
-        viewer: str | None = None,
+        viewer: LiveViewer | None = None,
     ) -> None:
         """Prepare a recording.
 
@@ -68,7 +69,7 @@ class Recorder:
             name: Name and identity of the recording: the same for equal runs.
             bounds: Where the maps lie, ``x_min, y_min, x_max, y_max`` [m]; found out where not given.
             robot_radius: Size of the robot that is drawn [m].
-            viewer: Where it is streamed to while it is written, see :func:`~.live.open_viewer`.
+            viewer: It is streamed to while it is written, see :func:`~.live.open_viewer`.
         """
         self._stream = RecordingStream(path, name, viewer)
         self._curves = Curves(self._stream)

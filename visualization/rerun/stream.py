@@ -17,6 +17,7 @@ from closedrooms.core.errors import OutputError
 from closedrooms.core.files.unfinished import final_place
 from closedrooms.core.runtime.stopping import wait_for_nothing
 from closedrooms.visualization.rerun.documents import text_document
+from closedrooms.visualization.rerun.live import LiveViewer
 
 APPLICATION = "closedrooms"
 # Chunks are cut by size alone: a cut by wall-clock time would differ from one run to the next.
@@ -56,14 +57,14 @@ class RecordingStream:
     No wall clock is recorded, so that equal runs give equal recordings.
     """
 
-    def __init__(self, path: Path, name: str, viewer: str | None = None) -> None:
+    def __init__(self, path: Path, name: str, viewer: LiveViewer | None = None) -> None:
         """Prepare a file.
 
         Args:
             path: The file.
             name: Of the recording.
-            viewer: Where it is streamed to while it is written. Batches are then cut by time too, so that two equal
-                runs give the same values in files that differ.
+            viewer: It is streamed to while it is written. Batches are then cut by time too, so that two equal runs give
+                the same values in files that differ.
         """
         self._path, self._name, self._viewer = path, name, viewer
         self._stage: int = Stage.BUILDING
@@ -77,6 +78,7 @@ class RecordingStream:
         )
         self.live = viewer is not None
         """Whether somebody watches while it is written."""
+        self._closing: threading.Thread | None = None
         self._handler = rr.LoggingHandler("log")
         self._log_level = logging.NOTSET
 
@@ -85,7 +87,7 @@ class RecordingStream:
             if self._viewer is None:
                 self._rec.save(self._path)
             else:
-                self._rec.set_sinks(rr.FileSink(str(self._path)), rr.GrpcSink(self._viewer))
+                self._rec.set_sinks(rr.FileSink(str(self._path)), rr.GrpcSink(self._viewer.address))
         self._rec.set_log_time_enabled(False)
         self._rec.send_recording_name(self._name)
         # The logging handler writes to the recording of its thread.
@@ -106,15 +108,27 @@ class RecordingStream:
         try:
             with self._clear_errors():
                 self._flush()
-        except BaseException:
-            # To close a file whose writer has ended may wait for ever too.
-            closing = threading.Thread(target=self._rec.disconnect, daemon=True)
-            closing.start()
-            closing.join(CLOSE_SECONDS)
-            if closing.is_alive():
+                if self._viewer is None:
+                    self._rec.disconnect()
+                elif not self._closed_within(FLUSH_SECONDS):
+                    raise RuntimeError("the viewer hangs")
+        except BaseException as failure:
+            watched = self._viewer if isinstance(failure, OutputError) else None
+            if watched is not None:
+                watched.give_up()
+            closed = self._closed_within(CLOSE_SECONDS if watched is None else FLUSH_SECONDS)
+            if not closed:
                 wait_for_nothing()
-            raise
-        self._rec.disconnect()
+            if watched is None or not closed:
+                raise  # Else it was the viewer that did not take it; the file is whole.
+
+    def _closed_within(self, seconds: float) -> bool:
+        """Close file and viewer; where the writer has ended, or a viewer hangs, that may never end."""
+        if self._closing is None:
+            self._closing = threading.Thread(target=self._rec.disconnect, daemon=True)
+            self._closing.start()
+        self._closing.join(seconds)
+        return not self._closing.is_alive()
 
     def _flush(self) -> None:
         """Wait until all is written, as long as the file grows."""

@@ -1,0 +1,117 @@
+"""Where a room may be, and which other shapes it is given, against small cases worked out by hand."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.geometry import box
+
+from closedrooms.core.grid import GridFrame
+from closedrooms.predictor.confidence.belief import Belief, Spread, choose_diverse, share_nearest
+from closedrooms.predictor.confidence.judge import join_spreads
+
+UPRIGHT, TURNED = np.array([1.0, 0.0]), np.array([0.0, 1.0])
+
+
+def _spread(share, origin=(0.0, 0.0), along=UPRIGHT, resolution=0.5):
+    return Spread(np.array(origin), along, resolution, np.array(share, dtype=np.float64))
+
+
+def test_a_spread_is_sampled_where_it_lies():
+    spread = _spread([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]], origin=(1.0, 2.0))
+    on = spread.on(GridFrame(0.5, 0.5, 1.5, 4, 5))
+    expected = [[0, 0, 0, 0, 0], [0, 0.1, 0.2, 0.3, 0], [0, 0.4, 0.5, 0.6, 0], [0, 0, 0, 0, 0]]
+    assert on == pytest.approx(np.array(expected), abs=1e-6)
+    assert on.dtype == np.float32
+
+
+def test_rows_run_to_the_left_of_the_columns():
+    # Columns along y: rows then run along -x.
+    spread = _spread([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]], origin=(1.0, 0.0), along=TURNED)
+    on = spread.on(GridFrame(0.5, 0.0, 0.0, 3, 2))
+    assert on == pytest.approx(np.array([[0.4, 0.1], [0.5, 0.2], [0.6, 0.3]]), abs=1e-6)
+    assert np.argwhere(spread.inside(box(0.0, 0.5, 0.5, 1.0))).tolist() == [[1, 1]]
+    assert spread.bounds(0.6) == pytest.approx((0.0, 1.0, 0.5, 1.5))
+
+
+def test_between_two_centres_a_share_is_between():
+    on = _spread([[0.0, 1.0], [0.0, 1.0]]).on(GridFrame(0.25, 0.25, 0.25, 2, 2))
+    assert on == pytest.approx(np.array([[0.25, 0.75], [0.25, 0.75]]), abs=0.02)
+
+
+def test_bounds_hold_every_cell_of_at_least_the_share():
+    spread = _spread([[0.0, 0.0, 0.0], [0.0, 0.2, 0.3], [0.0, 0.1, 0.0]], origin=(1.0, 2.0))
+    assert spread.bounds(0.1) == (1.5, 2.5, 2.5, 3.5)
+    assert spread.bounds(0.2) == (1.5, 2.5, 2.5, 3.0)
+    assert spread.bounds(0.21) == (2.0, 2.5, 2.5, 3.0)
+    assert spread.bounds(0.31) is None
+
+
+@given(st.floats(0.0, 2 * math.pi))
+@settings(max_examples=20, deadline=None)
+def test_bounds_of_a_turned_spread_are_those_of_its_corners(angle):
+    spread = _spread(np.ones((2, 3)), origin=(1.0, 2.0), along=np.array([math.cos(angle), math.sin(angle)]))
+    c, s = math.cos(angle), math.sin(angle)
+    corners = [(1.0 + u * c - v * s, 2.0 + u * s + v * c) for u in (0.0, 1.5) for v in (0.0, 1.0)]
+    expected = (*np.min(corners, axis=0), *np.max(corners, axis=0))
+    assert spread.bounds(0.5) == pytest.approx(expected)
+
+
+def test_a_cell_is_free_when_any_room_holds_it():
+    frame = GridFrame(0.5, 0.0, 0.0, 4, 4)
+    one, other = _spread([[0.5, 0.5]]), _spread([[0.4, 0.0], [1.0, 0.005]], origin=(0.5, 0.0))
+    whole, joint = join_spreads(frame, [Belief(0.5, (), s) for s in (one, other)])
+    assert (whole.origin_x, whole.origin_y) == (0.0, 0.0)
+    assert joint[:2, :2] == pytest.approx(np.array([[0.5, 1 - 0.5 * 0.6], [0.0, 1.0]]), abs=1e-6)
+    nothing, none = join_spreads(frame, [Belief(0.5, (), _spread([[0.005]]))])
+    assert nothing == frame.cropped(0, 0, 1, 1)
+    assert none.tolist() == [[0.0]]
+    outside, far = join_spreads(frame, [Belief(0.5, (), _spread([[0.7]], origin=(-1.0, 3.0)))])
+    assert (outside.origin_x, outside.origin_y) == (-1.0, 3.0)
+    assert far[0, 0] == pytest.approx(0.7)
+
+
+# Three groups of shapes that overlap little: 0 and 1 are nearly one.
+OVERLAP = np.array([[1.0, 0.95, 0.2, 0.1], [0.95, 1.0, 0.3, 0.1], [0.2, 0.3, 1.0, 0.1], [0.1, 0.1, 0.1, 1.0]])
+
+
+def test_other_shapes_are_those_that_raise_the_expected_overlap_most():
+    weights = np.array([0.4, 0.3, 0.2, 0.1])
+    assert choose_diverse(OVERLAP, weights, 0) == [0, 2, 3]
+    assert choose_diverse(OVERLAP, weights, 0, count=1) == [0, 2]
+    assert choose_diverse(OVERLAP, weights, 0, count=0) == [0]
+    # By the root of the probabilities: 0.1 then weighs a third of 0.9, not a ninth.
+    assert choose_diverse(np.eye(2), np.array([1.0 - 1e-5, 1e-5]), 0) == [0, 1]
+    assert choose_diverse(np.eye(2), np.array([1.0 - 1e-7, 1e-7]), 0) == [0]
+
+
+@given(st.integers(0, 1000))
+@settings(max_examples=30, deadline=None)
+def test_the_next_shape_is_the_best_of_all_by_trying_each(seed):
+    rng = np.random.default_rng(seed)
+    overlap = rng.uniform(0.0, 0.85, (6, 6))
+    overlap = (overlap + overlap.T) / 2
+    np.fill_diagonal(overlap, 1.0)
+    weights = rng.dirichlet(np.ones(6))
+    flat = np.sqrt(weights) / np.sqrt(weights).sum()
+    chosen = choose_diverse(overlap, weights, 2)
+    assert chosen[0] == 2
+    assert len(chosen) <= 4
+    for end in range(1, len(chosen)):
+        values = [flat @ overlap[:, [*chosen[:end], other]].max(axis=1) for other in range(6)]
+        assert values[chosen[end]] == pytest.approx(max(values))
+
+
+def test_a_shape_too_like_a_chosen_one_is_not_taken_at_any_weight():
+    overlap = np.array([[1.0, 0.9, 0.91], [0.9, 1.0, 0.5], [0.91, 0.5, 1.0]])
+    assert choose_diverse(overlap, np.array([0.1, 0.1, 0.8]), 0) == [0, 1]
+
+
+def test_belief_goes_to_the_nearest_shape_and_to_the_earlier_of_two():
+    weights = np.array([0.4, 0.3, 0.2, 0.1])
+    assert share_nearest(OVERLAP, weights, [0, 2, 3]) == pytest.approx([0.7, 0.2, 0.1])
+    tie = np.array([[1.0, 0.5, 0.5], [0.5, 1.0, 0.5], [0.5, 0.5, 1.0]])
+    assert share_nearest(tie, np.array([0.2, 0.3, 0.5]), [0, 1]) == pytest.approx([0.7, 0.3])
+    assert share_nearest(tie, np.array([0.2, 0.3, 0.5]), [1, 0]) == pytest.approx([0.8, 0.2])
