@@ -62,7 +62,7 @@ def assert_repeated(first, again):
     assert one == two
 
 
-@pytest.mark.parametrize("method", ["paper", "rose", "best"])
+@pytest.mark.parametrize("method", ["paper", "rose", "best", "learned"])
 def test_predict_repeats_a_prediction(corridor, call, method):
     words = ("--method", method, "--predictor.door-width", "1.1", "--out", corridor / "a")
     assert call("predict", corridor / "map.yaml", "--doors", corridor / "doors.geojson", *words) == 0

@@ -2,7 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from closedrooms.experiments.evaluation.reporting.figures import draw_iou
+from closedrooms.experiments.evaluation.reporting.figures import COLOURS, draw_iou
+from closedrooms.predictor.methods import METHODS
 
 
 @pytest.mark.parametrize("method", ["learned", "somebody's"])
@@ -15,3 +16,7 @@ def test_every_method_is_drawn_one_of_another_package_too(tmp_path: Path, method
     path = tmp_path / "iou.png"
     assert draw_iou(path, rows, ["best", method], ["matched"])
     assert path.stat().st_size > 1000
+
+
+def test_every_method_of_ours_has_a_colour_of_its_own() -> None:
+    assert len({COLOURS[name] for name in METHODS}) == len(METHODS)

@@ -205,7 +205,7 @@ def test_a_map_of_one_kind_fails_every_door_with_a_reason(fill):
 
 @pytest.mark.parametrize("size", [40, 60, 150, 400])
 @pytest.mark.parametrize("occupied", [0.01, 0.02, 0.1, 0.5])
-@pytest.mark.parametrize("method", ["paper", "rose", "best"])
+@pytest.mark.parametrize("method", ["paper", "rose", "best", "learned"])
 def test_noise_without_a_line_fails_with_a_reason(method, size, occupied):
     for seed, free in itertools.product(range(3), (0.5, 1.0)):
         dice = np.random.default_rng(seed).random((size, size))
@@ -216,7 +216,7 @@ def test_noise_without_a_line_fails_with_a_reason(method, size, occupied):
         assert "a" in prediction.failures
 
 
-@pytest.mark.parametrize("method", ["paper", "rose", "best"])
+@pytest.mark.parametrize("method", ["paper", "rose", "best", "learned"])
 def test_walls_are_found_among_noise(method, mapped, iou):
     scene = mapped(closed=("t1", "b3"))
     dice = np.random.default_rng(0).random(scene.grid.cells.shape)

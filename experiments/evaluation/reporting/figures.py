@@ -15,7 +15,7 @@ from closedrooms.visualization.colours import ROOM_COLOURS, Colour
 COLOURS: dict[str, Colour] = {
     name: ROOM_COLOURS[number]
     for number, name in enumerate(
-        ("paper", "rose", "best", "line-of-sight", "geometric", "authors", "closed", "baseline")
+        ("paper", "rose", "best", "line-of-sight", "geometric", "authors", "closed", "baseline", "learned")
     )
 }
 LABELS = {
