@@ -1,5 +1,6 @@
 """Shapes: how much two overlap; which cells of a grid one holds, its outline passes, and which lie in doorways."""
 
+import contextlib
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -28,11 +29,15 @@ def take_away(shape: Shape, taken: Iterable[BaseGeometry]) -> BaseGeometry:
     """Take areas away from a shape: a valid area, empty where nothing is left.
 
     Of areas that touch but for a rounding error, what is left may come out as a shape with its neighbour as a hole
-    outside of it: such are taken away again with corners on a lattice of :data:`SNAP`.
+    outside of it, and a shape whose sides cross cannot be cut at all: such are made valid, and taken away with corners
+    on a lattice of :data:`SNAP`.
     """
     whole = shapely.union_all(list(taken))
-    left = shape.difference(whole)
-    return left if left.is_valid else shape.difference(whole, grid_size=SNAP)
+    with contextlib.suppress(shapely.errors.GEOSException):
+        left = shape.difference(whole)
+        if left.is_valid:
+            return left
+    return shapely.difference(shapely.make_valid(shape), shapely.make_valid(whole), grid_size=SNAP)
 
 
 def cells_inside(shape: Shape, frame: GridFrame) -> BoolArray:

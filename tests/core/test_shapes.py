@@ -107,6 +107,15 @@ def test_what_touches_but_for_a_rounding_error_takes_nothing_away(turn, also):
     assert take_away(room, []).equals(room)
 
 
+def test_a_shape_whose_sides_cross_is_cut_all_the_same() -> None:
+    # Two triangles of area 1 that meet in (1, 1); what lies within half of that stays.
+    bow = shapely.Polygon([(0, 0), (2, 2), (2, 0), (0, 2)])
+    left = take_away(bow, [shapely.box(0, 0, 0.5, 2), shapely.box(1.5, 0, 2, 2)])
+    assert left.is_valid
+    assert left.area == pytest.approx(2 * 0.5**2)
+    assert take_away(bow, [shapely.box(0, 0, 2, 2)]).is_empty
+
+
 def test_overlap_is_what_two_areas_share_of_what_they_hold_together() -> None:
     a, b = shapely.box(0, 0, 2, 2), shapely.box(1, 0, 4, 2)
     assert polygon_iou(a, b) == pytest.approx(2 / 8)
