@@ -4,7 +4,7 @@
     python benchmarks/speed/coverage.py MAP.yaml [MAP.yaml ...]   # these maps too
     python benchmarks/speed/coverage.py --quick              # the smallest office of each table
 
-Times are CPU seconds of this process, the best of three (of one where a run takes seconds). Tours are compared on the
+Times are CPU seconds of this process, the median of three (of one where a run takes seconds). Tours are compared on the
 metric closure of the same graph, each solver for the whole graph at once; ``ours`` is what the default method does. The
 last columns are "ours / best known" in processor time: of tracing beside a plain loop, of the tour beside each solver.
 """
@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import networkx as nx
@@ -69,15 +70,14 @@ def office(width: float, height: float, *, pillars: int = 0, resolution: float =
 
 
 def measured(run: Callable[[], Any], repeats: int = 3) -> tuple[float, Any]:
-    """Measure the least CPU time of some runs [s], with the last result; one run when it takes over 2 s."""
-    best, result = np.inf, None
-    for _ in range(repeats):
+    """Measure the median CPU time of some runs [s], with the last result; one run when it takes over 2 s."""
+    times: list[float] = []
+    result = None
+    while len(times) < repeats and max(times, default=0.0) <= 2.0:
         began = time.process_time()
         result = run()
-        best = min(best, time.process_time() - began)
-        if best > 2.0:
-            break
-    return best, result
+        times.append(time.process_time() - began)
+    return median(times), result
 
 
 def plain_trace(skeleton: BoolArray) -> "nx.Graph[Any]":
