@@ -76,6 +76,15 @@ def test_free_distance_ends_where_the_body_touches() -> None:
     assert free_distance(wall, -0.5, 0.0, CONFIG) > 0.7
 
 
+def test_the_body_is_the_robot_and_three_tenths_of_its_margin() -> None:
+    limit = CONFIG.robot.radius + 0.3 * CONFIG.clearance_margin
+    for side in (-1.0, 1.0):
+        beside, in_the_way = (np.array([(0.5, side * (limit + off))]) for off in (1e-3, -1e-3))
+        assert free_distance(beside, 0.5, 0.0, CONFIG) == horizon(CONFIG) - CONFIG.required_clearance
+        # Of the arc every 0.05 m is looked at: it is free up to the place before the one abeam.
+        assert free_distance(in_the_way, 0.5, 0.0, CONFIG) == pytest.approx(0.45)
+
+
 def test_a_wall_alongside_does_not_stop_the_robot() -> None:
     wall = np.array([(x, 0.25) for x in np.arange(-1.0, 2.0, 0.02)])
     assert free_distance(wall, 0.5, 0.0, CONFIG) > 0.7
