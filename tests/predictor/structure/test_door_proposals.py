@@ -1,6 +1,7 @@
 """Closed doors proposed from a map alone."""
 
 import math
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -206,3 +207,10 @@ def test_a_room_beside_the_leaf_counts_only_where_the_leaf_opens_into_it() -> No
     behind = round((2.0 + 0.3 + 1.0) / RESOLUTION)
     cells[behind:, low - 4 : low] = cells[behind:, high : high + 4] = FREE
     assert propose_doors(OccupancyGrid(grid.frame, cells)) == ()
+
+
+@pytest.mark.parametrize("name", [field.name for field in fields(ProposalConfig)])
+def test_every_setting_is_a_finite_number_of_at_least_nothing(name: str) -> None:
+    for value in (-1e-9, -1.0, math.nan, math.inf):
+        with pytest.raises(InvalidInputError, match=f"{name} .*expected a finite number of at least 0"):
+            ProposalConfig(**{name: value})
