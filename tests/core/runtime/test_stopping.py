@@ -14,13 +14,20 @@ from closedrooms.core.runtime.stopping import Terminated, stopping
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_is_an_exception_and_a_second_one_disturbs_nothing(number: int) -> None:
-    with stopping() as stop:
-        assert not stop
-        with pytest.raises(Terminated):
-            signal.raise_signal(number)
-        signal.raise_signal(signal.SIGTERM)
-        signal.raise_signal(signal.SIGINT)
-        assert stop.status == 128 + number
+    # Whoever started the tests in the background of a script, or by nohup, had some of them ignored.
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(each, signal.SIG_DFL) for each in signals]
+    try:
+        with stopping() as stop:
+            assert not stop
+            with pytest.raises(Terminated):
+                signal.raise_signal(number)
+            signal.raise_signal(signal.SIGTERM)
+            signal.raise_signal(signal.SIGINT)
+            assert stop.status == 128 + number
+    finally:
+        for each, handler in zip(signals, before, strict=True):
+            signal.signal(each, handler)
 
 
 def test_handlers_are_put_back_and_an_ignored_signal_stays_ignored() -> None:
