@@ -399,10 +399,12 @@ class Mapper:
         """Run the final pose-graph optimisation, over all keyframes, and look for glass in all that they saw."""
         if self._graph.optimise():
             self._poses_moved()
-        self._panes.start_again()
-        for keyframe in self.keyframes:
-            keyframe.shown = None
-        self._drawn = 0
+        if self._config.glass:
+            self._panes.start_again()
+            for keyframe in self.keyframes:
+                if keyframe.shown is not keyframe.beams:  # what no pane has cut need not be drawn anew
+                    keyframe.shown = None
+            self._drawn = 0
 
 
 def _outdated(keyframe: Keyframe) -> bool:

@@ -27,6 +27,7 @@ class Lidar:
         self._noise = noise
         self._physics = physics
         self._angles = config.angle_min + config.angle_increment * np.arange(config.beams)
+        self._shortest, self._longest = _single(np.array([config.range_min, config.range_max])).tolist()
         self._offsets = np.arange(-3, config.beams + 3)
         self._mount = Pose2(*config.mount)
         self._range_noise = stream(seed, "lidar", "range")
@@ -150,8 +151,8 @@ class Lidar:
             ranges,
             config.angle_min,
             config.angle_increment,
-            float(np.float32(config.range_max)),
-            float(np.float32(config.range_min)),
+            self._longest,
+            self._shortest,
             stamp,
             config.mount,
             config.beam_times[1] - config.beam_times[0],
@@ -165,8 +166,8 @@ class Lidar:
         if noise.range_sd > 0:
             ranges = distances + noise.range_sd * self._range_noise.standard_normal(config.beams)
         ranges = _single(ranges)
-        ranges = np.where(ranges < np.float32(config.range_min), math.nan, ranges)
-        ranges = np.where(ranges >= np.float32(config.range_max), math.inf, ranges)
+        ranges = np.where(ranges < self._shortest, math.nan, ranges)
+        ranges = np.where(ranges >= self._longest, math.inf, ranges)
         measured = np.isfinite(ranges)
         if noise.outliers > 0:
             chance, place = self._outliers.random((2, config.beams))

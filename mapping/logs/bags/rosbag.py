@@ -111,11 +111,11 @@ def _resolved(messages: BagMessages, options: BagOptions, remarks: list[Remark])
     scan_times = Times(*np.array([(stamp_of(message), at) for message, at in messages.scans]).T)
     times = None if track is None else Times(track[:, 0], track[:, 1])
     stamps, odometry_stamps, clock_remarks = scan_and_odometry_times(scan_times, times)
+    remarks += [*found, *mount_remarks, *clock_remarks, *_put_in_order(messages, stamps)]
     sweeps, sweep_remarks = _sweeps(messages, stamps)
+    remarks += sweep_remarks
     # A message's stamp is that of its first beam, a scan's that of its latest.
     stamps += np.maximum(sweeps, 0.0)
-    order_remarks, sweeps = _put_in_order(messages, stamps, sweeps)
-    remarks += [*found, *mount_remarks, *clock_remarks, *sweep_remarks, *order_remarks]
     if track is None:
         poses, known = np.zeros((len(stamps), 3)), np.ones(len(stamps), dtype=np.bool_)
     else:
@@ -130,26 +130,23 @@ def _resolved(messages: BagMessages, options: BagOptions, remarks: list[Remark])
 def _sweeps(messages: BagMessages, stamps: FloatArray) -> tuple[FloatArray, list[Remark]]:
     """Read how long each sweep took [s]; 0 for all where that is more than there is from one to the next."""
     sweeps = np.array([sweep_of(message) for message, _ in messages.scans])
-    steps = np.diff(np.sort(stamps))
-    longer = (
-        int((np.abs(sweeps) > LONGEST_SWEEP * np.median(steps)).sum()) if steps.size else int((sweeps != 0.0).sum())
-    )
+    longest = LONGEST_SWEEP * float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+    longer = int((np.abs(sweeps) > longest).sum())
     if 2 * longer <= sweeps.size:
         return sweeps, []
     why = "longer than from one scan to the next; the scans are taken to be of one instant each"
     return np.zeros(sweeps.size), [Remark(action="repaired", what="times between beams", why=why, count=longer)]
 
 
-def _put_in_order(messages: BagMessages, stamps: FloatArray, sweeps: FloatArray) -> tuple[list[Remark], FloatArray]:
-    """Sort the scans, their stamps in place and how long each took by time: networks deliver some of them late."""
+def _put_in_order(messages: BagMessages, stamps: FloatArray) -> list[Remark]:
+    """Sort the scans, and their stamps in place, by time: networks deliver some of them late."""
     late = int((np.diff(stamps) < 0.0).sum())
     if not late:
-        return [], sweeps
+        return []
     order = np.argsort(stamps, kind="stable")
     stamps[:] = stamps[order]
     messages.scans[:] = [messages.scans[i] for i in order.tolist()]
-    why = "recorded out of order; sorted by their time"
-    return [Remark(action="repaired", what="scans", why=why, count=late)], sweeps[order]
+    return [Remark(action="repaired", what="scans", why="recorded out of order; sorted by their time", count=late)]
 
 
 def _run(
