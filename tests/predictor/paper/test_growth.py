@@ -125,3 +125,49 @@ def test_adjacent_border_rooms_share_their_mean_depth(faces, average, depths):
     growth = Growth(arrangement, unknown, entrances)
     rooms = border_rooms(growth, PaperConfig(average_border_depth=average))
     assert (rooms[0].depth, rooms[1].depth) == pytest.approx(depths)
+
+
+def _around(faces, *places):
+    """Doors ``(name, behind, before)`` into faces along the border of a box, cut every 4 m near its corner."""
+    arrangement = faces.cut(xs=(-8.0, -4.0, 0.0, 4.0, 8.0, 16.0), ys=(-8.0, -4.0, 0.0, 4.0, 8.0, 17.0))
+    unknown = arrangement.border.copy()
+    return Growth(arrangement, unknown, [faces.entrance(arrangement, *place) for place in places])
+
+
+def _depths(growth):
+    return {growth.entrances[room].door.id: border.depth for room, border in border_rooms(growth, CONFIG).items()}
+
+
+def test_only_border_rooms_that_touch_each_other_and_look_the_same_way_share_their_depth(faces):
+    top = [(f"t{x}", (x, 18.0), (x, 12.0)) for x in (-6.0, -2.0, 2.0, 12.0)]
+    growth = _around(faces, *top)
+    # Three in a row of 4 m each; the last stands alone, 8 m wide.
+    assert _depths(growth) == pytest.approx({"t-6.0": 4.0, "t-2.0": 4.0, "t2.0": 4.0, "t12.0": 8.0})
+    growth = _around(faces, *top, ("t6", (6.0, 18.0), (6.0, 12.0)))
+    assert _depths(growth) == pytest.approx(dict.fromkeys(("t-6.0", "t-2.0", "t2.0", "t6", "t12.0"), 24.0 / 5))
+    # Around a corner: the one looks up, the other to the right.
+    growth = _around(faces, ("up", (12.0, 18.0), (12.0, 12.0)), ("corner", (18.0, 18.0), (18.0, 12.0)))
+    assert set(_depths(growth)) == {"up", "corner"}
+    assert growth.touches(0) == {1}
+    growth = _around(faces, ("corner", (18.0, 18.0), (12.0, 18.0)), ("up", (12.0, 18.0), (12.0, 12.0)))
+    assert growth.touches(0) == {1}
+    # The corner is 4 x 3 m and entered from the left through an edge that the border cuts: as deep as it is wide.
+    assert _depths(growth) == pytest.approx({"corner": 4.0, "up": 8.0})
+
+
+def test_rooms_of_inner_faces_have_no_square(faces):
+    growth = _around(faces, ("t", (2.0, 18.0), (2.0, 12.0)))
+    growth.unknown[faces.at(growth.arrangement, 2.0, 2.0)] = True
+    inner = faces.entrance(growth.arrangement, "inner", (2.0, 2.0), (2.0, -2.0))
+    assert set(border_rooms(Growth(growth.arrangement, growth.unknown, [inner, *growth.entrances]), CONFIG)) == {1}
+
+
+def test_a_square_runs_left_around(faces):
+    growth = _around(
+        faces, ("t", (2.0, 18.0), (2.0, 12.0)), ("b", (2.0, -18.0), (2.0, -6.0)), ("l", (-18.0, 2.0), (-6.0, 2.0)),
+        ("r", (18.0, 2.0), (12.0, 2.0)),
+    )  # fmt: skip
+    boxes = [(0.0, 17.0, 4.0, 21.0), (0.0, -12.0, 4.0, -8.0), (-12.0, 0.0, -8.0, 4.0), (16.0, 0.0, 20.0, 4.0)]
+    for room, box in zip(border_rooms(growth, CONFIG).values(), boxes, strict=True):
+        assert room.polygon().exterior.is_ccw
+        assert room.polygon().symmetric_difference(shapely.box(*box)).area < 1e-9
