@@ -156,7 +156,7 @@ def test_clutter_goes_where_it_does_not_hang_together_with_a_wall():
     cells = grid.cells.copy()
     # A thing far from the walls, one that touches one, and unknown cells, which stay; in a frame with a margin.
     cells[30:32, 30:32] = OCCUPIED
-    cells[102:106, 40:44] = OCCUPIED
+    cells[101:106, 40:44] = OCCUPIED
     cells[190:, :] = UNKNOWN
     grid = OccupancyGrid(grid.frame, cells)
     wide = grid.on(grid.frame.cropped(-5, -7, 220, 230))
