@@ -96,7 +96,7 @@ def scan_at(
     angles = math.radians(-view / 2) + math.radians(0.5) * np.arange(beams)
     sensor = world_T_robot @ Pose2(*mount)
     ends = np.column_stack((np.cos(angles + sensor.theta), np.sin(angles + sensor.theta))) * 20.0
-    rays = shapely.linestrings(np.stack((np.zeros_like(ends), ends), axis=1) + (sensor.x, sensor.y))
+    rays = shapely.linestrings(np.stack((np.zeros_like(ends), ends), axis=1) + np.array([sensor.x, sensor.y]))
     walls = shapely.MultiLineString([list(segment) for segment in SEGMENTS])
     ranges = shapely.distance(shapely.intersection(rays, walls), shapely.Point(sensor.x, sensor.y))
     return LaserScan(ranges, math.radians(-view / 2), math.radians(0.5), 20.0, stamp=7.0, robot_T_sensor=mount)

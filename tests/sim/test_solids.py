@@ -46,7 +46,7 @@ def test_the_volume_is_floor_area_times_height_wherever_it_stands(
     area: Polygon, height: float, at: tuple[float, float], only_sides: bool
 ) -> None:
     vertices, triangles = extrude(area, height=height)
-    vertices = vertices + (*at, 0.0)
+    vertices = vertices + np.array([*at, 0.0])
     if only_sides:
         triangles = upright(vertices, triangles)
     part = MovingPart(vertices, triangles, False, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
