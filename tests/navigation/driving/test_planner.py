@@ -1,4 +1,5 @@
 import math
+from itertools import pairwise
 
 import networkx as nx
 import numpy as np
@@ -192,7 +193,7 @@ def test_paths_cost_what_a_search_of_the_whole_grid_says(
         reached = reachable_cells(costmap, place, CONFIG)
         assert reached is not None
         assert sorted(map(tuple, np.argwhere(reached).tolist())) == sorted(costs)
-        for a, b in zip(path.points, path.points[1:], strict=False):
+        for a, b in pairwise(path.points):
             line = a + np.linspace(0.0, 1.0, 40)[:, None] * (b - a)
             # Between two cells side by side the line may cut the corner of a third.
             assert costmap.clearance_at(line).min() > 0.5 * CONFIG.required_clearance
@@ -264,7 +265,7 @@ def test_straightening_keeps_the_ends_and_as_much_room_as_there_was() -> None:
     assert kept[0].tolist() == around[0].tolist()
     assert kept[-1].tolist() == around[-1].tolist()
     least = costmap.clearance_at(around).min()
-    for a, b in zip(kept, kept[1:], strict=False):
+    for a, b in pairwise(kept):
         line = a + np.linspace(0.0, 1.0, 60)[:, None] * (b - a)
         assert costmap.clearance_at(line).min() >= min(least, CONFIG.open_clearance) - 0.05
     for few in (around[:1], around[:2]):
