@@ -9,7 +9,7 @@ from shapely.geometry import box
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
-from closedrooms.navigation.tour.revised_prediction import COMPARE_INTERVAL, DOORWAY, RevisedPrediction
+from closedrooms.navigation.tour.revised_prediction import DOORWAY, RevisedPrediction
 from closedrooms.predictor.inpainting import inpaint
 from closedrooms.predictor.prediction import Prediction
 
@@ -88,7 +88,6 @@ def test_a_map_that_is_as_predicted_is_not_wrong_and_one_with_a_square_metre_of_
 
 def test_it_is_compared_every_two_seconds() -> None:
     prediction = begun()
-    assert COMPARE_INTERVAL == pytest.approx(2.0)
     empty, seen = corridor(OPENED), corridor(OPENED, (1.0, 2.2, 5.0, 6.2))
 
     def compared(grid: OccupancyGrid, stamp: float) -> tuple[str, ...] | None:
