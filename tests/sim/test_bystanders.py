@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 
 import networkx as nx
 import numpy as np
@@ -102,7 +103,7 @@ def test_a_path_is_as_short_as_any_over_eight_neighbours_and_cuts_no_corner(floo
         start, goal = floor.sample(rng), floor.sample(rng)
         path = floor.path(start, goal)
         assert (path[0], path[-1]) == (start, goal)
-        length = sum(graph.edges[a, b]["weight"] for a, b in zip(path, path[1:], strict=False))
+        length = sum(graph.edges[a, b]["weight"] for a, b in pairwise(path))
         assert length == pytest.approx(nx.dijkstra_path_length(graph, start, goal))
 
 

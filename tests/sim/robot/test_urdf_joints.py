@@ -53,8 +53,8 @@ def test_two_wheels_beside_each_other_drive_across_their_axes_and_rather_forward
 
 def test_wheels_on_the_floor_are_found_and_casters_above_and_in_the_middle_are_not() -> None:
     joints = [
-        *driving(), wheel(2, 0.3, 0.0), wheel(3, 0.3, 0.1, low=0.02), wheel(4, 0.3, 0.1, low=0.04), wheel(5, 0.3, 0.1, size=0.0),
-        wheel(6, 0.3, 0.1, slope=math.pi / 2), wheel(7, 0.3, 0.15, free=False),
+        *driving(), wheel(2, 0.3, 0.0), wheel(3, 0.3, 0.1, low=0.02), wheel(4, 0.3, 0.1, low=0.04),
+        wheel(5, 0.3, 0.1, size=0.0), wheel(6, 0.3, 0.1, slope=math.pi / 2), wheel(7, 0.3, 0.15, free=False),
         wheel(8, 0.3, -0.1, low=0.02),
     ]  # fmt: skip
     wheels, heading = find_wheels(joints, None, PATH)
@@ -148,7 +148,11 @@ def test_the_joints_of_the_robot_that_we_make_are_read_where_they_are(tmp_path: 
 
 
 ARM = """<robot name="r">
-  <link name="base"><inertial><origin xyz="0.3 0 0"/><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="base">
+    <inertial>
+      <origin xyz="0.3 0 0"/><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
+    </inertial>
+  </link>
   <link name="arm"/>
   <joint name="hinge" type="revolute">
     <parent link="base"/><child link="arm"/><origin xyz="0.1 0.2 0.3" rpy="0 0 0.5"/><axis xyz="1 0 0"/>
