@@ -166,7 +166,9 @@ def _sliding_leaves(plan: FloorPlan, door: PlanDoor, half: float) -> tuple[Leaf,
     for panels in range(1, MAX_PANELS + 1):
         for ends in (((near, far, 0),), ((far, near, 1),), ((near, middle, 0), (far, middle, 1))):
             leaves = tuple(leaf for jamb, end, k in ends for leaf in _panels(jamb, end, half, panels, pockets[k]))
-            opened = sum(min(pockets[k], _length(end - jamb) / panels) * panels for jamb, end, k in ends)
+            # Of each side all panels end up behind one, which goes into its pocket.
+            sides = [(_length(end - jamb), pockets[k]) for jamb, end, k in ends]
+            opened = sum(side - side / panels + min(pocket, side / panels) for side, pocket in sides)
             if opened > clear + 1e-6:
                 best, clear = leaves, opened
     return best

@@ -141,7 +141,7 @@ def free_spans(
         taken: Doors and openings already placed.
         margin: Metres kept clear of corners, crossing walls and other passages.
     """
-    blocked = [(-1e9, margin), (edge.length - margin, 1e9)]
+    blocked = [(edge.length - margin, math.inf)]
     # What meets a wall borders on one of its rooms.
     near = [other.segment for other in edges if not {*edge.rooms}.isdisjoint(other.rooms)]
     meeting = np.array(near, dtype=np.float64)
@@ -154,9 +154,9 @@ def free_spans(
     in_line = ends[off.max(axis=1, initial=0.0) < 0.3] if len(ends) else ends
     blocked += [(float(pair.min()) - margin, float(pair.max()) + margin) for pair in in_line]
     blocked.sort()
-    spans, at = [], -1e9
+    spans, at = [], margin
     for low, high in blocked:
-        if low > at > -1e8:
+        if low > at:
             spans.append((at, low))
         at = max(at, high)
     return spans

@@ -1,6 +1,7 @@
 import cv2
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.robot import RobotConfig
@@ -100,3 +101,111 @@ def test_of_each_cell_of_a_frontier_is_told_the_same_alone_as_with_all_others(se
     alone = [still_unknown(grid, point[None], CONFIG) for point in points]
     assert 0 < np.count_nonzero(alone) < len(points)
     assert still_unknown(grid, points, CONFIG) == pytest.approx(sum(alone))
+
+
+def blotches(seed: int, rows: int = 64, cols: int = 72) -> np.ndarray:
+    """A map of patches of free, occupied and unknown cells of 0.05 m, some large, some small."""
+    rng = np.random.default_rng(seed)
+    values = cv2.blur(rng.random((rows, cols)), (7, 7))
+    low, high = np.quantile(values, [0.5, 0.93])
+    cells = np.where(values < low, 0, np.where(values < high, -1, 100)).astype(np.int8)
+    cells[rng.random((rows, cols)) < 0.01] = 100
+    return cells
+
+
+def beside(mask: np.ndarray) -> np.ndarray:
+    """Cells beside a marked one, over an edge."""
+    grown = np.zeros_like(mask)
+    grown[1:] |= mask[:-1]
+    grown[:-1] |= mask[1:]
+    grown[:, 1:] |= mask[:, :-1]
+    grown[:, :-1] |= mask[:, 1:]
+    return grown
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("vain", [False, True])
+def test_frontiers_are_the_free_cells_beside_unknown_patches_that_are_worth_it(seed: int, vain: bool) -> None:
+    config = NavigationConfig(min_unknown_area=0.08, min_frontier=0.4).for_robot(RobotConfig())
+    navigation = NavigationMap(config)
+    navigation.update(grid_of(blotches(seed)))
+    frame, free = navigation.frontier_frame, navigation.free.astype(bool)
+    given_up = np.array([(1.5, 1.5), (2.2, 0.8), (-99.0, 4.0)]) if vain else None
+    found = find_frontiers(navigation, config, given_up=given_up)
+
+    patches = ndimage.label(~free & ~navigation.blocked.astype(bool))[0]
+    areas = np.bincount(patches.ravel()) * frame.resolution**2
+    areas[0] = 0.0
+    area = np.zeros(frame.shape)
+    for number in range(1, patches.max() + 1):
+        touched = beside(patches == number) & free
+        area[touched] = np.maximum(area[touched], areas[number])
+    worth = area >= 0.08 - 1e-6
+    if given_up is not None:
+        rows, cols = frame.to_cells(given_up[:2]).T
+        for row, col in zip(rows, cols, strict=True):
+            worth[row - 1 : row + 2, col - 1 : col + 2] = False
+    pieces, count = ndimage.label(worth, structure=np.ones((3, 3)))
+    long = [number for number in range(1, count + 1) if np.sum(pieces == number) * frame.resolution >= 0.4 - 1e-9]
+    assert long
+    expected = np.isin(pieces, long)
+    cells = frame.to_cells(found.points)
+    assert cells.tolist() == np.argwhere(expected).tolist()
+    for label in range(len(long)):
+        own = cells[found.labels == label]
+        (number,) = set(pieces[own[:, 0], own[:, 1]].tolist())
+        assert len(own) == np.sum(pieces == number)
+        assert found.unknown_area[label] == pytest.approx(area[pieces == number].max(), rel=1e-5)
+    assert len(found.unknown_area) == len(long)
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_cells_within_a_distance_are_those_a_flood_reaches_in_as_many_steps(seed: int, distance: float) -> None:
+    navigation, found = frontiers_of(blotches(seed))
+    chosen = np.arange(len(found.points)) % 3 == 0
+    cells = found.frame.to_cells(found.points[chosen])
+    reached = np.zeros(found.frame.shape, dtype=bool)
+    reached[cells[:, 0], cells[:, 1]] = True
+    for _ in range(round(distance / found.frame.resolution)):
+        reached |= beside(reached) & navigation.free.astype(bool)
+    assert np.array_equal(found.within(distance, chosen), reached)
+    assert not found.within(distance, np.zeros(len(found.points), dtype=bool)).any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("reach", [0.3, 0.9])
+def test_points_are_seen_from_a_place_that_free_cells_close_by_join_with_it(seed: int, reach: float) -> None:
+    navigation, found = frontiers_of(blotches(seed))
+    frame, free = found.frame, navigation.free.astype(bool)
+    span = round(reach / frame.resolution) + 1
+    for row, col in np.argwhere(free)[::37].tolist():
+        place = frame.to_points(np.array([row, col]))
+        near = np.zeros_like(free)
+        near[max(row - span, 0) : row + span + 1, max(col - span, 0) : col + span + 1] = True
+        own = ndimage.label(free & near)[0]
+        away = np.hypot(*(found.points - place).T)
+        rows, cols = frame.to_cells(found.points).T
+        expected = found.points[(away <= reach) & near[rows, cols] & (own[rows, cols] == own[row, col])]
+        seen = seen_from(navigation, (float(place[0]), float(place[1])), found.points, reach)
+        assert seen.tolist() == expected.tolist()
+
+
+@pytest.mark.parametrize(("unknown", "left"), [(5, 0), (6, 1), (49, 1)])
+def test_a_cell_is_a_frontier_while_more_than_a_ninth_around_it_is_unknown(unknown: int, left: int) -> None:
+    # Three frontier cells of two map cells a side are seven map cells with the one in the middle.
+    cells = np.zeros((40, 40), dtype=np.int8)
+    rows, cols = np.divmod(np.arange(49), 7)
+    cells[17 + rows[:unknown], 17 + cols[:unknown]] = -1
+    point = grid_of(cells).frame.to_points(np.array([[20, 20]]))
+    assert still_unknown(grid_of(cells), point, CONFIG) == pytest.approx(left * CONFIG.frontier_resolution)
+
+
+def test_what_lies_beyond_the_map_is_unknown() -> None:
+    grid = grid_of(np.zeros((40, 40), dtype=np.int8))
+    points = np.array([(0.02, 1.0), (1.0, 1.98), (1.0, 1.0), (1.98, 0.02)])
+    assert still_unknown(grid, points, CONFIG) == pytest.approx(0.3)
+    # Of finer and coarser frontier cells as much each.
+    for resolution in (0.05, 0.2):
+        config = NavigationConfig(frontier_resolution=resolution).for_robot(RobotConfig())
+        assert still_unknown(grid, points, config) == pytest.approx(3 * resolution)

@@ -68,3 +68,128 @@ def test_a_large_patch_is_worth_any_distance() -> None:
     goal = search.find(Pose2(2.0, 2.0), hall(1.5))
     assert goal is not None
     assert goal.place[0] > 11.0
+
+
+def cell(*patches: tuple[float, float, float, float], size: tuple[float, float] = (10.0, 6.0)) -> OccupancyGrid:
+    """A walled floor of so many metres, in which some boxes are unknown."""
+    rows, cols = round(size[1] / 0.05), round(size[0] / 0.05)
+    cells = np.full((rows, cols), FREE, dtype=np.int8)
+    cells[[0, -1]] = OCCUPIED
+    cells[:, [0, -1]] = OCCUPIED
+    for x0, y0, x1, y1 in patches:
+        cells[round(y0 / 0.05) : round(y1 / 0.05), round(x0 / 0.05) : round(x1 / 0.05)] = UNKNOWN
+    return OccupancyGrid(GridFrame(0.05, 0.0, 0.0, rows, cols), cells)
+
+
+def searching(**settings: float) -> GoalSearch:
+    return GoalSearch(NavigationConfig(**settings).for_robot(RobotConfig()))
+
+
+LEFT_PATCH, RIGHT_PATCH = (0.5, 2.0, 2.0, 4.0), (8.0, 2.0, 9.5, 4.0)
+
+
+@pytest.mark.parametrize(("x", "left"), [(3.5, True), (6.5, False)])
+def test_of_two_large_patches_the_nearer_one_is_gone_for(x: float, left: bool) -> None:
+    search = searching()
+    goal = search.find(Pose2(x, 3.0), cell(LEFT_PATCH, RIGHT_PATCH))
+    assert goal is not None
+    assert (goal.place[0] < 5.0) == left
+    assert ((goal.frontier[:, 0] < 5.0) == left).all()
+    # The goal is as close as it is to be, where the robot has room, and the path leads there.
+    away = np.hypot(*(goal.frontier - np.array(goal.place)).T)
+    assert away.min() <= 0.5 + 0.3
+    assert away.max() <= search.config.farthest_approach + 0.2
+    assert goal.path.points[-1].tolist() == list(goal.place)
+    assert goal.path.points[0].tolist() == [x, 3.0]
+    assert goal.path.length < abs(x - (2.0 if left else 8.0)) + 0.3
+    # Of both patches all cells are known as frontiers.
+    assert set(np.unique(search.frontiers[:, 0] < 5.0)) == {True, False}
+    assert search.count == 1
+    assert not search.enclosed
+
+
+def test_what_was_given_up_stays_so_and_what_was_put_off_comes_back() -> None:
+    grid, here = cell(LEFT_PATCH, RIGHT_PATCH), Pose2(4.0, 3.0)
+    search = searching()
+    first = search.find(here, grid)
+    assert first is not None
+    left = search.frontiers[search.frontiers[:, 0] < 5.0]
+    search.put_off(left)
+    other = search.find(here, grid)
+    assert other is not None
+    assert other.place[0] > 5.0
+    search.give_up(search.frontiers[search.frontiers[:, 0] > 5.0])
+    assert search.find(here, grid) is None
+    assert search.try_again()
+    again = search.find(here, grid)
+    assert again is not None
+    assert again.place == first.place
+    assert not search.try_again()
+    assert search.count == 4
+
+
+def test_obstacles_that_were_met_are_tried_again_too() -> None:
+    search = searching()
+    grid = cell(RIGHT_PATCH)
+    search.map.add_obstacles(np.column_stack((np.full(120, 5.0), np.arange(120) * 0.05)))
+    assert search.find(Pose2(2.0, 3.0), grid) is None
+    assert search.try_again()
+    assert search.find(Pose2(2.0, 3.0), grid) is not None
+
+
+def test_a_robot_that_fits_nowhere_is_enclosed() -> None:
+    search = searching()
+    assert search.find(Pose2(2.0, 3.0), cell(RIGHT_PATCH)) is not None
+    assert not search.enclosed
+    tight = cell(size=(0.5, 0.5))
+    assert search.find(Pose2(0.25, 0.25), tight) is None
+    assert search.enclosed
+    assert search.find(Pose2(2.0, 3.0), cell()) is None
+    assert not search.enclosed
+
+
+def test_a_frontier_behind_furniture_is_looked_at_from_farther_off() -> None:
+    # A row of posts 0.35 m before the patch, through which free cells lead but no robot.
+    grid = cell((6.0, 1.0, 9.0, 5.0))
+    cells = grid.cells.copy()
+    cells[::6, 113:115] = OCCUPIED
+    search = searching()
+    goal = search.find(Pose2(2.0, 3.0), OccupancyGrid(grid.frame, cells))
+    assert goal is not None
+    gap = np.hypot(*(goal.frontier - np.array(goal.place)).T).min()
+    assert 0.5 < gap <= 1.2
+    # Not from any farther.
+    cells[::6, 93:95] = OCCUPIED
+    cells[::6, 103:105] = OCCUPIED
+    assert search.find(Pose2(2.0, 3.0), OccupancyGrid(grid.frame, cells)) is None
+
+
+@pytest.mark.parametrize(("near", "gone"), [((3.0, 2.5, 3.5, 3.0), True), ((0.5, 0.3, 1.0, 0.8), False)])
+def test_a_small_patch_is_looked_at_on_the_way_and_not_on_a_detour(near: tuple[float, ...], gone: bool) -> None:
+    # 0.25 m2 are worth 3.75 m; the large patch is 4 m away.
+    search = searching()
+    goal = search.find(Pose2(4.2, 3.0), cell(near, RIGHT_PATCH))
+    assert goal is not None
+    assert (goal.place[0] < 5.0) == gone
+    # A patch that is worth less is passed by.
+    poor = searching(worth=0.5).find(Pose2(4.2, 3.0), cell(near, RIGHT_PATCH))
+    assert poor is not None
+    assert poor.place[0] > 5.0
+
+
+def test_a_large_patch_that_is_nearer_comes_before_a_small_one() -> None:
+    goal = searching().find(Pose2(6.5, 3.0), cell((3.0, 2.5, 3.5, 3.0), RIGHT_PATCH))
+    assert goal is not None
+    assert goal.place[0] > 5.0
+
+
+def test_of_small_patches_the_first_that_is_worth_its_way_is_taken() -> None:
+    # 0.16 m2 are worth 2.4 m, 0.64 m2 9.6 m: the smaller one is nearer, but 3.3 m away.
+    small, larger = (5.7, 2.8, 6.1, 3.2), (8.0, 2.6, 8.8, 3.4)
+    goal = searching().find(Pose2(2.0, 3.0), cell(small, larger))
+    assert goal is not None
+    assert goal.place[0] > 7.0
+    goal = searching().find(Pose2(4.5, 3.0), cell(small, larger))
+    assert goal is not None
+    assert goal.place[0] < 7.0
+    assert searching(worth=1.0).find(Pose2(2.0, 3.0), cell(small, larger)) is None

@@ -14,7 +14,17 @@ from shapely.geometry import Point, Polygon, box
 from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
 from closedrooms.sim.config import SimConfig, noise_level
-from closedrooms.sim.contacts import SKIN, Obstacles, edges_of, move_disc
+from closedrooms.sim.contacts import (
+    CELL,
+    SKIN,
+    Obstacles,
+    SolidEdge,
+    distance,
+    edges_of,
+    leaf_edges,
+    move_disc,
+    offset,
+)
 from closedrooms.sim.robot.differential_drive import Drive
 from closedrooms.sim.robot.driven_robot import Motion
 from closedrooms.sim.simulation import Simulation
@@ -172,3 +182,110 @@ def test_the_entrance_of_the_building_is_shut(plan: FloorPlan) -> None:
             sim.step(1.0, 0.0, 0.1)
         assert abs(sim.world_T_robot.x - (12 - 0.08 - 0.2)) < 2e-3
         assert sim.true_ranges(Pose2(10.0, 1.75, 0.0)).max() < 13.0
+
+
+coordinates = st.floats(-6.0, 6.0)
+edges = st.tuples(coordinates, coordinates, coordinates, coordinates)
+
+
+@given(st.lists(edges, max_size=6), st.lists(edges, max_size=3), coordinates, coordinates, st.floats(0.05, 2.0))
+def test_every_edge_within_reach_is_looked_up_and_none_far_beyond(
+    fixed: list[SolidEdge], leaves: list[SolidEdge], x: float, y: float, reach: float
+) -> None:
+    obstacles = Obstacles(np.array(fixed).reshape(-1, 4), reach)
+    for number, (ax, ay, bx, by) in enumerate(leaves):
+        obstacles.add_leaf(("leaf", number), (min(ax, bx), min(ay, by), max(ax, bx), max(ay, by)))
+        obstacles.move_leaf(("leaf", number), [(ax, ay, bx, by)])
+    found = obstacles.near(x, y)
+    near = [edge for edge in (*fixed, *leaves) if exact_distance(x, y, edge) <= reach]
+    assert all(edge in found for edge in near)
+    # Fixed edges are sorted in by their distance, up to a cell's diagonal.
+    far = [edge for edge in fixed if exact_distance(x, y, edge) > reach + math.sqrt(2.0) * CELL + 1e-6]
+    assert not any(edge in found for edge in far if edge not in leaves)
+    assert len(found) <= len(fixed) + len(leaves)
+
+
+def exact_distance(x: float, y: float, edge: SolidEdge) -> float:
+    return float(shapely.LineString([edge[:2], edge[2:]]).distance(Point(x, y)))
+
+
+def test_a_leaf_is_where_it_was_last_put_and_looked_up_within_its_box_alone() -> None:
+    obstacles = Obstacles(np.zeros((0, 4)), 0.3)
+    obstacles.add_leaf(("door", 1), (0.0, 0.0, 1.0, 1.0))
+    for y in (0.0, 1.0):
+        obstacles.move_leaf(("door", 1), [(0.0, y, 1.0, y)])
+        assert list(obstacles.near(0.5, 0.5)) == [(0.0, y, 1.0, y)]
+    for x, y in ((2.1, 0.5), (-1.1, 0.5), (0.5, 2.1), (0.5, -1.1)):
+        assert list(obstacles.near(x, y)) == []
+    for x, y in ((1.29, 1.29), (-0.29, -0.29), (1.29, -0.29)):
+        assert len(obstacles.near(x, y)) == 1
+
+
+@given(coordinates, coordinates, edges | coordinates.map(lambda v: (v, 1.0, v, 1.0)))
+def test_the_offset_leads_from_the_nearest_point_of_an_edge(x: float, y: float, edge: SolidEdge) -> None:
+    dx, dy = offset(x, y, edge)
+    line = shapely.LineString([edge[:2], edge[2:]])
+    assert math.hypot(dx, dy) == pytest.approx(line.distance(Point(x, y)), abs=1e-6)
+    assert line.distance(Point(x - dx, y - dy)) < 1e-6
+    other = (9.0, 9.0, 8.0, 7.0)
+    nearest = min(exact_distance(x, y, edge), exact_distance(x, y, other))
+    assert distance(x, y, [edge, other]) == distance(x, y, [other, edge]) == pytest.approx(nearest, abs=1e-6)
+    assert distance(x, y, []) == math.inf
+
+
+def test_the_edges_of_an_area_are_those_of_all_its_rings() -> None:
+    ring = box(0, 0, 4, 3) - box(1, 1, 2, 2)
+    area = shapely.MultiPolygon([ring, box(6, 0, 7, 1)])
+    found = edges_of(area)
+    assert found.shape == (12, 4)
+    assert np.hypot(*(found[:, 2:] - found[:, :2]).T).sum() == pytest.approx(area.boundary.length)
+    assert shapely.union_all(shapely.linestrings(found.reshape(-1, 2, 2))).equals(area.boundary)
+    assert edges_of(shapely.MultiPolygon()).shape == (0, 4)
+
+
+def test_a_leaf_has_an_edge_from_each_corner_to_the_next() -> None:
+    corners = np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)])
+    assert leaf_edges(corners) == [(0, 0, 2, 0), (2, 0, 2, 1), (2, 1, 0, 1), (0, 1, 0, 0)]
+
+
+WALL = [(1.0, -9.0, 1.0, 9.0)]
+
+
+@given(st.floats(-1.2, 1.2), st.floats(0.1, 3.0))
+def test_what_a_wall_takes_of_a_motion_is_what_leads_into_it(direction: float, length: float) -> None:
+    dx, dy = length * math.cos(direction), length * math.sin(direction)
+    moved = move_disc(0.0, 0.0, dx, dy, RADIUS, WALL)
+    stop = 1.0 - RADIUS - SKIN
+    assert moved.x == pytest.approx(min(dx, stop), abs=1e-6)
+    assert moved.y == pytest.approx(dy, abs=1e-6)
+    if abs(dx - stop) > 1e-6:
+        assert moved.touched == (dx > stop)
+
+
+@pytest.mark.parametrize(("dx", "dy"), [(3.0, 1.0), (1.0, 3.0), (3.0, 3.0), (2.0, 5.0)])
+def test_in_a_corner_the_disc_comes_to_rest_whichever_wall_it_meets_first(dx: float, dy: float) -> None:
+    corner = [*WALL, (-9.0, 1.5, 9.0, 1.5)]
+    moved = move_disc(0.0, 0.0, dx, dy, RADIUS, corner)
+    assert moved.x == pytest.approx(min(dx, 1.0 - RADIUS - SKIN), abs=1e-6)
+    assert moved.y == pytest.approx(min(dy, 1.5 - RADIUS - SKIN), abs=1e-6)
+    assert moved.touched
+    # Out of it the way is free.
+    away = move_disc(moved.x, moved.y, -0.5, -0.25, RADIUS, corner)
+    assert (away.x, away.y, away.touched) == (pytest.approx(moved.x - 0.5), pytest.approx(moved.y - 0.25), False)
+
+
+def test_in_a_wedge_the_disc_stops_where_both_sides_touch() -> None:
+    # Two walls that meet at (2, 0) at half a right angle each to the way.
+    wedge = [(0.0, 2.0, 2.0, 0.0), (2.0, 0.0, 0.0, -2.0)]
+    moved = move_disc(0.0, 0.0, 3.0, 0.3, RADIUS, wedge)
+    reach = (RADIUS + SKIN) * math.sqrt(2.0)
+    assert (moved.x, moved.y) == (pytest.approx(2.0 - reach, abs=1e-4), pytest.approx(0.0, abs=1e-4))
+
+
+def test_round_the_end_of_a_wall_the_disc_rolls() -> None:
+    # Its lower end is 0.1 m above the way: the disc passes below it, at its own distance.
+    end = [(1.0, 0.1, 1.0, 5.0)]
+    moved = move_disc(0.0, 0.0, 1.5, 0.0, RADIUS, end)
+    assert moved.touched
+    assert moved.y < 0.0
+    assert exact_distance(moved.x, moved.y, end[0]) >= RADIUS

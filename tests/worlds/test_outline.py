@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import shapely
 
@@ -61,3 +62,48 @@ def test_rooms_drawn_apart_by_their_walls_are_one_outline(small: FloorPlan) -> N
     assert all(
         shapely.LineString(wall.segment).distance(shapely.box(0.2, 0.2, 11.8, 4.8).boundary) < 0.3 for wall in added
     )
+
+
+def test_walls_that_are_added_are_as_thick_as_the_others_and_have_names_of_their_own(small: FloorPlan) -> None:
+    inner = tuple(replace(wall, id="outline000" if n == 0 else wall.id) for n, wall in enumerate(small.walls[4:]))
+    closed = without_leaks(replace(small, walls=inner))
+    added = closed.walls[len(inner) :]
+    assert closed.walls[: len(inner)] == inner
+    assert [wall.id for wall in added] == [f"outline{n:03d}" for n in range(1, len(added) + 1)]
+    assert {wall.thickness for wall in added} == {0.2}
+    # Where inner walls end on the outline they stand already.
+    outline = shapely.box(0, 0, 12, 5).boundary
+    assert outline.buffer(1e-6).covers(shapely.MultiLineString([wall.segment for wall in added]))
+    length = sum(shapely.LineString(wall.segment).length for wall in added)
+    assert 33.0 < length < 34.0
+    (remark,) = closed.remarks
+    assert remark.count == len(added)
+    assert remark.why.startswith(f"{length:.1f} m added")
+    assert not leaks(closed)
+
+
+def test_a_robot_gets_out_through_what_is_wider_than_itself(small: FloorPlan) -> None:
+    ends = (Wall("w0", ((0.0, 0.0), (6.0, 0.0)), 0.3), Wall("w9", ((7.0, 0.0), (12.0, 0.0)), 0.3))
+    plan = replace(small, walls=(*ends, *small.walls[1:]))
+    assert [leaks(plan, radius) for radius in (0.1, 0.45, 0.55, 2.0)] == [True, True, False, False]
+
+
+def test_what_lies_far_from_the_origin_is_judged_alike(small: FloorPlan) -> None:
+    def moved(plan: FloorPlan, dx: float, dy: float) -> FloorPlan:
+        def at(points: np.ndarray) -> np.ndarray:
+            return np.asarray(points + np.array([dx, dy]))
+
+        return replace(
+            plan,
+            rooms=tuple(replace(r, polygon=shapely.transform(r.polygon, at)) for r in plan.rooms),
+            walls=tuple(replace(w, segment=tuple(map(tuple, at(np.array(w.segment)).tolist()))) for w in plan.walls),
+            doors=(),
+            openings=(),
+            start=None,
+        )
+
+    for dx, dy in ((-300.0, 200.0), (40.0, -500.0)):
+        assert not leaks(moved(small, dx, dy))
+        holed = replace(small, walls=small.walls[1:])
+        assert leaks(moved(holed, dx, dy))
+        assert not leaks(without_leaks(moved(holed, dx, dy)))

@@ -1,10 +1,13 @@
+import math
 from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 import shapely
+from shapely.affinity import rotate
 from shapely.geometry import box
 
+from closedrooms.core.door import Segment
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.worlds.geometry import wall_area
 from closedrooms.worlds.library import bundled_names, load_world
@@ -104,3 +107,71 @@ def test_a_plan_in_which_the_robot_fits_nowhere_is_one_clear_line(small: FloorPl
     plan = replace(small, start=None, furniture=(Furniture("f0", box(0, 0, 12, 5)),))
     with pytest.raises(InvalidInputError, match="a plan without a place for the robot; expected a room"):
         start_pose(plan)
+
+
+@pytest.mark.parametrize("degrees", [0, 30, 60, 89, 90, 91, 135, 179])
+def test_the_robot_looks_along_the_corridor_whichever_way_that_lies(small: FloorPlan, degrees: int) -> None:
+    turned = turned_by(small, degrees)
+    pose = start_pose(turned)
+    assert -math.pi / 2 < pose.theta <= math.pi / 2 + 1e-4
+    assert math.remainder(pose.theta - math.radians(degrees), math.pi) == pytest.approx(0.0, abs=1e-3)
+    # In the middle of the corridor: 2 m less half the walls on either side.
+    assert wall_area(turned).distance(shapely.Point(pose.x, pose.y)) == pytest.approx((2.0 - 0.15 - 0.1) / 2, abs=0.06)
+
+
+def turned_by(plan: FloorPlan, degrees: float) -> FloorPlan:
+    def of(segment: Segment) -> Segment:
+        a, b = rotate(shapely.LineString(segment), degrees, origin=(0, 0)).coords
+        return (a, b)
+
+    return replace(
+        plan,
+        rooms=tuple(replace(r, polygon=rotate(r.polygon, degrees, origin=(0, 0))) for r in plan.rooms),
+        walls=tuple(replace(w, segment=of(w.segment)) for w in plan.walls),
+        doors=tuple(replace(d, segment=of(d.segment)) for d in plan.doors),
+        openings=tuple(replace(o, segment=of(o.segment)) for o in plan.openings),
+        start=None,
+    )
+
+
+def test_the_largest_part_of_a_building_is_started_in(small: FloorPlan) -> None:
+    # Without its doors the corridor and r3, joined by an opening, are 36 m2; r1 and r2 joined are 24.
+    joined = Opening("o1", ((4.0, 3.0), (4.0, 4.0)), ("r1", "r2"))
+    plan = replace(small, doors=(), openings=(*small.openings, joined), start=None)
+    assert start_room(plan) == "r0"
+    # All rooms above are 36 m2, the corridor 24; of those r2 has two passages.
+    alone = replace(plan, openings=(Opening("o1", ((8.0, 3.0), (8.0, 4.0)), ("r2", "r3")), joined), doors=())
+    assert start_room(alone) == "r2"
+
+
+def test_a_passage_to_the_outside_does_not_make_a_room_the_main_one(small: FloorPlan) -> None:
+    rooms = (PlanRoom("a", "room", box(0, 0, 4, 4)), PlanRoom("b", "room", box(4, 0, 9, 4)))
+    walls = tuple(
+        Wall(f"w{n}", (p, q), 0.2)
+        for n, (p, q) in enumerate(pair for room in rooms for pair in pairwise(room.polygon.exterior.coords))
+    )
+    ways = (Opening("o0", ((4, 1), (4, 3)), ("a", "b")), *(
+        Opening(f"e{n}", ((0.5 + n, 0), (1.4 + n, 0)), ("a", None)) for n in range(3)
+    ))  # fmt: skip
+    plan = replace(small, rooms=rooms, walls=walls, doors=(), openings=ways, start=None)
+    assert start_room(plan) == "b"
+
+
+@pytest.mark.parametrize(("width", "fits"), [(0.75, False), (0.85, True)])
+def test_a_room_is_started_in_where_a_circle_of_thirty_centimetres_fits(
+    small: FloorPlan, width: float, fits: bool
+) -> None:
+    # Less half of the walls of 0.2 m on either side.
+    room = PlanRoom("r0", "hall", box(0, 0, 5, width))
+    walls = tuple(Wall(f"w{n}", pair, 0.2) for n, pair in enumerate(pairwise(room.polygon.exterior.coords)))
+    plan = replace(small, rooms=(room,), walls=walls, doors=(), openings=(), start=None)
+    if fits:
+        assert start_pose(plan).y == pytest.approx(width / 2, abs=0.03)
+    else:
+        with pytest.raises(InvalidInputError, match="without a place"):
+            start_pose(plan)
+
+
+def test_a_start_on_the_border_of_a_room_lies_in_it(small: FloorPlan) -> None:
+    assert start_room(replace(small, start=(2.0, 2.0, 0.0))) == "r0"
+    assert start_room(replace(small, start=(4.0, 4.0, 0.0))) == "r1"

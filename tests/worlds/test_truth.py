@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,9 +10,9 @@ from hypothesis import strategies as st
 from closedrooms.core.grid import GridFrame
 from closedrooms.core.pose import Pose2
 from closedrooms.worlds.closing import closable_rooms
-from closedrooms.worlds.geometry import room_interior, wall_area
+from closedrooms.worlds.geometry import door_gap, room_interior, wall_area
 from closedrooms.worlds.library import load_world
-from closedrooms.worlds.plan import FloorPlan
+from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom
 from closedrooms.worlds.start_pose import start_pose
 from closedrooms.worlds.truth import rasterise, reachable, true_rooms, truth_bounds
 
@@ -102,3 +103,84 @@ def test_closing_every_closable_room_hides_exactly_their_cells(name: str) -> Non
 def test_a_start_in_a_wall_reaches_nothing(small: FloorPlan) -> None:
     frame = frame_around(small, Pose2())
     assert not reachable(small, [], frame, Pose2(), (0.0, 0.0)).any()
+
+
+def cells_of(frame: GridFrame, mask: np.ndarray, map_T_world: Pose2) -> np.ndarray:
+    """Middles of marked cells in the building frame, shape (n, 2)."""
+    return map_T_world.inverse().transform(frame.to_points(np.argwhere(mask)))
+
+
+def test_rooms_drawn_apart_by_their_wall_are_joined_by_their_doorways_alone(small: FloorPlan) -> None:
+    inside = tuple(replace(room, polygon=room.polygon.buffer(-0.1, join_style="mitre")) for room in small.rooms)
+    out = PlanDoor("e0", ((5.0, 0.0), (6.0, 0.0)), ("r0", None), opens_into="r0")
+    plan = replace(small, rooms=inside, doors=(*small.doors, out))
+    map_T_world = Pose2(0.3, -0.2, 0.5)
+    frame = frame_around(plan, map_T_world)
+    truth = rasterise(plan, frame, map_T_world)
+    centres = cells_of(frame, np.ones(frame.shape, dtype=bool), map_T_world)
+    inner = [p for p in plan.passages if None not in p.rooms]
+    doorways = shapely.union_all([door_gap(plan, passage) for passage in inner])
+    rooms, walls = shapely.union_all([room.polygon for room in inside]), wall_area(plan)
+    # Doorways are cut a centimetre deeper than their walls.
+    sure = ~shapely.dwithin(shapely.unary_union([doorways.boundary, rooms.boundary, walls.boundary]),
+                            shapely.points(centres), 0.011)  # fmt: skip
+    free = shapely.contains_xy(rooms | doorways, *centres.T) & ~shapely.contains_xy(walls, *centres.T)
+    assert (truth.free.ravel() == free)[sure].all()
+    # The way out is neither wall nor room.
+    row, col = frame.to_cells(map_T_world.transform(np.array([5.5, 0.0])))
+    assert truth.unknown[row, col]
+
+
+def test_true_rooms_that_are_joined_by_open_passages_are_one_with_the_passage(small: FloorPlan) -> None:
+    # Only d0 and d1 lead to r1, r2 and r3, of which d2 joins two.
+    plan = replace(small, openings=())
+    (left, right) = true_rooms(plan, ["d1", "d0"], Pose2())
+    assert (left.doors, right.doors) == (("d0",), ("d1",))
+    assert left.polygon.symmetric_difference(room_interior(plan, "r1")).area < 1e-9
+    joined = room_interior(plan, "r2") | room_interior(plan, "r3") | door_gap(plan, plan.doors[2])
+    assert right.polygon.symmetric_difference(joined).area < 0.9 * 0.02 + 1e-6
+    # Closed as well, they are two rooms, and d2 is a door of both.
+    rooms = true_rooms(plan, ["d0", "d1", "d2"], Pose2())
+    assert [room.doors for room in rooms] == [("d0",), ("d1", "d2"), ("d2",)]
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.7, -2.0])
+def test_bounds_hold_walls_and_rooms_tightly(small: FloorPlan, theta: float) -> None:
+    map_T_world = Pose2(5.0, -3.0, theta)
+    porch = replace(small, rooms=(*small.rooms, PlanRoom("r9", "porch", shapely.box(12, 6, 14, 8))))
+    for plan in (small, porch, replace(small, walls=small.walls[4:])):
+        area = shapely.union_all([wall_area(plan), *(room.polygon for room in plan.rooms)])
+        expected = shapely.transform(area, map_T_world.transform).bounds
+        assert truth_bounds(plan, map_T_world) == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.parametrize("resolution", [0.02, 0.1, 0.25])
+def test_a_shut_door_takes_no_more_than_its_leaf_or_a_cell(small: FloorPlan, resolution: float) -> None:
+    frame, start = frame_around(small, Pose2(), resolution), (3.0, 1.0)
+    free = rasterise(small, frame, Pose2()).free
+    shut = reachable(small, ["d1"], frame, Pose2(), start)
+    assert np.array_equal(reachable(small, [], frame, Pose2(), start), free)
+    # r2 is still reached through r3; what is lost lies in the band of the leaf.
+    lost = cells_of(frame, free & ~shut, Pose2())
+    half = max(0.025, 0.51 * resolution)
+    assert len(lost)
+    assert (np.abs(lost[:, 1] - 2.0) <= half + 1e-9).all()
+    assert ((lost[:, 0] > 5.5 - 1e-6) & (lost[:, 0] < 6.4 + 1e-6)).all()
+    for row in np.unique(np.round(lost[:, 1], 6)):
+        assert np.sum(np.isclose(lost[:, 1], row)) == pytest.approx(0.9 / resolution, abs=1.0)
+
+
+def test_a_start_outside_the_frame_reaches_nothing(small: FloorPlan) -> None:
+    frame = frame_around(small, Pose2())
+    for start in ((50.0, 1.0), (-50.0, 1.0), (3.0, 50.0), (3.0, -50.0)):
+        assert not reachable(small, [], frame, Pose2(), start).any()
+
+
+def test_cells_that_touch_at_corners_alone_are_not_connected() -> None:
+    # Two rooms that meet at a point.
+    rooms = (PlanRoom("a", "room", shapely.box(0, 0, 2, 2)), PlanRoom("b", "room", shapely.box(2, 2, 4, 4)))
+    plan = FloorPlan("x", rooms, (), ())
+    frame = GridFrame(0.5, 0.0, 0.0, 8, 8)
+    got = reachable(plan, [], frame, Pose2(), (0.25, 0.25))
+    assert np.argwhere(got).max() == 3
+    assert got.sum() == 16

@@ -42,3 +42,40 @@ def test_the_place_of_the_robot_is_not_judged_but_the_next_ones_are() -> None:
 def test_a_path_of_one_point_has_nothing_left_to_drive() -> None:
     assert fits((40, 20), path=PATH[:1])
     assert not fits((40, 60), path=PATH[[0, 20]])
+
+
+@pytest.mark.parametrize("resolution", [0.05, 0.1])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_path_fits_where_no_obstacle_is_nearer_than_the_radius_less_half_a_cell(seed: int, resolution: float) -> None:
+    rng = np.random.default_rng(seed)
+    frame = GridFrame(resolution, -1.0, 0.5, 90, 110)
+    answers = set()
+    for _ in range(40):
+        cells = np.zeros(frame.shape, dtype=np.int8)
+        rows, cols = rng.integers(0, 90, 40), rng.integers(0, 110, 40)
+        cells[rows, cols] = 100
+        start, end = (frame.to_points(np.array([r, c])) for r, c in rng.integers(20, 70, (2, 2)))
+        path = start + np.linspace(0.0, 1.0, 9)[:, None] * (end - start) + 0.0137  # on no border of cells
+        # From the middles of cells to those of obstacles, of which half a cell belongs to the obstacle.
+        seen = frame.to_points(frame.to_cells(path))
+        gap = np.hypot(*(seen[:, None] - frame.to_points(np.column_stack((rows, cols)))).transpose(2, 0, 1)).min(axis=1)
+        gap = gap - 0.5 * resolution
+        judged = np.hypot(*(path - path[0]).T) > CONFIG.required_clearance
+        # OpenCV's distances are exact to 2 %.
+        if (np.abs(gap[judged] - (0.2 - 0.5 * resolution)) < 0.02 + 0.02 * gap[judged]).any():
+            continue
+        expected = bool((gap[judged] >= 0.2 - 0.5 * resolution).all())
+        assert fits_along(OccupancyGrid(frame, cells), path, CONFIG) == expected
+        answers.add(expected)
+    assert answers == {True, False}
+
+
+def test_a_path_at_the_edge_of_the_map_is_judged_by_what_the_map_shows() -> None:
+    cells = np.zeros((40, 40), dtype=np.int8)
+    cells[0, 20:] = 100
+    grid = OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 40, 40), cells)
+    for y, ok in ((0.325, True), (0.125, False)):
+        along = np.column_stack((np.arange(0.025, 1.9, 0.1), np.full(19, y)))
+        assert fits_along(grid, along, CONFIG) == ok
+    beyond = np.array([(0.5, 1.0), (0.5, 5.0), (-7.0, 5.0)])
+    assert fits_along(grid, beyond, CONFIG)
