@@ -7,6 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import MultiPolygon, Point, Polygon, box
 
+from closedrooms.core.remarks import Remark
+from closedrooms.worlds import geometry
 from closedrooms.worlds.geometry import (
     door_gap,
     door_leaf,
@@ -89,3 +91,23 @@ def test_bundled_walls_are_valid_and_closed_around_every_room(name: str) -> None
 def test_a_plan_without_walls_has_an_empty_area() -> None:
     plan = FloorPlan("x", (PlanRoom("r0", "room", box(0, 0, 1, 1)),), (), ())
     assert wall_area(plan).is_empty
+
+
+def test_walls_are_united_once_for_a_plan_whatever_is_remarked_of_it(
+    small: FloorPlan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = []
+
+    def count(walls: tuple[Wall, ...]) -> Polygon | MultiPolygon:
+        calls.append(walls)
+        return solid_walls(walls)
+
+    monkeypatch.setattr(geometry, "solid_walls", count)
+    plan = replace(small, name="never seen before")
+    remark = Remark(action="guessed", what="scale", why="no scale")
+    first = wall_area(plan)
+    assert wall_area(replace(plan, remarks=(remark,))) is first
+    assert len(calls) == 1
+    thicker = replace(plan, walls=tuple(replace(wall, thickness=2.0 * wall.thickness) for wall in plan.walls))
+    assert wall_area(thicker).area > first.area
+    assert len(calls) == 2
