@@ -82,12 +82,12 @@ def peel(mask: BoolArray) -> BoolArray:
         once: IntArray = found[stamp[found] == number]
         return once
 
-    edge = np.zeros_like(mask)
-    edge[1:-1, 1:-1] = mask[1:-1, 1:-1]
+    inside = np.zeros_like(mask)
+    inside[1:-1, 1:-1] = mask[1:-1, 1:-1]
     for row, col in AROUND.tolist():
-        edge[1:-1, 1:-1] &= mask[1 + row : mask.shape[0] - 1 + row, 1 + col : mask.shape[1] - 1 + col]
+        inside[1:-1, 1:-1] &= mask[1 + row : mask.shape[0] - 1 + row, 1 + col : mask.shape[1] - 1 + col]
     # Beside the rim, which the first two steps look at whole: cells around those that went in a step.
-    looked_at = rim = np.flatnonzero(mask & ~edge)
+    looked_at = rim = np.flatnonzero(mask & ~inside)
     changed: list[IntArray] = [rim]
     for rules in itertools.cycle(removable()):
         present = (cells[looked_at[:, None] + around] << np.arange(8, dtype=np.uint8)).sum(axis=1)

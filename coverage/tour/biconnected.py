@@ -16,7 +16,6 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.coverage.graph.topological_graph import TopologicalGraph
 
-
 # From so many vertices on all pairs are measured by scipy.
 MANY = 500
 
