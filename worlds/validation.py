@@ -10,7 +10,7 @@ from shapely.strtree import STRtree
 
 from closedrooms.core.door import Segment
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.worlds.geometry import WallAxes, wall_area
+from closedrooms.worlds.geometry import WallAxes, wall_area, wall_axes
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
 
 # Jambs lie on a wall's centre line within this [m].
@@ -131,7 +131,7 @@ def passage_faults(plan: FloorPlan) -> dict[int, tuple[str, str]]:
     """
     rooms = {room.id: room.polygon for room in plan.rooms}
     thickest = max((wall.thickness for wall in plan.walls), default=0.0)
-    lines = WallAxes(plan)
+    lines = wall_axes(plan)
     on_wall = _on_walls(plan, [door.segment for door in plan.doors])
     seen: set[str] = set()
     faults: dict[int, tuple[str, str]] = {}
