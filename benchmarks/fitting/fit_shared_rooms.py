@@ -1,10 +1,11 @@
 """Find the weights of ``predictor/best/shared_rooms.py`` on samples of the use ``fit``: which doors share a room.
 
-    python benchmarks/fitting/fit_shared_rooms.py FIT [FIT ...] [--every 1]
+    python benchmarks/fitting/fit_shared_rooms.py FIT [FIT ...] [--method best|learned] [--every 1]
 
 FIT are folders of samples, as ``drawn_maps.py`` writes them; a building of another use is refused. Of every three maps
 those with rooms of several doors count all, of the others every ``--every``-th. What is printed beside the weights was
-found with other buildings (eight folds over groups of buildings).
+found with other buildings (eight folds over groups of buildings). The method ``learned`` has weights of its own
+(``predictor/learned/ratings.py``): what it measures holds what its network says.
 """
 
 import argparse
@@ -23,18 +24,25 @@ from closedrooms.predictor.best.hypotheses import propose_rectangles
 from closedrooms.predictor.best.resolution import in_cells
 from closedrooms.predictor.best.scene import prepare
 from closedrooms.predictor.best.shared_rooms import SHARED_FEATURES, measure_shared
-from closedrooms.predictor.config import BestConfig
+from closedrooms.predictor.config import BestConfig, LearnedConfig
+from closedrooms.predictor.learned.model import load_model
+from closedrooms.predictor.learned.ratings import Rater
 
 FOLDS = 8
 
 
-def measure(sample: Sample) -> list[tuple[FloatArray, bool]]:
-    """Measure what every set of doors of a sample shows, and whether they share a room."""
+def measure(sample: Sample, method: str) -> list[tuple[FloatArray, bool]]:
+    """Measure what every set of doors of a sample shows a method, and whether they share a room."""
     owner = {door: number for number, room in enumerate(sample.rooms) for door in room.doors}
-    scene = prepare(sample.observed, sample.doors, BestConfig())
+    learned = method == "learned"
+    config = BestConfig(shortlist=LearnedConfig().rated) if learned else BestConfig()
+    scene = prepare(sample.observed, sample.doors, config)
     names = [pose.facing.door.id for pose in scene.poses]
+    proposals = propose_rectangles(scene)
+    if learned:
+        proposals = Rater(load_model(None), LearnedConfig().shortlist)(scene, proposals)
     found = []
-    for doors, values in measure_shared(propose_rectangles(scene), in_cells(scene.walls.usual)).items():
+    for doors, values in measure_shared(proposals, in_cells(scene.walls.usual)).items():
         rooms = [owner.get(names[i]) for i in doors]
         if None not in rooms:
             found.append((values, len(set(rooms)) == 1))
@@ -63,6 +71,7 @@ def fit(values: FloatArray, shared: BoolArray, groups: list[str], counts: IntArr
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("fit", type=Path, nargs="+")
+    parser.add_argument("--method", choices=("best", "learned"), default="best")
     parser.add_argument("--every", type=int, default=1)
     args = parser.parse_args()
     rows, groups, counts = [], [], []
@@ -72,7 +81,7 @@ def main() -> None:
             sys.exit(f"{sample.world} is not of the use fit")
         if number % args.every and all(len(room.doors) == 1 for room in sample.rooms):
             continue
-        found = measure(sample)
+        found = measure(sample, args.method)
         rows += found
         groups += [group_of(sample.world)] * len(found)
         # What was left out counts as well.

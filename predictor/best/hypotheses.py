@@ -77,10 +77,12 @@ class Proposals:
     Attributes:
         alone: One a door, in the order of the doors.
         shared: By the indices of two or more doors, ascending; as seen from each of them that proposed any.
+        sharing: Weights of what tells whether doors share a room, where the scores are not those of ``best``.
     """
 
     alone: list[Hypotheses]
     shared: dict[Doors, list[Hypotheses]]
+    sharing: FloatArray | None = None
 
 
 def propose_rectangles(scene: Scene) -> Proposals:
