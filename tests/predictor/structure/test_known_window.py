@@ -122,3 +122,21 @@ def test_what_is_near_a_door_stays():
         cleared = free_islands(grid, 4.0, [(9.0, 9.0), door], reach)
         assert (cleared.cells[40:60, 40:60] == (OCCUPIED if stays else FREE)).all()
         assert (cleared.cells[40:60, 80:100] == FREE).all()
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        (slice(0, 20), slice(50, 70)),
+        (slice(-20, None), slice(50, 70)),
+        (slice(50, 70), slice(0, 20)),
+        (slice(50, 70), slice(-20, None)),
+    ],
+)
+def test_what_lies_at_the_edge_of_the_map_stays(place):
+    cells = np.full((120, 120), FREE)
+    cells[place] = OCCUPIED
+    cells[50:70, 50:70] = OCCUPIED
+    cleared = free_islands(grid_of(cells), 4.0, [], 1.0)
+    assert (cleared.cells[place] == OCCUPIED).all()
+    assert (cleared.cells[50:70, 50:70] == FREE).all()
