@@ -191,4 +191,3 @@ def test_faces_hang_together_by_edges():
     assert connected(1, 2)
     assert not connected(0, 2)
     assert not connected(0, 1, 3)
-    assert not connected()
