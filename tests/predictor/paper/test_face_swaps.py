@@ -65,7 +65,7 @@ def test_two_rooms_take_the_best_of_all_ways_to_part_the_faces_on_their_common_w
             parts = [own + [f for f, s in zip(common, side, strict=True) if s == at] for at, own in enumerate(fixed)]
             if all(_is_one(growth, part) for part in parts):
                 found.append(_joint(growth, parts))
-        _swap(growth, a, b, CONFIG)
+        _swap(growth, *((a, b) if seed % 2 else (b, a)), CONFIG)
         after = [growth.layout(room).tolist() for room in (a, b)]
         assert sorted(after[0] + after[1]) == sorted(before[0] + before[1])
         assert _joint(growth, after) == pytest.approx(max(found), abs=1e-6)
@@ -191,4 +191,3 @@ def test_faces_hang_together_by_edges():
     assert connected(1, 2)
     assert not connected(0, 2)
     assert not connected(0, 1, 3)
-    assert not connected()

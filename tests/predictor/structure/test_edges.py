@@ -261,3 +261,11 @@ def test_what_is_turned_by_hardly_anything_is_upright():
     for degrees in (0.0, 0.3, -1.4, 2.9, -2.9):
         assert _sharpest(points, math.radians(degrees), 0.05) == 0.0
     assert abs(_sharpest(points, math.radians(3.1), 0.05)) > math.radians(1.0)
+
+
+@pytest.mark.parametrize(("degrees", "told"), [(0.2, False), (0.3, False), (0.5, True), (1.2, True), (-0.6, True)])
+def test_what_is_turned_by_more_than_a_third_of_a_degree_is_turned(degrees, told):
+    # Bars of 12 m, whose ends lie 0.07 m apart at a third of a degree.
+    frame, bars = _bars(degrees, length=240, gap=20)
+    found = math.degrees(_sharpest(frame.to_points(np.argwhere(bars)), math.radians(degrees), 0.05))
+    assert found == pytest.approx(degrees, abs=0.11) if told else found == 0.0

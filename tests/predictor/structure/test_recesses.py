@@ -66,14 +66,19 @@ def _slowly(line, config):
     return found
 
 
-@given(seed=st.integers(0, 10_000), noise=st.sampled_from([0.004, 0.02]), jamb=st.sampled_from([0.05, 0.2, 0.3]))
-@settings(max_examples=25)
-def test_recesses_are_the_clearest_widths_of_every_first_bin(seed, noise, jamb):
+@given(
+    seed=st.integers(0, 10_000),
+    noise=st.sampled_from([0.004, 0.02]),
+    jamb=st.sampled_from([0.05, 0.2, 0.3]),
+    share=st.sampled_from([0.9, 0.72]),
+)
+@settings(max_examples=30)
+def test_recesses_are_the_clearest_widths_of_every_first_bin(seed, noise, jamb, share):
     rng = np.random.default_rng(seed)
     depth = rng.normal(0.0, noise, 60)
     first, bins = int(rng.integers(5, 30)), int(rng.integers(11, 25))
     depth[first : first + bins] -= rng.uniform(0.03, 0.19)
-    line = _line(depth, rng.random(60) < 0.9)
+    line = _line(depth, rng.random(60) < share)
     config = ProposalConfig(jamb=jamb)
     expected = _slowly(line, config)
     found = _recesses(line, CELL, config)

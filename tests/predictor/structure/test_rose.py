@@ -105,6 +105,8 @@ def rays(*degrees, size=256, weights=None, halves=(1, -1)):
         along, across = fx * math.cos(angle) + fy * math.sin(angle), fy * math.cos(angle) - fx * math.sin(angle)
         near = (np.abs(across) < 1.5) & np.isin(np.sign(along), halves) & (np.hypot(fx, fy) < size / 2)
         magnitude[near] += 1.0 if weights is None else weights[number]
+    # As many as there are occupied cells: it lies in no direction.
+    magnitude[0, 0] = 3000.0
     return magnitude.astype(np.complex64)
 
 

@@ -135,6 +135,8 @@ def test_a_wall_begins_where_free_space_ends_and_takes_its_thickness_from_there(
 def test_a_wall_beyond_which_too_little_is_seen_lies_half_on_either_side():
     assert _depth(*SIDES, _seen_below(0.0, 0.31), 0.2) == pytest.approx(0.2, abs=0.026)
     assert _depth(*SIDES, _seen_below(0.0, 0.29), 0.2) == 0.1
+    # 24 of 80 places, half a cell and on from where the side begins, are three tenths.
+    assert _depth(*SIDES, _seen_below(0.0, 0.301), 0.2) == pytest.approx(0.2, abs=0.026)
     assert _depth(*SIDES, _seen_below(-5.0), 0.3) == 0.15
     # From the other side all is unknown.
     assert _depth(*SIDES[::-1], _seen_below(-0.5), 0.2) == 0.1
