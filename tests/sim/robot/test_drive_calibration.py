@@ -66,8 +66,15 @@ def test_a_robot_is_driven_ever_more_gently_until_it_drives(
 
 
 @pytest.mark.parametrize(
-    ("outcome", "why"), [((0.0, 0.0, 0.2), "tips over"), ((0.0, 0.0, 0.0), "does not get on"), ((0.5, 0.0, 0.0), "does not turn")]
-)  # fmt: skip
+    ("outcome", "why"),
+    [
+        ((0.0, 0.0, 0.2), "tips over"),
+        ((1.0, 1.0, 0.1), "tips over"),
+        ((0.0, 0.0, 0.0), "does not get on"),
+        ((0.1, 1.0, 0.0), "does not get on"),
+        ((0.5, 0.0, 0.0), "does not turn"),
+    ],
+)
 def test_a_robot_that_never_does_is_refused_with_what_was_wrong(
     monkeypatch: pytest.MonkeyPatch, outcome: tuple[float, float, float], why: str
 ) -> None:

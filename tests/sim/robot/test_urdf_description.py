@@ -53,9 +53,14 @@ def test_a_chain_may_have_as_many_links_as_pybullet_reads(tmp_path: Path, count:
 
 
 @pytest.mark.parametrize(
-    "joint", ["<joint name='j'/>", "<joint name='j'><parent link='a'/></joint>", "<joint name='j'><child link='b'/></joint>",
-              "<joint name='j'><parent/><child link='b'/></joint>"],
-)  # fmt: skip
+    "joint",
+    [
+        "<joint name='j'/>",
+        "<joint name='j'><parent link='a'/></joint>",
+        "<joint name='j'><child link='b'/></joint>",
+        "<joint name='j'><parent/><child link='b'/></joint>",
+    ],
+)
 def test_a_joint_without_an_end_makes_no_tree(tmp_path: Path, joint: str) -> None:
     with pytest.raises(InvalidInputError, match="make no tree"):
         check_description(described(tmp_path / "robot.urdf", ["a", "b"], [], joint))
