@@ -99,7 +99,7 @@ def test_glass_is_met_by_those_who_ask_for_glass_alone(still: PhysicsWorld) -> N
     assert still.has_glass
     assert ahead(still) == (pytest.approx(5.0), wall)
     fractions, bodies, normals = still.cast_at_glass(
-        np.zeros(3) + (0, 0, 0.5), np.array([[10.0, 0.0, 0.5], [0.0, 10.0, 0.5]])
+        np.array([0.0, 0.0, 0.5]), np.array([[10.0, 0.0, 0.5], [0.0, 10.0, 0.5]])
     )
     assert bodies.tolist() == [pane, -1]
     assert 10.0 * fractions[0] == pytest.approx(3.0)
