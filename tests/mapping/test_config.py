@@ -56,10 +56,10 @@ def test_defaults_fit_together() -> None:
     assert loops.enabled
     assert recovery.enabled
     # Shares and likelihoods.
-    for value in (matcher.new_surface, matcher.lost_score, matcher.min_score, matcher.doubt, matcher.poor, loops.min_score,
-                  loops.max_rival, loops.min_weight, recovery.check_below, recovery.max_conflict, recovery.min_score,
-                  recovery.max_rival):  # fmt: skip
-        assert 0.0 < value < 1.0
+    shares = (matcher.new_surface, matcher.lost_score, matcher.min_score, matcher.doubt, matcher.poor)
+    shares += (loops.min_score, loops.max_rival, loops.min_weight)
+    shares += (recovery.check_below, recovery.max_conflict, recovery.min_score, recovery.max_rival)
+    assert all(0.0 < value < 1.0 for value in shares)
     assert matcher.lost_score < matcher.min_score < loops.min_score < matcher.doubt
     assert matcher.poor < recovery.check_below < matcher.doubt
     assert 0.0 < recovery.advantage < 0.2

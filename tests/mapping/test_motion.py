@@ -216,7 +216,8 @@ def test_a_step_that_no_robot_makes_is_a_jump_and_not_followed(seconds: float) -
     longest = config.possible_speed * max(seconds, 0.2), config.possible_turn_rate * max(seconds, 0.2)
     for step, jump in (
         (Pose2(0.99 * longest[0]), False), (Pose2(1.01 * longest[0]), True),
-        (Pose2(0, 0, min(0.99 * longest[1], 3.0)), False), (Pose2(0, 0, -min(1.01 * longest[1], 3.1)), 1.01 * longest[1] < 3.1),
+        (Pose2(0, 0, min(0.99 * longest[1], 3.0)), False),
+        (Pose2(0, 0, -min(1.01 * longest[1], 3.1)), 1.01 * longest[1] < 3.1),
     ):  # fmt: skip
         driving = Driving()
         driving.drive(AHEAD, seconds=seconds)

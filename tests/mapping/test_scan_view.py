@@ -115,12 +115,14 @@ def test_corners_and_blobs_face_no_way() -> None:
     corner = np.concatenate(
         (np.column_stack((side[::-1], np.zeros(12))), [(0.0, 0.0)], np.column_stack((np.zeros(12), side)))
     )
-    normals, incidence = faces(corner + (2.0, 1.0), np.array([12]), np.array([(2.0, 1.0)]))
+    normals, incidence = faces(corner + np.array([2.0, 1.0]), np.array([12]), np.array([(2.0, 1.0)]))
     assert np.isnan(normals).all()
     assert np.isnan(incidence).all()
     # Well beside it the wall is a wall again.
     normals, _ = faces(
-        np.concatenate((corner[:12] + (3.0, 1.0), np.full((1, 2), np.nan))), np.array([5]), np.array([(3.0, 1.0)])
+        np.concatenate((corner[:12] + np.array([3.0, 1.0]), np.full((1, 2), np.nan))),
+        np.array([5]),
+        np.array([(3.0, 1.0)]),
     )
     assert np.abs(normals[0]) == pytest.approx([0.0, 1.0], abs=1e-9)
 

@@ -46,9 +46,9 @@ def test_errors_are_the_root_mean_square_of_positions_and_headings() -> None:
     larger = square * (1.1, 1.1, 1.0) + (0.0, 0.0, 0.1) * np.array([[1], [-1], [1], [-1]])
     assert ate(larger, square) == pytest.approx((np.hypot(0.1, 0.1), 0.1))
     # Headings are compared over the turn.
-    turned = square + (0.0, 0.0, 2 * np.pi)
+    turned = square + np.array([0.0, 0.0, 2 * np.pi])
     assert ate(turned, square) == pytest.approx((0.0, 0.0), abs=1e-9)
-    half = square + (0.0, 0.0, np.pi)
+    half = square + np.array([0.0, 0.0, np.pi])
     assert ate(half, square)[1] == pytest.approx(np.pi)
 
 
