@@ -1,8 +1,12 @@
+import math
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.beams import clean, hit_points, steadied, thin_points
+from closedrooms.mapping.beams import clean, hit_points, matched_range, spaced, steadied, thin_points
 
 FULL = 2 * np.pi / 360
 
@@ -149,3 +153,146 @@ def test_what_was_crossed_ends_where_the_surface_is() -> None:
     ends = beams.outline[0::2]
     gaps = np.hypot(*(beams.points[:, None] - ends[None]).transpose(2, 0, 1)).min(axis=1)
     assert gaps.max() < 1e-9
+
+
+def thinned(points: np.ndarray, spacing: float, most: int) -> np.ndarray:
+    """One point after the other: kept where the way along the scan passes a multiple of the spacing."""
+    if len(points) < 3:
+        return points
+    steps = np.minimum(np.hypot(*np.diff(points, axis=0).T), spacing)
+    along = np.concatenate(([0.0], np.cumsum(steps)))
+    width = max(spacing, along[-1] / most)
+    kept = [0]
+    for number in range(1, len(points)):
+        if math.floor(along[number] / width) > math.floor(along[number - 1] / width):
+            kept.append(number)
+    return points[kept]
+
+
+@given(st.integers(0, 60), st.floats(0.05, 1.0), st.integers(2, 80), st.integers(0, 1000))
+def test_points_are_thinned_along_the_scan(count: int, spacing: float, most: int, seed: int) -> None:
+    points = np.cumsum(np.random.default_rng(seed).normal(scale=0.2, size=(count, 2)), axis=0)
+    kept = thin_points(points, spacing, most)
+    assert kept.tolist() == thinned(points, spacing, most).tolist()
+    assert len(kept) <= most + 1
+    # Of several scans at once each is thinned as alone, whatever stands behind it.
+    padded = np.concatenate((points, np.full((7, 2), 99.0)))[None].repeat(2, axis=0)
+    marks = spaced(padded, np.array([[count], [count // 2]]), spacing, most)
+    assert padded[0][marks[0]].tolist() == kept.tolist()
+    assert padded[1][marks[1]].tolist() == thinned(points[: count // 2], spacing, most).tolist()
+
+
+@pytest.mark.parametrize(
+    ("longest", "most", "matched"), [(30.0, 25.0, 25.0), (25.0, 25.0, 24.0), (12.0, 25.0, 11.0), (5.0, 25.0, 4.5), (3.5, 2.0, 2.0)]
+)
+def test_points_at_the_end_of_sight_are_not_matched(longest: float, most: float, matched: float) -> None:
+    found = matched_range(LaserScan(np.ones(3), 0.0, 0.1, longest), max_range=most, margin=1.0)
+    assert found == pytest.approx(matched)
+
+
+def lone(index: int, value: float, base: float = 3.0) -> np.ndarray:
+    ranges = np.full(360, base)
+    ranges[index] = value
+    return ranges
+
+
+@pytest.mark.parametrize(("off", "kept"), [(0.29, True), (0.31, False), (-0.29, True), (-0.31, False)])
+def test_a_beam_is_believed_that_is_less_than_thirty_centimetres_off(off: float, kept: bool) -> None:
+    for index in (0, 1, 100, 358, 359):
+        beams = clean(scan(lone(index, 3.0 + off)), max_range=25.0)
+        assert len(beams.points) == (360 if kept else 359)
+        # What was too long counts as free as far as its surroundings, what was too short as far as it went.
+        reach = radii(beams.outline)[2 * index]
+        assert reach == pytest.approx(3.0 + off if kept or off < 0 else 3.0)
+
+
+def test_a_beam_before_one_neighbour_alone_is_a_surface() -> None:
+    ranges = np.full(360, 3.0)
+    ranges[100:] = 5.0
+    assert len(clean(scan(ranges), max_range=25.0).points) == 360
+    # Before both it is none; beside a drop-out the other neighbour decides.
+    for value, beside, kept in ((2.0, np.nan, False), (2.8, np.nan, True)):
+        ranges = lone(50, value)
+        ranges[51] = beside
+        assert len(clean(scan(ranges), max_range=25.0).points) == (359 if kept else 358)
+
+
+def test_in_a_half_turn_the_ends_have_neighbours_on_one_side_only() -> None:
+    def half(ranges: np.ndarray) -> LaserScan:
+        return LaserScan(ranges, -np.pi / 2, np.pi / 180, 20.0, 0.1)
+
+    for index in (0, 180):
+        ranges = np.full(181, 3.0)
+        ranges[index] = 9.0
+        assert len(clean(half(ranges), max_range=25.0).points) == 180
+        ranges[index] = 1.0
+        beams = clean(half(ranges), max_range=25.0)
+        assert len(beams.points) == 180
+        # The outline begins at the sensor, and is not closed over the back.
+        assert len(beams.outline) == 2 * 181
+        assert radii(beams.outline)[0] == 0.0
+
+
+def test_the_outline_follows_the_beams_and_what_lies_between_them() -> None:
+    ranges = 3.0 + 0.2 * np.sin(np.arange(360) / 9.0)
+    outline = clean(scan(ranges), max_range=25.0).outline
+    angles = -np.pi + FULL * np.arange(360)
+    assert outline[0::2] == pytest.approx(ranges[:, None] * np.column_stack((np.cos(angles), np.sin(angles))))
+    least, half = np.minimum(ranges, np.roll(ranges, -1)), angles + FULL / 2
+    assert outline[1::2] == pytest.approx(least[:, None] * np.column_stack((np.cos(half), np.sin(half))))
+
+
+def test_what_is_beyond_the_map_or_too_near_is_no_surface() -> None:
+    for value, points, reach in ((24.0, 359, 3.0), (20.0, 359, 3.0), (0.05, 359, 3.0), (3.0, 360, 3.0)):
+        beams = clean(scan(lone(9, value)), max_range=25.0)
+        assert len(beams.points) == points
+        assert radii(beams.outline)[18] == pytest.approx(reach)
+    far = clean(scan(np.full(360, 18.0)), max_range=15.0)
+    assert len(far.points) == 0
+    assert radii(far.outline) == pytest.approx(np.full(720, 15.0))
+    exact = clean(scan(np.full(360, 15.0)), max_range=15.0)
+    assert len(exact.points) == 0
+
+
+def test_a_drop_out_beside_another_takes_the_shorter_neighbour_or_nothing() -> None:
+    ranges = np.full(360, 3.0)
+    ranges[11:] = 4.0
+    ranges[10] = np.nan
+    assert radii(clean(scan(ranges), max_range=25.0).outline)[20] == pytest.approx(3.0)
+    # A drop-out before a far outlier is filled with what is usual around it.
+    ranges = lone(10, np.nan)
+    ranges[[9, 11]] = 9.0
+    assert radii(clean(scan(ranges), max_range=25.0).outline)[20] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("wrap", [True, False])
+def test_steadying_stops_at_corners_and_needs_enough_beams(wrap: bool) -> None:
+    few = 3.0 + np.random.default_rng(0).normal(scale=0.05, size=8)
+    assert steadied(few, FULL, wrap=wrap) is few
+    nine = 3.0 + np.random.default_rng(0).normal(scale=0.05, size=9)
+    assert not np.array_equal(steadied(nine, FULL, wrap=wrap), nine)
+    # Of several scans each is steadied by its own noise.
+    rng = np.random.default_rng(1)
+    quiet, loud = 3.0 + rng.normal(scale=0.005, size=(2, 360)) * np.array([[1.0], [12.0]])
+    both = steadied(np.stack((quiet, loud)), FULL, wrap=wrap)
+    assert np.array_equal(both[0], quiet)
+    assert both[1] == pytest.approx(steadied(loud, FULL, wrap=wrap))
+    # Nothing is known of a scan without a measurement.
+    nothing = np.full(360, np.nan)
+    assert np.isnan(steadied(np.stack((nothing, loud)), FULL, wrap=wrap)[0]).all()
+
+
+def test_a_steadied_beam_is_the_mean_of_its_pairs_on_a_wall() -> None:
+    # One noisy beam in the middle of a smooth wall, others noisy enough that the scan is steadied at all.
+    rng = np.random.default_rng(5)
+    angles = FULL * (np.arange(41) - 20)
+    inverse = np.cos(angles) / 2.0
+    ranges = 1.0 / inverse + rng.normal(scale=0.04, size=41)
+    found = steadied(ranges, FULL, wrap=False)
+    pairs = [(1 / ranges[20 - k] + 1 / ranges[20 + k]) / (2 * math.cos(k * FULL)) for k in range(1, 5)]
+    means = [np.average([1 / ranges[20], *pairs[:count]], weights=[1.0, *([2.0] * count)]) for count in range(5)]
+    # Pairs count from the inside on, as far as they agree with those before.
+    assert min(abs(1 / found[20] - mean) for mean in means) < 1e-9
+    offs = [abs(pair - mean) * ranges[20] ** 2 for pair, mean in zip(pairs, means, strict=False)]
+    assert max(offs) < 0.2
+    assert abs(1 / found[20] - means[4]) < 1e-9

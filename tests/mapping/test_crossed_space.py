@@ -5,6 +5,7 @@ import pytest
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
+from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.beams import clean
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.crossed_space import CrossedSpace
@@ -84,3 +85,65 @@ def test_people_who_walk_along_do_not_hold_the_robot_back_in_a_corridor() -> Non
 def _octagon(x: float, y: float) -> list[tuple[float, float, float, float]]:
     corners = [(x + 0.2 * np.cos(a), y + 0.2 * np.sin(a)) for a in np.arange(9) * np.pi / 4.0]
     return [(*a, *b) for a, b in pairwise(corners)]
+
+
+@pytest.mark.parametrize(("distance", "moves"), [(2.7, True), (3.3, False)])
+def test_things_are_looked_at_up_to_three_metres_away(distance: float, moves: bool) -> None:
+    hall = SegmentWorld(box(-6.0, -6.0, 6.0, 6.0))
+    walls = clean(hall.scan(HERE, beams=360), max_range=25.0).points
+    points = np.vstack((walls, ring(distance * np.cos(0.4), distance * np.sin(0.4))))
+    assert seen_through(hall, 5).stands_still(HERE, points)[len(walls) :].all() != moves
+
+
+@pytest.mark.parametrize(("count", "judged"), [(7, False), (9, True), (80, True), (100, False)])
+def test_what_moves_is_a_part_of_the_scan_worth_leaving_out_and_not_too_large_a_one(count: int, judged: bool) -> None:
+    # Of 400 points 2 % to 20 %; the others lie on walls.
+    angles = np.linspace(0.001, 2 * np.pi, 400 - count, endpoint=False)
+    corners = np.column_stack((np.cos(angles), np.sin(angles)))
+    walls = corners * np.minimum(4.0 / np.abs(corners[:, :1]), 3.0 / np.abs(corners[:, 1:]))
+    points = np.vstack((HERE.inverse().transform(walls), ring(1.0, 0.5, count)))
+    still = seen_through(ROOM, 5).stands_still(HERE, points)
+    assert still[: 400 - count].all()
+    assert still[400 - count :].all() != judged
+
+
+@pytest.mark.parametrize(("met", "moves"), [(0, True), (1, True), (2, False)])
+def test_a_place_is_free_where_twice_as_many_scans_went_through_as_met_something(met: int, moves: bool) -> None:
+    # Somebody stood there for some of six scans: 3 more than twice as many have to go through.
+    free = CrossedSpace(MapperConfig())
+    pose = Pose2()
+    person = _octagon(1.5, 0.5)
+    for number in range(6):
+        world = SegmentWorld([*box(-4.0, -3.0, 4.0, 3.0), *(person if number < met else [])])
+        free.add([(clean(world.scan(pose, beams=720), max_range=25.0), pose)])
+    inside = np.array([1.5, 0.5]) + 0.19 * np.column_stack((np.cos(np.arange(8)), np.sin(np.arange(8))))
+    walls = clean(ROOM.scan(pose, beams=360), max_range=25.0).points
+    still = free.stands_still(pose, np.vstack((walls, inside)))
+    assert still[len(walls) :].all() != moves
+
+
+def test_what_lies_beyond_what_was_seen_stands_still() -> None:
+    free = seen_through(ROOM, 5)
+    far = Pose2(300.0, -200.0, 0.0)
+    assert free.stands_still(far, np.vstack((WALLS, ring(1.5, 0.5)))).all()
+    assert CrossedSpace(MapperConfig()).stands_still(HERE, WALLS).all()
+    # Scans that crossed nothing add nothing.
+    empty = clean(LaserScan(np.zeros(0), 0.0, 0.1, 20.0), max_range=25.0)
+    nothing = CrossedSpace(MapperConfig())
+    nothing.add([(empty, HERE)])
+    nothing.add([])
+    assert nothing.stands_still(HERE, WALLS).all()
+
+
+def test_free_space_is_where_it_was_seen_however_far_the_map_has_grown() -> None:
+    free = seen_through(ROOM, 5)
+    points = np.vstack((WALLS, ring(1.5, 0.5)))
+    before = free.stands_still(HERE, points)
+    away = Pose2(60.0, -80.0, 0.4)
+    free.add([(clean(ROOM.scan(HERE, beams=720), max_range=25.0), away) for _ in range(5)])
+    assert np.array_equal(free.stands_still(HERE, points), before)
+    there = away @ HERE.inverse()
+    moved = np.array(
+        [there.transform(np.array([[1.5, 0.5]]))[0] + 0.2 * np.array([np.cos(a), np.sin(a)]) for a in range(8)]
+    )
+    assert not free.stands_still(away, np.vstack((WALLS, away.inverse().transform(moved))))[len(WALLS) :].any()

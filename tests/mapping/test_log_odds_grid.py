@@ -1,8 +1,12 @@
+import cv2
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shapely.geometry import Polygon
 
+from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams, clean
 from closedrooms.mapping.config import MapperConfig
@@ -160,3 +164,134 @@ def test_the_place_that_somebody_left_is_seen_as_free_though_the_rest_was_drawn_
         grid = evidence.grid()
     rows, cols = grid.frame.to_cells(PERSON).T
     assert grid.free[rows, cols].all()
+
+
+def rough(seed: int) -> Beams:
+    """A scan of a rough room around the robot, some of whose beams end nowhere."""
+    rng = np.random.default_rng(seed)
+    angles = np.linspace(-np.pi, np.pi, 90, endpoint=False)
+    radii = 1.5 + 0.5 * np.sin(3 * angles + rng.uniform(0, 6)) + rng.normal(scale=0.03, size=90)
+    outline = radii[:, None] * np.column_stack((np.cos(angles), np.sin(angles)))
+    return Beams(outline[rng.random(90) < 0.8], outline, np.zeros(2))
+
+
+def counts(scans: list[tuple[Beams, Pose2]], grid: OccupancyGrid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Hits of each cell, scans that surely crossed it, and those that may have: it lies at their rim."""
+    cells = np.argwhere(np.ones(grid.frame.shape, dtype=bool))
+    middles = shapely.points(grid.frame.to_points(cells))
+    hits, sure, maybe = (np.zeros(grid.frame.shape, dtype=int) for _ in range(3))
+    for beams, pose in scans:
+        hit = np.zeros(grid.frame.shape, dtype=bool)
+        rows, cols = grid.frame.to_cells(pose.transform(beams.points)).T
+        hit[rows, cols] = True
+        area = shapely.make_valid(Polygon(pose.transform(beams.outline)))
+        inside = shapely.contains(area, middles).reshape(hit.shape)
+        rim = (shapely.distance(middles, area.boundary) < 1.5 * grid.frame.resolution).reshape(hit.shape)
+        hits += hit
+        sure += inside & ~rim & ~hit
+        maybe += rim & ~hit
+    return hits, sure, maybe
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_cells_hold_what_hits_and_crossings_make_of_them(seed: int) -> None:
+    config = MapperConfig()
+    scans = [(rough(10 * seed + n), Pose2(0.3 * n, 0.1 * n, 0.7 * n)) for n in range(5)]
+    evidence = EvidenceGrid(config)
+    evidence.add_all(scans)
+    grid = evidence.grid()
+    hits, sure, maybe = counts(scans, grid)
+    certain = maybe == 0
+    assert np.array_equal((grid.cells == -1)[certain], ((hits == 0) & (sure == 0))[certain])
+    # Where nothing was ever crossed around a hit, nothing has gone.
+    never = cv2.dilate((sure + maybe > 0).astype(np.uint8), np.ones((5, 5))) == 0
+    seen = certain & (hits + sure > 0) & ((hits == 0) | never)
+    assert seen.sum() > 1000
+    odds = np.clip(
+        hits * config.log_odds_hit - sure * config.log_odds_miss, -config.log_odds_limit, config.log_odds_limit
+    )
+    percent = 100.0 / (1.0 + np.exp(-odds))
+    assert np.abs(grid.cells - percent)[seen].max() <= 1.8
+    # One after the other is as all at once.
+    alone = EvidenceGrid(config)
+    for beams, pose in scans:
+        alone.add(beams, pose)
+    frame = grid.frame.covering(*alone.grid().frame.bounds)
+    assert np.array_equal(alone.grid().on(frame).cells, grid.on(frame).cells)
+
+
+def test_a_scan_is_counted_by_its_imprint_as_by_itself_also_after_the_map_has_grown() -> None:
+    poses = [Pose2(0.2, 0.1, 0.3), Pose2(15.0, -12.0, 1.0), Pose2(-14.0, 9.0, 2.0)]
+    whole, printed = EvidenceGrid(MapperConfig()), EvidenceGrid(MapperConfig())
+    for number, pose in enumerate(poses):
+        whole.add(rough(number), pose)
+    prints = [printed.imprint(rough(number), pose) for number, pose in enumerate(poses)]
+    assert all(print_ is not None for print_ in prints)
+    assert not printed.grid().known.any()
+    for print_ in prints:
+        printed.count_imprint(print_)
+    assert np.array_equal(printed.grid().cells, whole.grid().cells)
+    printed.count_imprint(prints[1], sign=-1)
+    whole.add(rough(1), poses[1], sign=-1)
+    assert np.array_equal(printed.grid().cells, whole.grid().cells)
+    nothing = Beams(np.empty((0, 2)), np.empty((0, 2)), np.zeros(2))
+    assert printed.imprint(nothing, Pose2()) is None
+    printed.add(nothing, Pose2(90.0, 0.0))
+    assert printed.grid().frame == whole.grid().frame
+
+
+def test_what_is_drawn_at_once_is_what_is_drawn_bit_by_bit() -> None:
+    rng = np.random.default_rng(2)
+    once, often = EvidenceGrid(MapperConfig()), EvidenceGrid(MapperConfig())
+    for number in range(12):
+        pose = Pose2(*rng.uniform(-3, 3, 2), rng.uniform(-3, 3))
+        once.add(rough(number), pose)
+        often.add(rough(number), pose)
+        often.grid()
+    assert np.array_equal(once.grid().cells, often.grid().cells)
+
+
+@pytest.mark.parametrize("resolution", [0.05, 0.1])
+def test_a_surface_was_seen_through_where_more_scans_went_through_than_met_it(resolution: float) -> None:
+    outline = np.array([[0.0, -1.0], [4.0, -1.0], [4.0, 1.0], [0.0, 1.0]])
+    pane = np.column_stack((np.full(8, 2.02), np.arange(8) * resolution - 0.33))
+    for met, through, is_crossed in (
+        (0, 3, True),
+        (0, 2, False),
+        (4, 4, True),
+        (4, 3, False),
+        (8, 5, True),
+        (8, 4, False),
+    ):
+        evidence = EvidenceGrid(MapperConfig(resolution=resolution))
+        for number in range(met + through):
+            evidence.add(Beams(pane if number < met else pane[:0], outline, np.zeros(2)), Pose2())
+        evidence.grid()
+        row, col, crossed = evidence.crossed(0.2)
+        cells = np.floor(pane / resolution).astype(int) - (col, row)
+        assert crossed[cells[:, 1], cells[:, 0]].all() == is_crossed
+        assert crossed[cells[:, 1], cells[:, 0]].any() == is_crossed
+        # A whole window may be asked for, and another share.
+        corners = np.array([1.5, -0.5]), np.array([2.5, 0.5])
+        row, col, part = evidence.crossed(0.2, within=corners)
+        assert (row, col) == tuple(np.floor(np.array([-0.5, 1.5]) / resolution + 1e-9).astype(int))
+        assert part.shape == (round(1.0 / resolution) + 1, round(1.0 / resolution) + 1)
+        strict = evidence.crossed(0.2, share=1.0, within=corners)[2]
+        assert strict.sum() <= part.sum()
+
+
+def test_beside_a_surface_that_stands_nothing_counts_as_crossed() -> None:
+    outline = np.array([[0.0, -1.0], [4.0, -1.0], [4.0, 1.0], [0.0, 1.0]])
+    post = np.array([[2.02, 0.02]])
+    evidence = EvidenceGrid(MapperConfig())
+    for _ in range(6):
+        evidence.add(Beams(post, outline, np.zeros(2)), Pose2())
+    evidence.grid()
+    for apart, cells in ((0.05, 1), (0.2, 4), (0.22, 5)):
+        row, col, crossed = evidence.crossed(apart)
+        middle_row, middle_col = 0 - row, 40 - col
+        near = np.zeros_like(crossed)
+        near[middle_row - cells : middle_row + cells + 1, middle_col - cells : middle_col + cells + 1] = True
+        assert not crossed[near].any()
+        ring = cv2.dilate(near.astype(np.uint8), np.ones((3, 3))) > 0
+        assert crossed[ring & ~near].all()

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from closedrooms.core.arrays import FloatArray
+from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.scan_odometry import ScanOdometry
+from closedrooms.mapping.scan_odometry import STALE, SURROUNDINGS, ScanOdometry
 from closedrooms.mapping.scan_preparation import prepare_scans
 from closedrooms.mapping.trajectory import ate
 
@@ -53,3 +54,73 @@ def test_a_scan_that_fits_nowhere_is_counted_and_the_robot_goes_on(office: Any) 
     poses = [odometry.follow(points, 0.1 * i).as_tuple() for i, points in enumerate(made)]
     assert odometry.lost == 1
     assert ate(np.array(poses), drive.truth)[0] < 0.05
+
+
+def followed_at(odometry: ScanOdometry, world: Any, pose: Pose2, stamp: float, **sensor: float) -> Pose2:
+    return odometry.follow(points_of(world, pose, **sensor), stamp)
+
+
+def points_of(world: Any, pose: Pose2, **sensor: float) -> FloatArray:
+    return next(iter(prepare_scans([world.scan(pose, **sensor)], MapperConfig()))).points
+
+
+def test_a_robot_without_a_scan_that_fits_goes_on_as_in_its_last_step(office: Any) -> None:
+    odometry = ScanOdometry(MapperConfig())
+    nothing = np.empty((0, 2))
+    assert followed_at(odometry, office, Pose2(1.0, 1.0), 5.0) == Pose2()
+    moved = followed_at(odometry, office, Pose2(1.2, 1.0, 0.1), 5.5)
+    assert moved.as_tuple() == pytest.approx((0.2, 0.0, 0.1), abs=0.02)
+    # As far again in as much time, and half as far in half of it; longer than a step it does not go on.
+    for seconds, share in ((0.5, 1.0), (0.25, 0.5), (2.0, 1.0)):
+        before = odometry._pose
+        step = odometry._step
+        odometry_step = Pose2(*(share * value for value in step.as_tuple()))
+        predicted = odometry._predicted(seconds * odometry._duration / 0.5)
+        assert predicted.as_tuple() == pytest.approx((before @ odometry_step).as_tuple())
+    alone = odometry.follow(nothing, 6.0)
+    assert odometry.lost == 1
+    assert alone.as_tuple() == pytest.approx((moved @ moved).as_tuple(), abs=0.01)
+    # Of few points as well.
+    odometry.follow(np.ones((19, 2)), 6.5)
+    assert odometry.lost == 2
+
+
+@pytest.mark.parametrize(("step", "remembered"), [(0.2, False), (0.3, True)])
+def test_scans_join_the_surroundings_every_quarter_of_a_metre(office: Any, step: float, remembered: bool) -> None:
+    odometry = ScanOdometry(MapperConfig())
+    followed_at(odometry, office, Pose2(1.0, 1.0), 0.0)
+    followed_at(odometry, office, Pose2(1.0 + step, 1.0), 0.5)
+    assert len(odometry._last) == (2 if remembered else 1)
+
+
+@pytest.mark.parametrize(("turn", "remembered"), [(0.31, False), (0.39, True), (-0.39, True)])
+def test_scans_join_the_surroundings_when_the_robot_has_turned(office: Any, turn: float, remembered: bool) -> None:
+    odometry = ScanOdometry(MapperConfig())
+    followed_at(odometry, office, Pose2(1.0, 1.0), 0.0)
+    followed_at(odometry, office, Pose2(1.0, 1.0, turn), 0.5)
+    assert len(odometry._last) == (2 if remembered else 1)
+
+
+def test_the_surroundings_are_the_last_scans_and_drawn_anew_when_too_many_older_ones_are_left() -> None:
+    odometry = ScanOdometry(MapperConfig())
+    # Each scan sees a post of its own, 0.3 m on.
+    for number in range(SURROUNDINGS + STALE + 3):
+        odometry._pose = Pose2(0.5 * number)
+        odometry._remember(np.array([[0.0, 3.0]]))
+        stamped = [odometry._field.values[rows[0], cols[0]] > 0.9 for rows, cols in (
+            odometry._field.lattice.cells(np.array([[0.5 * n + 0.01, 3.01]])) for n in range(number + 1)
+        )]  # fmt: skip
+        older = max(number + 1 - SURROUNDINGS, 0)
+        expected = [True] * (number + 1) if older <= STALE else [False] * (STALE + 1) + [True] * (number - STALE)
+        assert stamped == expected
+    assert len(odometry._last) == SURROUNDINGS
+    assert 20 <= SURROUNDINGS <= 100
+    assert 0 < STALE < SURROUNDINGS
+
+
+def test_a_step_of_a_metre_is_found_where_scans_are_seconds_apart(office: Any) -> None:
+    odometry = ScanOdometry(MapperConfig())
+    followed_at(odometry, office, Pose2(2.0, 1.0), 0.0)
+    pose = followed_at(odometry, office, Pose2(3.0, 1.0, 0.2), 2.0)
+    assert pose.as_tuple() == pytest.approx((1.0, 0.0, 0.2), abs=0.06)
+    assert odometry.lost == 0

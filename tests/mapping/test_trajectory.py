@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
 from closedrooms.core.random import stream
-from closedrooms.mapping.trajectory import ate
+from closedrooms.mapping.trajectory import align, ate
 
 WAY = np.column_stack((np.linspace(0, 10, 60), np.sin(np.linspace(0, 6, 60)), np.linspace(-2, 2, 60)))
 
@@ -38,3 +38,28 @@ def test_rejects_trajectories_of_other_shapes() -> None:
         ate(WAY[:-1], WAY)
     with pytest.raises(InvalidInputError):
         ate(np.empty((0, 3)), np.empty((0, 3)))
+
+
+def test_errors_are_the_root_mean_square_of_positions_and_headings() -> None:
+    # A square, of which the estimate is 0.2 m too large on every side, and whose headings are off by +-0.1.
+    square = np.array([(1.0, 1.0, 0.0), (-1.0, 1.0, 1.0), (-1.0, -1.0, 2.0), (1.0, -1.0, 3.1)])
+    larger = square * (1.1, 1.1, 1.0) + (0.0, 0.0, 0.1) * np.array([[1], [-1], [1], [-1]])
+    assert ate(larger, square) == pytest.approx((np.hypot(0.1, 0.1), 0.1))
+    # Headings are compared over the turn.
+    turned = square + np.array([0.0, 0.0, 2 * np.pi])
+    assert ate(turned, square) == pytest.approx((0.0, 0.0), abs=1e-9)
+    half = square + np.array([0.0, 0.0, np.pi])
+    assert ate(half, square)[1] == pytest.approx(np.pi)
+
+
+def test_alignment_moves_the_middle_and_turns_about_it() -> None:
+    moved = np.array([(Pose2(3.0, -2.0, 1.2) @ Pose2(*p)).as_tuple() for p in WAY])
+    aligned = align(moved, WAY)
+    assert aligned[:, :2] == pytest.approx(WAY[:, :2], abs=1e-9)
+    assert np.cos(aligned[:, 2] - WAY[:, 2]) == pytest.approx(np.ones(len(WAY)))
+    # Two places say which way the line between them leads, not how long it is.
+    line = align(np.array([(0.0, 0.0, 0.0), (2.0, 0.0, 0.0)]), np.array([(5.0, 1.0, 0.0), (5.0, 5.0, 0.0)]))
+    assert line == pytest.approx(np.array([(5.0, 2.0, np.pi / 2), (5.0, 4.0, np.pi / 2)]))
+    still = align(np.tile([1.0, 2.0, 3.0], (4, 1)), np.column_stack((np.ones((4, 2)), [-3.0, -3.1, -2.9, -3.0])))
+    assert still[:, :2] == pytest.approx(np.ones((4, 2)))
+    assert np.cos(still[:, 2] + 3.0) == pytest.approx(np.ones(4), abs=1e-4)

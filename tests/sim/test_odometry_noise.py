@@ -134,3 +134,37 @@ def test_errors_of_the_travelled_distance_lie_along_the_motion_whatever_its_dire
     across = poses[:, 0] * 0.8 + poses[:, 1] * 0.6
     assert np.abs(across).max() < 1e-12
     assert_sd(poses[:, 0] * 0.6 - poses[:, 1] * 0.8, 0.1)
+
+
+@pytest.mark.parametrize("pieces", [1, 4, 50])
+def test_a_biased_way_is_an_arc_however_it_is_cut(pieces: int) -> None:
+    # Driven straight on for 2 m, counted as an arc of 0.05 rad a metre, 10 % too long.
+    noise = NoiseConfig(distance=0.0, turn_per_metre=0.0, turn=0.0, bias_distance=0.1, bias_turn_per_metre=0.05)
+    odometry = Odometry(noise, 0)
+    for _ in range(pieces):
+        odometry.add(Motion(2.0 / pieces, 0.0, 0.0))
+    radius = 2.2 / 0.1
+    assert odometry.pose.x == pytest.approx(radius * math.sin(0.1), abs=2e-3)
+    assert odometry.pose.y == pytest.approx(radius * (1.0 - math.cos(0.1)), abs=2e-4)
+    assert odometry.pose.theta == pytest.approx(0.1)
+
+
+def test_turns_that_drive_nowhere_err_along_the_heading() -> None:
+    noise = NoiseConfig(distance=0.0, turn_per_metre=0.0, turn=0.0, distance_per_turn=0.2)
+    poses = errors(noise, Motion(0.0, 0.0, 2 * math.pi), 1)
+    assert_sd(poses[:, 0], 0.2)
+    assert np.abs(poses[:, 1]).max() < 1e-12
+    # However the turn is cut it adds up to as much, in all directions that the robot has looked to.
+    cut = errors(noise, Motion(0.0, 0.0, 2 * math.pi), 12)
+    assert_sd(np.concatenate((cut[:, 0], cut[:, 1])), 0.2 / math.sqrt(2))
+
+
+def test_draws_go_on_beyond_those_that_were_fetched_at_once() -> None:
+    odometry = Odometry(NoiseConfig(distance=0.1, turn_per_metre=0.0, turn=0.0), 4)
+    steps = []
+    for _ in range(3000):
+        before = odometry.pose.x
+        odometry.add(Motion(0.01, 0.0, 0.0))
+        steps.append(odometry.pose.x - before)
+    assert len(set(steps)) == 3000
+    assert np.std(steps) == pytest.approx(0.1 * math.sqrt(0.01), rel=4 / math.sqrt(6000))

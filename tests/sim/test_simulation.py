@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+import shapely
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.observation import Observation
@@ -15,6 +16,7 @@ from closedrooms.core.robot import RobotConfig
 from closedrooms.sim.config import (
     LIDAR_PRESETS,
     NOISE_LEVELS,
+    FaultConfig,
     LidarConfig,
     NoiseConfig,
     SimConfig,
@@ -223,3 +225,109 @@ def test_pybullet_keeps_quiet_when_it_is_imported() -> None:
 def test_the_levels_can_be_named() -> None:
     assert all(noise_level(name) is level for name, level in NOISE_LEVELS.items())
     assert SimConfig().noise == NOISE_LEVELS["medium"]
+
+
+@pytest.mark.simulation
+@pytest.mark.parametrize(("gap", "fits"), [(0.2002, True), (0.2, False), (0.19, False)])
+def test_a_robot_starts_where_it_does_not_touch(plan: FloorPlan, gap: float, fits: bool) -> None:
+    # The wall's face is at x = 0.08; the closed leaf of a door, and furniture, count as well.
+    closed = Simulation(dataclasses.replace(plan, start=(1.95, 4.0 - 0.025 - gap, 0.0)), ["hinged"], SimConfig(), 0)
+    for sim in (
+        Simulation(dataclasses.replace(plan, start=(0.08 + gap, 2.0, 0.0)), [], SimConfig(), 0),
+        Simulation(dataclasses.replace(plan, start=(1.0, 7.5 - gap, 0.0)), [], SimConfig(), 0),
+        closed,
+    ):
+        if fits:
+            with sim:
+                pass
+        else:
+            with pytest.raises(InvalidInputError, match=r"is 0\.(200|190) m from a wall"), sim:
+                pass
+
+
+@pytest.mark.simulation
+def test_sweeps_follow_each_other_at_the_rate_of_the_lidar(plan: FloorPlan) -> None:
+    for rate in (5.0, 40.0):
+        with Simulation(plan, [], SimConfig(lidar=LidarConfig(rate=rate)), 0) as sim:
+            assert sim.period == pytest.approx(1.0 / rate)
+
+
+@pytest.mark.simulation
+def test_a_long_step_is_as_many_short_ones_whatever_moves_meanwhile(plan: FloorPlan) -> None:
+    def after(pieces: int, **settings: object) -> tuple[float, ...]:
+        config = SimConfig(noise=noise_level("none"), **settings)  # type: ignore[arg-type]
+        with Simulation(plan, ["hinged"], config, 0) as sim:
+            sim.open_door("hinged")
+            for _ in range(pieces):
+                sim.step(0.4, 0.3, 1.0 / pieces)
+            people = [mover.outline.centroid.coords[0] for mover in sim.movers]
+            return (*sim.world_T_robot.as_tuple(), sim.time, sim.door_states()["hinged"], *sum(people, ()))
+
+    for settings in ({}, {"people": 2}):
+        whole, cut = after(1, **settings), after(10, **settings)
+        assert whole == pytest.approx(cut, abs=1e-3)
+        assert whole[3] == pytest.approx(1.0)
+        assert whole[4] == pytest.approx(0.5)
+
+
+@pytest.mark.simulation
+def test_the_path_that_a_rolling_sweep_needs_is_kept_and_no_more(plan: FloorPlan) -> None:
+    config = SimConfig(lidar=LidarConfig(sweep="rolling", rate=10.0), noise=noise_level("none"))
+    with Simulation(dataclasses.replace(plan, start=(2.0, 2.0, 0.0)), [], config, 0) as sim:
+        for number in range(1, 30):
+            sim.step(0.5, 0.0, 0.07)
+            stamps = sim._path[:, 0]
+            assert (np.diff(stamps) > 0).all()
+            assert stamps[-1] == pytest.approx(0.07 * number)
+            # From before the first beam on, and of what lies before that one row.
+            begin = sim.time - 0.1
+            assert stamps[0] <= max(begin, 0.0) + 1e-9
+            assert np.sum(stamps <= begin) <= 1
+            poses = sim._beam_poses()
+            assert poses is not None
+            assert poses.shape == (720, 3)
+            expected = np.interp(sim.time - 0.1 * (1.0 - (np.arange(720) + 1) / 720), stamps, sim._path[:, 1])
+            assert poses[:, 0] == pytest.approx(expected, abs=1e-6)
+    with Simulation(plan, [], SimConfig(), 0) as sim:
+        sim.step(0.5, 0.0, 0.5)
+        assert sim._beam_poses() is None
+        assert len(sim._path) == 1
+
+
+@pytest.mark.simulation
+def test_nobody_begins_at_the_robots_start(plan: FloorPlan) -> None:
+    with Simulation(plan, [], SimConfig(people=15, clutter=15), 1) as sim:
+        assert len(sim.movers) == 30
+        away = [mover.outline.centroid.distance(shapely.Point(2.0, 2.0)) for mover in sim.movers]
+    # Two radii and a metre.
+    assert min(away) >= 1.4
+    assert min(away) < 3.0
+    with Simulation(plan, [], SimConfig(), 1) as sim:
+        assert sim.movers == []
+
+
+@pytest.mark.simulation
+def test_unequal_wheels_count_by_the_distance_between_them(plan: FloorPlan) -> None:
+    for radius in (0.15, 0.25):
+        config = SimConfig(
+            robot=RobotConfig(radius=radius), faults=FaultConfig(unequal_wheels=0.02), noise=noise_level("none")
+        )
+        with Simulation(dataclasses.replace(plan, start=(2.0, 2.0, 0.0)), [], config, 0) as sim:
+            sim.step(1.0, 0.0, 3.0)
+            driven = sim.map_T_robot.x
+            # On a track of 1.5 radii.
+            assert sim.observe().odometry.theta == pytest.approx(0.02 / (1.5 * radius) * driven)
+
+
+@pytest.mark.simulation
+def test_a_lost_scan_shows_no_phantoms_either(plan: FloorPlan) -> None:
+    for lost, shown in ((0.0, True), (1.0, False)):
+        config = SimConfig(faults=FaultConfig(lost_scans=lost, phantom_doors=50))
+        with Simulation(plan, ["hinged"], config, 0) as sim:
+            seen = [sim.observe() for _ in range(5)]
+        assert any(observation.sightings for observation in seen) == shown
+        assert all(np.isnan(observation.scan.ranges).all() != shown for observation in seen)
+        if shown:
+            names = {sighting.id for observation in seen for sighting in observation.sightings}
+            assert "hinged" in names
+            assert any(name.startswith("phantom") for name in names)

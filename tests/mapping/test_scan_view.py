@@ -1,0 +1,137 @@
+"""What one scan tells about places, and which way surfaces face, in rooms whose answers are known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from closedrooms.mapping.beams import Beams
+from closedrooms.mapping.scan_view import FACE_GAP, FACE_REACH, View, faces
+
+
+def circle(
+    radius: float, *, origin: tuple[float, float] = (0.0, 0.0), beams: int = 720, view: float = math.tau
+) -> Beams:
+    angles = -view / 2 + view / beams * np.arange(beams)
+    outline = np.array(origin) + radius * np.column_stack((np.cos(angles), np.sin(angles)))
+    return Beams(outline, outline, np.array(origin))
+
+
+@pytest.mark.parametrize("origin", [(0.0, 0.0), (2.0, -1.0)])
+def test_beams_went_beyond_a_place_by_what_is_left_to_their_end(origin: tuple[float, float]) -> None:
+    view = View(circle(4.0, origin=origin))
+    rng = np.random.default_rng(0)
+    away, bearing = rng.uniform(0.3, 6.0, 60), rng.uniform(-math.pi, math.pi, 60)
+    points = np.array(origin) + away[:, None] * np.column_stack((np.cos(bearing), np.sin(bearing)))
+    assert view.beyond(points) == pytest.approx(4.0 - away, abs=1e-6)
+
+
+def test_of_all_beams_within_reach_of_a_place_the_shortest_counts() -> None:
+    # A post of one beam at 1 m; all others go on to 4 m.
+    beams = circle(4.0)
+    outline = beams.outline.copy()
+    outline[500] *= 0.25
+    view = View(Beams(outline, outline, np.zeros(2)))
+    step = math.tau / 720
+    bearing = -math.pi + 500 * step
+    for distance, lateral in ((1.0, 0.12), (3.0, 0.12), (3.0, 0.3)):
+        # Half as many directions to either side as a power of two holds.
+        half = 2 ** math.ceil(math.log2(max(lateral / distance / step, 1.0)))
+        for off in (0, half // 2, half, half + 1, 3 * half):
+            for side in (-1, 1):
+                angle = bearing + side * off * step
+                place = distance * np.array([[math.cos(angle), math.sin(angle)]])
+                found = float(view.beyond(place, lateral)[0])
+                assert found == pytest.approx((1.0 if off <= half else 4.0) - distance, abs=1e-6)
+
+
+def test_what_is_out_of_view_or_too_near_is_not_told() -> None:
+    half = View(circle(4.0, view=math.pi))
+    places = np.array([(2.0, 0.0), (0.0, 1.9), (-2.0, 0.1), (-0.1, 2.0)])
+    assert np.isnan(half.beyond(places)).tolist() == [False, False, True, True]
+    # Nearer than 64 directions to either side allow for.
+    near = 0.12 / (64 * math.tau / 720)
+    whole = View(circle(4.0))
+    assert np.isnan(whole.beyond(np.array([(near - 0.01, 0.0), (near + 0.01, 0.0), (0.0, 0.0)]))).tolist() == [
+        True,
+        False,
+        True,
+    ]
+    assert np.isnan(whole.beyond(np.array([(0.02, 0.0)]), 0.01)).tolist() == [False]
+    # A scan of one beam or none says nothing.
+    for outline in (np.empty((0, 2)), np.array([(1.0, 0.0)]), np.zeros((3, 2))):
+        assert np.isnan(View(Beams(outline, outline, np.zeros(2))).beyond(places)).all()
+
+
+def test_sectors_without_a_measurement_are_out_of_view() -> None:
+    beams = circle(4.0)
+    outline = beams.outline.copy()
+    outline[100:200] = 0.0
+    view = View(Beams(outline, outline, np.zeros(2)))
+    angles = -math.pi + math.tau / 720 * np.array([98, 99, 104, 150, 195, 200, 300])
+    found = view.beyond(2.0 * np.column_stack((np.cos(angles), np.sin(angles))), 0.01)
+    assert np.isnan(found).tolist() == [False, False, True, True, True, False, False]
+
+
+def wall(angle: float, distance: float = 2.0, spread: float = 0.7, count: int = 61, shift: float = 0.0) -> np.ndarray:
+    """Where beams around a wall's normal end on it; the normal is turned by ``angle``."""
+    bearings = np.linspace(-spread, spread, count) + shift
+    return (distance / np.cos(bearings))[:, None] * np.column_stack(
+        (np.cos(bearings + angle), np.sin(bearings + angle))
+    )
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, math.pi / 2, 2.0, -3.0])
+def test_a_straight_wall_faces_along_its_normal_and_is_met_at_the_angle_of_the_beam(angle: float) -> None:
+    points = wall(angle)
+    at = np.array([12, 20, 30, 40, 48])
+    normals, incidence = faces(points, at, points[at])
+    normal = np.array([math.cos(angle), math.sin(angle)])
+    assert np.abs(normals @ normal) == pytest.approx(np.ones(5))
+    assert np.hypot(*normals.T) == pytest.approx(np.ones(5))
+    assert incidence == pytest.approx(np.abs(np.linspace(-0.7, 0.7, 61)[at]), abs=1e-6)
+
+
+def test_what_is_seen_of_a_face_ends_at_a_step_and_at_the_end_of_the_scan() -> None:
+    # Two walls side by side, one set back: each faces along x, though beams on both sides are near.
+    front, back = wall(0.0)[:30], wall(0.0, 2.0 + FACE_GAP + 0.05)[30:]
+    points = np.concatenate((front, back))
+    normals, _ = faces(points, np.array([27, 29, 30, 33]), points[[27, 29, 30, 33]])
+    assert np.abs(normals[:, 0]) == pytest.approx(np.ones(4))
+    # Too few points are no face: two beside the place, to either side.
+    for count, known in ((4, False), (5, True)):
+        few = np.concatenate((np.full((1, 2), np.nan), wall(0.0, count=count, spread=0.05), np.full((1, 2), np.nan)))
+        normals, incidence = faces(few, np.array([count // 2 + 1]), few[[count // 2 + 1]])
+        assert np.isnan(normals).any() != known
+        assert np.isnan(incidence).any() != known
+    # At the ends of a scan as much as there is.
+    points = wall(0.3)
+    normals, _ = faces(points, np.array([0, 60]), points[[0, 60]])
+    assert np.abs(normals @ (math.cos(0.3), math.sin(0.3))) == pytest.approx(np.ones(2))
+
+
+def test_corners_and_blobs_face_no_way() -> None:
+    side = np.arange(1, 13) * 0.05
+    corner = np.concatenate(
+        (np.column_stack((side[::-1], np.zeros(12))), [(0.0, 0.0)], np.column_stack((np.zeros(12), side)))
+    )
+    normals, incidence = faces(corner + np.array([2.0, 1.0]), np.array([12]), np.array([(2.0, 1.0)]))
+    assert np.isnan(normals).all()
+    assert np.isnan(incidence).all()
+    # Well beside it the wall is a wall again.
+    normals, _ = faces(
+        np.concatenate((corner[:12] + np.array([3.0, 1.0]), np.full((1, 2), np.nan))),
+        np.array([5]),
+        np.array([(3.0, 1.0)]),
+    )
+    assert np.abs(normals[0]) == pytest.approx([0.0, 1.0], abs=1e-9)
+
+
+def test_as_many_points_are_looked_at_as_a_face_reaches() -> None:
+    # A kink far away does not turn a face, one within its reach does.
+    flat = np.column_stack((np.full(80, 3.0), np.arange(80) * 0.05))
+    for kink, turned in ((40 + FACE_REACH + 1, False), (40 + FACE_REACH // 2, True)):
+        bent = flat.copy()
+        bent[kink:, 0] += 0.5 * (np.arange(80 - kink) + 1) * 0.05
+        normals, _ = faces(bent, np.array([40]), np.array([(3.0, 0.0)]))
+        assert (abs(float(normals[0, 1])) > 0.02) == turned
