@@ -6,7 +6,9 @@ import shapely
 from shapely.geometry import box
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.worlds.geometry import wall_area
+from closedrooms.worlds import start_pose as start_pose_module
+from closedrooms.worlds.closing import closable_rooms, hidden_rooms
+from closedrooms.worlds.geometry import room_interior, wall_area
 from closedrooms.worlds.library import bundled_names, load_world
 from closedrooms.worlds.plan import FloorPlan, Furniture, Opening, PlanRoom, Wall
 from closedrooms.worlds.start_pose import start_pose, start_room
@@ -104,3 +106,18 @@ def test_a_plan_in_which_the_robot_fits_nowhere_is_one_clear_line(small: FloorPl
     plan = replace(small, start=None, furniture=(Furniture("f0", box(0, 0, 12, 5)),))
     with pytest.raises(InvalidInputError, match="a plan without a place for the robot; expected a room"):
         start_pose(plan)
+
+
+def test_the_room_to_start_in_is_sought_once_for_a_plan(small: FloorPlan, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def count(plan: FloorPlan, room: str) -> shapely.Polygon:
+        asked.append(room)
+        return room_interior(plan, room)
+
+    monkeypatch.setattr(start_pose_module, "room_interior", count)
+    plan = replace(small, name="never started in before", start=None)
+    doors = [door for doors in closable_rooms(plan).values() for door in doors]
+    hidden_rooms(plan, doors)
+    start_pose(plan)
+    assert asked == ["r0"]
