@@ -183,7 +183,8 @@ def test_points_are_thinned_along_the_scan(count: int, spacing: float, most: int
 
 
 @pytest.mark.parametrize(
-    ("longest", "most", "matched"), [(30.0, 25.0, 25.0), (25.0, 25.0, 24.0), (12.0, 25.0, 11.0), (5.0, 25.0, 4.5), (3.5, 2.0, 2.0)]
+    ("longest", "most", "matched"),
+    [(30.0, 25.0, 25.0), (25.0, 25.0, 24.0), (12.0, 25.0, 11.0), (5.0, 25.0, 4.5), (3.5, 2.0, 2.0)],
 )
 def test_points_at_the_end_of_sight_are_not_matched(longest: float, most: float, matched: float) -> None:
     found = matched_range(LaserScan(np.ones(3), 0.0, 0.1, longest), max_range=most, margin=1.0)

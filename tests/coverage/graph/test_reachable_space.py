@@ -318,6 +318,32 @@ def test_the_path_around_a_table_is_the_shortest():
     assert find_shortest_path(start, goal, cells) is None
 
 
+@given(seed=st.integers(0, 10_000), walls=st.integers(0, 8), most=st.sampled_from([0, 30, 300]))
+@settings(max_examples=40, deadline=None)
+def test_a_path_that_is_far_to_seek_is_found_wherever_there_is_one(seed, walls, most):
+    rng = np.random.default_rng(seed)
+    cells = np.zeros((60, 90), dtype=bool)
+    cells[1:-1, 1:-1] = True
+    for wall in range(walls):
+        cells[:, 10 * wall + 5 : 10 * wall + 10] = False
+        gap = int(rng.integers(1, 55))
+        cells[gap : gap + 4, 10 * wall + 5 : 10 * wall + 10] = rng.random() < 0.9
+    cells[[0, -1]] = False
+    inside = np.argwhere(cells)
+    start, goal = inside[rng.integers(0, len(inside), 2)]
+    near, far = find_shortest_path(start, goal, cells), find_shortest_path(start, goal, cells, most=most)
+    assert (near is None) == (far is None)
+    if near is None:
+        return
+    assert far[0].tolist() == start.tolist()
+    assert far[-1].tolist() == goal.tolist()
+    steps = np.diff(far, axis=0)
+    assert np.abs(steps).max(initial=0) <= 1
+    assert cells[far[:, 0], far[:, 1]].all()
+    length = [np.hypot(*np.diff(path, axis=0).T).sum() for path in (near, far)]
+    assert length[0] - 1e-6 <= length[1] <= 1.1 * length[0] + 1e-6
+
+
 def test_a_path_keeps_near_the_chain_that_it_follows_where_it_can():
     """Two ways around a block: the one beside the chain is longer, and taken."""
     cells = np.zeros((80, 120), dtype=bool)
