@@ -1,6 +1,7 @@
 """A graph while it is drawn, on free space with known cells; and where robots and rays get to, cell by cell."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +10,9 @@ from hypothesis import strategies as st
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame
-from closedrooms.coverage.config import GraphConfig
+from closedrooms.coverage.config import CoverageConfig, GraphConfig
 from closedrooms.coverage.graph.free_space import FreeSpace
+from closedrooms.coverage.graph.graph_builder import _chosen_parts, _nearest_part, _start_vertex
 from closedrooms.coverage.graph.graph_draft import GraphDraft, _beside_leaf, _visible_edge, add_doors
 from closedrooms.coverage.graph.reachable_space import (
     _coarsened,
@@ -277,3 +279,84 @@ def test_hits_are_counted_in_eight_directions(seed):
                 r, c = r + step[0], c + step[1]
             count += 0 <= r < 9 and 0 <= c < 12 and coarse[r, c] == 1
         assert hits[row, col] == count
+
+
+@given(seed=st.integers(0, 1000), x=st.floats(0.0, 6.0), y=st.floats(1.0, 6.0))
+@settings(max_examples=30)
+def test_the_part_of_a_start_is_that_of_the_nearest_cell(seed, x, y):
+    rng = np.random.default_rng(seed)
+    parts = np.zeros((ROWS, COLS), dtype=np.int64)
+    for part in range(1, 5):
+        row, col = rng.integers(0, (ROWS - 6, COLS - 6))
+        parts[row : row + 6, col : col + 6] = part
+    space = replace(_space(parts > 0), parts=parts)
+    cells = np.argwhere(parts > 0)
+    apart = np.hypot(*(FRAME.to_points(cells) - (x, y)).T)
+    at = FRAME.to_cells(np.array([x, y]))
+    part, distance = _nearest_part(space, (x, y))
+    if FRAME.contains(at) and parts[tuple(at)]:
+        assert (part, distance) == (parts[tuple(at)], 0.0)
+    else:
+        assert distance == pytest.approx(apart.min())
+        assert part in {int(parts[tuple(cell)]) for cell in cells[apart <= apart.min() + 1e-9]}
+
+
+def _in_parts():
+    """Three parts: of 100 cells, of 50, and of 25."""
+    parts = np.zeros((ROWS, COLS), dtype=np.int64)
+    parts[5:15, 5:15], parts[30:35, 5:15], parts[30:35, 40:45] = 1, 2, 3
+    areas = np.array([0.0, 100.0, 50.0, 25.0]) * CELL_AREA
+    return replace(_space(parts > 0), parts=parts, areas=areas, clearance=(parts > 0) * 0.5)
+
+
+CELL_AREA = 0.05**2
+
+
+def test_the_part_with_the_start_is_kept_and_what_is_left_out_is_said():
+    space, config = _in_parts(), CoverageConfig()
+    # In the middle of the third, and 0.5 m right of it.
+    inside = (1.0 + 42.5 * 0.05, 2.0 + 32.5 * 0.05)
+    for start, chosen, which in (
+        (None, 1, "the largest"), (inside, 3, "the one with the start"),
+        ((inside[0] + 0.6, inside[1]), 3, "the one with the start"),
+    ):  # fmt: skip
+        kept, notes = _chosen_parts(space, config, start)
+        assert np.array_equal(kept.mask, space.parts == chosen)
+        assert np.array_equal(kept.parts, (space.parts == chosen).astype(int))
+        assert np.array_equal(kept.clearance, (space.parts == chosen) * 0.5)
+        assert kept.areas.tolist() == [0.0, space.areas[chosen]]
+        left = 175.0 * CELL_AREA - space.areas[chosen]
+        covered = f"{which} is covered ({space.areas[chosen]:.1f} m2), {left:.1f} m2 left out"
+        assert notes == [f"3 unconnected parts: {covered}"]
+    kept, notes = _chosen_parts(space, CoverageConfig(parts="all"), None)
+    assert kept is space
+    assert notes == ["3 unconnected parts, all covered, each by a tour of its own"]
+
+
+def test_what_is_left_out_of_a_map_is_said_before_its_parts():
+    space = replace(_in_parts(), outside=12.34, unreachable=5.67)
+    _, notes = _chosen_parts(space, CoverageConfig(parts="all"), (9.0, 3.0))
+    assert notes[0] == "12.3 m2 that rays saw through windows, with hardly a wall around, are left out"
+    assert notes[1] == "5.7 m2 that a robot of 0.20 m radius cannot get into are left out"
+    away = math.hypot(9.0 - (1.0 + 44.5 * 0.05), 3.0 + 0.0 - (2.0 + 30.5 * 0.05))
+    assert notes[2] == f"the start (9.00, 3.00) lies {away:.1f} m from free space"
+    _, notes = _chosen_parts(replace(_in_parts(), outside=0.3), CoverageConfig(parts="all"), None)
+    assert notes[0].startswith("0.3 m2 that rays saw through windows")
+    alone = replace(space, parts=(space.parts == 1) * 1, areas=space.areas[:2], outside=0.0, unreachable=0.0)
+    assert _chosen_parts(alone, CoverageConfig(), None) == (alone, [])
+
+
+def test_a_tour_begins_at_the_nearest_vertex_in_sight_of_the_start():
+    draft = _draft(_space(WIDE & ~_mask((20, 5, 1, 70))), (30.5, 20.5), (10.5, 20.5), (10.5, 60.5), edges=[(0, 1)])
+
+    def place(row, col):
+        return 1.0 + col * 0.05, 2.0 + row * 0.05
+
+    assert _start_vertex(draft, None) == 0
+    assert _start_vertex(draft, place(12.5, 22.5)) == 1
+    assert _start_vertex(draft, place(12.5, 50.5)) == 2
+    # Vertex 0 is nearer, behind the wall.
+    assert _start_vertex(draft, place(18.5, 20.5)) == 1
+    assert _start_vertex(draft, place(24.5, 20.5)) == 0
+    # In sight of none: the nearest.
+    assert _start_vertex(draft, place(20.5, 59.5)) == 2
