@@ -28,8 +28,8 @@ def message(
 ) -> Any:
     last = start + step * (beams - 1) if end is None else end
     return SimpleNamespace(
-        __msgtype__=SCAN, angle_min=start, angle_increment=step, angle_max=last, range_min=limits[0], range_max=limits[1],
-        time_increment=each, ranges=1.0 + np.arange(beams) / 100,
+        __msgtype__=SCAN, angle_min=start, angle_increment=step, angle_max=last, range_min=limits[0],
+        range_max=limits[1], time_increment=each, ranges=1.0 + np.arange(beams) / 100,
     )  # fmt: skip
 
 
@@ -47,7 +47,8 @@ def exact(start: float, step: float, ranges: np.ndarray, mount: Mount) -> set[tu
 
 
 @given(
-    st.floats(-3.0, 3.0), st.integers(2, 40), st.floats(0.01, 0.15), st.booleans(), st.booleans(), st.floats(-3, 3), st.booleans(),
+    st.floats(-3.0, 3.0), st.integers(2, 40), st.floats(0.01, 0.15), st.booleans(), st.booleans(), st.floats(-3, 3),
+    st.booleans(),
 )  # fmt: skip
 def test_beams_end_where_they_did_whichever_way_the_lidar_turns_and_hangs(
     start: float, beams: int, step: float, backwards: bool, upside_down: bool, yaw: float, turn: bool
@@ -131,8 +132,8 @@ def test_angles_come_from_what_makes_sense(
 
 @pytest.mark.parametrize(
     ("start", "step", "end", "beams"),
-    [(math.nan, 0.1, 1.0, 5), (0.0, math.inf, 1.0, 5), (0.0, 0.1, 1.0, 0), (0.0, 0.0, 0.0, 5), (0.0, 9.0, 99.0, 5), (0.0, 0.0, 1.0, 1),
-     (0.0, 2.0, 800.0, 401)],
+    [(math.nan, 0.1, 1.0, 5), (0.0, math.inf, 1.0, 5), (0.0, 0.1, 1.0, 0), (0.0, 0.0, 0.0, 5), (0.0, 9.0, 99.0, 5),
+     (0.0, 0.0, 1.0, 1), (0.0, 2.0, 800.0, 401)],
 )  # fmt: skip
 def test_angles_that_nothing_tells_are_refused(start: float, step: float, end: float, beams: int) -> None:
     with pytest.raises(InvalidInputError, match=r"without angles|more than a turn"):

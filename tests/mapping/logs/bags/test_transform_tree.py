@@ -74,8 +74,10 @@ def test_names_lose_their_slashes_blanks_and_prefixes() -> None:
 def test_a_lidar_sits_where_the_chain_of_transforms_puts_it_both_ways() -> None:
     a, b, c = Pose2(0.2, 0.1, 0.5), Pose2(-0.1, 0.3, -1.2), Pose2(0.05, 0.0, 2.0)
     found = tree(
-        ("base_link", "plate", matrix(*a.as_tuple())), ("mast", "plate", matrix(*b.inverse().as_tuple())), ("mast", "laser", matrix(*c.as_tuple())),
-    ).mount("base_link", "/laser")  # fmt: skip
+        ("base_link", "plate", matrix(*a.as_tuple())),
+        ("mast", "plate", matrix(*b.inverse().as_tuple())),
+        ("mast", "laser", matrix(*c.as_tuple())),
+    ).mount("base_link", "/laser")
     assert found.pose.as_tuple() == pytest.approx((a @ b @ c).as_tuple())
     assert not found.upside_down
     over = tree(("base_link", "laser", matrix(0.2, 0.1, 0.7, roll=math.pi))).mount("base_link", "laser")
@@ -178,9 +180,11 @@ def test_a_frame_is_found_by_its_name_or_what_it_ends_in(
 
 def test_the_base_has_a_usual_name_or_is_the_root() -> None:
     for names, base in (
-        (("base_footprint", "base_link"), "base_footprint"), (("base", "base_link"), "base_link"), (("x/base_link", "plate"), "x/base_link"),
+        (("base_footprint", "base_link"), "base_footprint"),
+        (("base", "base_link"), "base_link"),
+        (("x/base_link", "plate"), "x/base_link"),
         (("plate", "mast"), "root"),
-    ):  # fmt: skip
+    ):
         made = tree(*(("root", name, matrix()) for name in (*names, "laser")))
         assert made.base_of("laser") == base
     assert tree(("root", "laser", matrix())).base_of("lidar") is None
@@ -224,10 +228,15 @@ def test_a_robot_that_stands_has_an_odometry_all_the_same() -> None:
 @pytest.mark.parametrize(
     ("parent", "child", "frame"),
     [
-        ("map", "base_link", None), ("world", "base_link", None), ("robot/mocap0", "base_link", None), ("start", "base_link", "start"),
-        ("base_link", "wheel", None), ("base_link", "odometry_x", "odometry_x"), ("robot/odom_combined", "base_link", "robot/odom_combined"),
+        ("map", "base_link", None),
+        ("world", "base_link", None),
+        ("robot/mocap0", "base_link", None),
+        ("start", "base_link", "start"),
+        ("base_link", "wheel", None),
+        ("base_link", "odometry_x", "odometry_x"),
+        ("robot/odom_combined", "base_link", "robot/odom_combined"),
     ],
-)  # fmt: skip
+)
 def test_corrected_frames_and_wheels_are_no_odometry(parent: str, child: str, frame: str | None) -> None:
     made = moving(parent, child, *WAY, made=carried())
     found = made.odometry("laser")
