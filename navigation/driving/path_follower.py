@@ -66,7 +66,7 @@ class FollowedPath:
 
     def at(self, distance: float) -> tuple[float, float]:
         """Interpolate the point at a distance along the path [m]."""
-        i = min(max(bisect.bisect_right(self.along, distance) - 1, 0), len(self.along) - 1)
+        i = max(bisect.bisect_right(self.along, distance) - 1, 0)
         if i == len(self.along) - 1 or self.along[i + 1] <= self.along[i]:
             return (self.xs[i], self.ys[i])
         t = (distance - self.along[i]) / (self.along[i + 1] - self.along[i])
@@ -185,5 +185,5 @@ def limit_speed(command: Steering, points_robot: FloatArray, config: RobotNaviga
     if command.v <= 0.0:
         return command
     distance = free_distance(points_robot, command.v, command.w, config)
-    v = min(command.v, math.sqrt(2.0 * config.deceleration * distance) if distance > 0.0 else 0.0)
+    v = min(command.v, math.sqrt(2.0 * config.deceleration * distance))
     return Steering(v, command.w * v / command.v, command.progress, command.remaining)

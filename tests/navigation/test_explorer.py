@@ -325,6 +325,16 @@ def test_of_a_frontier_that_lies_farther_off_its_nearest_cell_is_given_up() -> N
     assert sorted(points.tolist()) == pytest.approx(np.array([(5.95, 1.95), (5.95, 2.05)]))
 
 
+@pytest.mark.parametrize(("left", "given_up"), [(3, True), (2, False)])
+def test_what_is_left_is_given_up_where_it_is_as_long_as_a_frontier(left: int, given_up: bool) -> None:
+    few = np.concatenate((FRONTIER[:left], FRONTIER[left:] - np.array([3.0, 0.0])))
+    search = Search(goal(5.5, frontier=few))
+    explorer, _ = arrived(search)
+    explorer.command(at(10.0 + SETTLE))
+    assert (len(search.given_up) == 1) == given_up
+    assert explorer.goal is None
+
+
 def test_what_has_become_known_is_not_given_up() -> None:
     search = Search(goal(5.0))
     explorer, driver = arrived(search)

@@ -206,3 +206,26 @@ def test_an_arc_to_the_left_meets_what_stands_at_the_left() -> None:
     # Chord from the place on the arc to the post: 2 r sin(rest / 2r).
     exact = 0.4 * (math.pi / 2 - 2.0 * math.asin(touching / 0.8))
     assert exact - 0.051 <= left <= exact
+
+
+def test_a_path_that_comes_back_beside_itself_is_not_cut_short() -> None:
+    # Nearer to the way back, which is 3.9 m on: only two look-aheads of the path are looked at.
+    there_and_back = FollowedPath.of(np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 0.3), (0.0, 0.3)]))
+    command = steer(there_and_back, Pose2(0.3, 0.25, 0.0), 0.0, CONFIG)
+    assert command.progress == pytest.approx(0.3)
+    # Round its turn it is.
+    assert steer(there_and_back, Pose2(1.9, 0.28, 0.0), 1.9, CONFIG).progress == pytest.approx(2.4)
+
+
+@pytest.mark.parametrize("error", [0.2, 0.7, 1.1])
+def test_at_its_target_the_robot_turns_no_sharper_than_half_a_look_ahead_asks(error: float) -> None:
+    # The end of the path is 0.1 m away.
+    pose = Pose2(4.0 - 0.1 * math.cos(error), -0.1 * math.sin(error), 0.0)
+    command = steer(FollowedPath.of(np.array([(0.0, 0.0), (4.0, 0.0)])), pose, 3.9, CONFIG)
+    assert command.w / command.v == pytest.approx(2.0 * math.sin(error) / (0.5 * CONFIG.lookahead))
+
+
+def test_an_obstacle_at_once_ahead_leaves_no_speed() -> None:
+    wall = np.array([(0.24, y) for y in np.arange(-1.0, 1.0, 0.02)])
+    slow = limit_speed(Steering(0.5, 0.2, 1.0, 2.0), wall, CONFIG)
+    assert (slow.v, slow.w) == (0.0, 0.0)

@@ -123,7 +123,9 @@ def test_a_start_at_the_goal_needs_no_way() -> None:
     assert path.length < 0.3
 
 
-@pytest.mark.parametrize("place", [(2.03, 1.98), (0.1, 4.05), (9.0, 9.0)])
+@pytest.mark.parametrize(
+    "place", [(2.03, 1.98), (0.1, 4.05), (9.0, 9.0), (-0.6, 2.0), (2.0, -0.6), (8.7, 2.0), (2.0, 4.7), (-3.0, -3.0)]
+)
 def test_the_cells_near_a_place_are_those_within_the_radius_of_a_goal(place: tuple[float, float]) -> None:
     costmap = costmap_of(two_rooms(1.0))
     every = np.argwhere(np.ones(costmap.frame.shape, dtype=np.bool_))
