@@ -14,7 +14,7 @@ from closedrooms.predictor.best.pair_features import score_pairs
 
 # Doors share a room from this probability on: two rooms made one lose less IoU than one room made two (``choose``). A
 # shared room that is less likely than the other is not thought of.
-SHARED, LEAST = 0.4, 0.05
+SHARED, LEAST = 0.35, 0.05
 COLUMNS = {feature.name: column for column, feature in enumerate(FEATURES)}
 
 
