@@ -189,12 +189,24 @@ class Panes:
         against, may_be = places[no_pane], places[~no_pane & (through >= SEEN_THROUGH)]
         segments = []
         for line in draw_lines(places[glass], normals[glass], self._resolution):
-            if last:
-                against = self._open_along(line, keyframes)
-            segment, bounded = extend_line(line, grid, may_be, against, self._driven, WIDE if last else FRAME)
-            if bounded or math.dist(*line) >= LENGTH:
+            long = math.dist(*line) >= LENGTH
+            if last and long:
+                open_ = self._open_along(line, keyframes)
+                segments.append(extend_line(line, grid, may_be, open_, self._driven, WIDE)[0])
+                continue
+            segment, bounded = extend_line(line, grid, may_be, against, self._driven, FRAME)
+            if long or (bounded and self._alternates(line)):
                 segments.append(segment)
         return np.array(segments).reshape(-1, 2, 2)
+
+    def _alternates(self, line: FloatArray) -> bool:
+        """Check that a pane was not only hit before it was gone through, or after: as who stood there and left."""
+        places = self._places[self._asked]
+        on_line = (np.hypot(*(places - line[0]).T) + np.hypot(*(places - line[1]).T)) < math.dist(*line) + DEPTH
+        hits, throughs = (
+            np.flatnonzero((self._said[:, on_line] == code).any(axis=1)) for code in (HIT_NEAR, PAST_OBLIQUE)
+        )
+        return bool(len(hits) and len(throughs) and hits[0] < throughs[-1] and throughs[0] < hits[-1])
 
     def _open_along(self, line: FloatArray, keyframes: Sequence[Keyframe]) -> FloatArray:
         """List places in line with a pane that keyframes went through near its normal, which the line tells best."""

@@ -165,6 +165,20 @@ def test_somebody_who_stood_there_and_left_is_no_pane() -> None:
     assert occupied_share(mapper.grid(), start, (3.9, 3.2, 4.1, 3.2)) == 0.0
 
 
+def test_somebody_who_stood_in_a_doorway_is_no_pane() -> None:
+    # Who stands in it is seen from the front; when they have left it is only seen at an angle.
+    doorway, person = (3.5, 6.0, 4.5, 6.0), [(3.8, 5.9, 4.2, 5.9), (4.2, 5.9, 4.2, 6.2), (3.8, 5.9, 3.8, 6.2)]
+    world = walls_beside(doorway)
+    route = [(1.0, 3.5), (4.0, 3.5), (4.0, 4.2), (6.0, 4.2), (7.0, 5.0), (6.0, 4.0), (7.5, 5.2)]
+    there, gone = SegmentWorld([*world, *person]).drive(route, beams=720), SegmentWorld(world).drive(route, beams=720)
+    mapper, left = Mapper(), next(i for i, pose in enumerate(there.truth) if pose[0] > 4.0)
+    for number, odometry in enumerate(there.odometry):
+        mapper.process((there if number < left else gone).scans[number], Pose2(*odometry))
+    mapper.finish()
+    mapper.grid()
+    assert len(mapper.panes) == 0
+
+
 @pytest.mark.parametrize("lateral", [0.0, 0.12])
 def test_a_view_tells_how_far_beams_went_beyond_a_place(office: SegmentWorld, lateral: float) -> None:
     view = View(clean(office.scan(Pose2(6.0, 1.0, 0.0), beams=720), max_range=25.0))
