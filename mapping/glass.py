@@ -186,15 +186,14 @@ class Panes:
         hit = np.maximum(hit, 1)  # a glimpse between two keyframes at least
         glass = (past <= DOUBT * hit) & (through >= SEEN_THROUGH) & (askew <= DOUBT * through)
         no_pane = (past > 1) & (past > hit)
-        against, may_be = places[no_pane], places[~no_pane & (through >= SEEN_THROUGH)]
+        may_be = places[~no_pane & (through >= SEEN_THROUGH)]
+        lines = draw_lines(places[glass], normals[glass], self._resolution)
+        opened = self._open_along(lines, keyframes) if last else [places[no_pane]] * len(lines)
         segments = []
-        for line in draw_lines(places[glass], normals[glass], self._resolution):
+        for line, against in zip(lines, opened, strict=True):
             long = math.dist(*line) >= LENGTH
-            if last and long:
-                open_ = self._open_along(line, keyframes)
-                segments.append(extend_line(line, grid, may_be, open_, self._driven, WIDE)[0])
-                continue
-            segment, bounded = extend_line(line, grid, may_be, against, self._driven, FRAME)
+            gap = WIDE if last and long else FRAME
+            segment, bounded = extend_line(line, grid, may_be, against, self._driven, gap)
             if long or (bounded and self._alternates(line)):
                 segments.append(segment)
         return np.array(segments).reshape(-1, 2, 2)
@@ -208,17 +207,21 @@ class Panes:
         )
         return bool(len(hits) and len(throughs) and hits[0] < throughs[-1] and throughs[0] < hits[-1])
 
-    def _open_along(self, line: FloatArray, keyframes: Sequence[Keyframe]) -> FloatArray:
-        """List places in line with a pane that keyframes went through near its normal, which the line tells best."""
-        length = math.dist(*line)
-        along = (line[1] - line[0]) / length
-        places = line[0] + np.arange(-FARTHEST, length + FARTHEST, self._resolution)[:, None] * along
-        normals = np.broadcast_to(np.array([-along[1], along[0]]), places.shape)
-        near = np.flatnonzero(np.hypot(*(self._sensors - line.mean(axis=0)).T) < REACH + FARTHEST + length)
-        said = np.stack([self._codes(keyframes[k], places, normals) for k in near.tolist()])
-        hit, _, past, _ = self._count_viewpoints(said, self._sensors[near])
-        opened: FloatArray = places[past > hit]
-        return opened
+    def _open_along(self, lines: Sequence[FloatArray], keyframes: Sequence[Keyframe]) -> list[FloatArray]:
+        """List for each line the places in it that keyframes went through near its normal, which it tells best."""
+        if not lines:
+            return []
+        on, facing = [], []
+        for a, b in lines:
+            length = math.dist(a, b)
+            along = (b - a) / length
+            on.append(a + np.arange(-FARTHEST, length + FARTHEST, self._resolution)[:, None] * along)
+            facing.append(np.broadcast_to(np.array([-along[1], along[0]]), on[-1].shape))
+        places, normals = np.concatenate(on), np.concatenate(facing)
+        said = np.stack([self._codes(keyframe, places, normals) for keyframe in keyframes])
+        hit, _, past, _ = self._count_viewpoints(said, self._sensors)
+        opened = np.split(past > hit, np.cumsum([len(some) for some in on])[:-1])
+        return [some[here] for some, here in zip(on, opened, strict=True)]
 
     @staticmethod
     def _count_viewpoints(said: npt.NDArray[np.int8], sensors: FloatArray) -> list[IntArray]:
