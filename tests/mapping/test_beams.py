@@ -163,9 +163,7 @@ def thinned(points: np.ndarray, spacing: float, most: int) -> np.ndarray:
     along = np.concatenate(([0.0], np.cumsum(steps)))
     width = max(spacing, along[-1] / most)
     kept = [0]
-    for number in range(1, len(points)):
-        if math.floor(along[number] / width) > math.floor(along[number - 1] / width):
-            kept.append(number)
+    kept += [n for n in range(1, len(points)) if math.floor(along[n] / width) > math.floor(along[n - 1] / width)]
     return points[kept]
 
 
