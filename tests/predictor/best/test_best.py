@@ -1,6 +1,7 @@
 """The method best on buildings drawn by hand: gaps, corridors at an angle, bad doors, invariance."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -257,3 +258,35 @@ def test_a_trace_of_a_room_with_two_doors_weighs_one_room(monkeypatch: pytest.Mo
     assert set(room.doors) == {"left", "right"}
     own = sum(terms[0] for terms in room.terms.values())
     assert own == pytest.approx(room.scores[room.chosen], abs=1e-6)
+
+
+def test_stages_are_kept_where_they_are_asked_for_and_there_are_any() -> None:
+    grid, doors = _building({"d1a"})
+    assert predict_best(grid, doors, CONFIG).trace is None
+    assert predict_best(grid, doors, BestConfig(keep_trace=True)).trace is not None
+    assert predict_best(grid, [], BestConfig(keep_trace=True)).trace is None
+
+
+def test_reasons_stand_in_the_order_of_the_doors_and_rooms_too() -> None:
+    grid, doors = _building({"d1a", "d3b"})
+    bad = [ClosedDoor(name, (x, 900.0)) for name, x in (("z", 1.0), ("a", 2.0), ("m", 3.0))]
+    prediction = predict_best(grid, [bad[0], doors[1], bad[1], doors[0], bad[2]], CONFIG)
+    assert list(prediction.failures) == ["z", "a", "m"]
+    assert [room.doors for room in prediction.rooms] == [(doors[1].id,), (doors[0].id,)]
+    assert len(prediction.beliefs) == 2
+
+
+def test_rectangles_are_rated_anew_by_who_is_asked() -> None:
+    grid, doors = _building({"d1a"})
+    asked = []
+
+    def turn_around(scene, proposals):
+        asked.append([pose.facing.door.id for pose in scene.poses])
+        (own,) = proposals.alone
+        worst = np.argsort(own.scores, kind="stable")
+        turned = {name: getattr(own, name)[worst] for name in ("boxes", "corners", "measured")}
+        return replace(proposals, alone=[replace(own, scores=-own.scores[worst], **turned)])
+
+    usual, other = predict_best(grid, doors, CONFIG), predict_best(grid, doors, CONFIG, rate=turn_around)
+    assert asked == [["d1a"]]
+    assert other.rooms[0].polygon.symmetric_difference(usual.rooms[0].polygon).area > 1.0
