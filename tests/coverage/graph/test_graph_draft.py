@@ -360,3 +360,31 @@ def test_a_tour_begins_at_the_nearest_vertex_in_sight_of_the_start():
     assert _start_vertex(draft, place(24.5, 20.5)) == 0
     # In sight of none: the nearest.
     assert _start_vertex(draft, place(20.5, 59.5)) == 2
+
+
+def test_an_edge_goes_around_furniture_by_detours_and_bends_at_walls():
+    # A table in the way, around which the clean map shows free space; then a corner of the walls.
+    table = _mask((16, 30, 12, 8))
+    clean = _mask((5, 5, 30, 60), (5, 55, 50, 10))
+    chain = np.array([*((20, col) for col in range(10, 61)), *((row, 60) for row in range(21, 51))])
+    draft = _draft(_space(clean & ~table, clean, np.ones((ROWS, COLS), dtype=np.int64)))
+    first = draft.follow(chain)
+    assert draft.points[first] == pytest.approx([20.5, 10.5])
+    kinds = {tuple(point.tolist()): kind for point, kind in zip(draft.points, draft.kinds, strict=True)}
+    assert kinds[20.5, 10.5] == kinds[50.5, 60.5] == "bend"
+    around = [point for point, kind in kinds.items() if kind == "detour"]
+    # Two corners of the table at least.
+    assert len(around) >= 2
+    assert all(14.0 < row < 30.0 and 28.0 < col < 42.0 for row, col in around)
+    bends = [point for point, kind in kinds.items() if kind == "bend"]
+    assert len(bends) == len(kinds) - len(around)
+    for (u, v), line in draft.edges.items():
+        assert line[0] == pytest.approx(draft.points[u])
+        assert line[-1] == pytest.approx(draft.points[v])
+        assert np.abs(np.diff(line, axis=0)).max() <= 1.0
+    # Where nothing is in the way the chain itself is drawn, as it was.
+    straight = _draft(_space(WIDE))
+    curved = np.array([(20 + (col - 10) % 2, col) for col in range(10, 31)])
+    straight.follow(curved)
+    assert straight.kinds == ["bend", "bend"]
+    assert straight.edges[0, 1].tolist() == (curved + 0.5).tolist()

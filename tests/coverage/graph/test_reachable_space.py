@@ -356,3 +356,28 @@ def test_a_path_keeps_near_the_chain_that_it_follows_where_it_can():
     assert along[:, 0].max() >= 60
     shortest = find_shortest_path(start, goal, cells)
     assert shortest[:, 0].max() < 20
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=40)
+def test_a_path_is_as_short_as_that_of_dijkstra(seed):
+    rng = np.random.default_rng(seed)
+    cells = rng.random((14, 22)) < 0.7
+    cells[[0, -1]] = cells[:, [0, -1]] = False
+    start, goal = rng.choice(np.argwhere(cells), 2, replace=False)
+    graph = nx.Graph()
+    graph.add_nodes_from(map(tuple, np.argwhere(cells).tolist()))
+    for row, col in list(graph):
+        for step in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            if (row + step[0], col + step[1]) in graph:
+                graph.add_edge((row, col), (row + step[0], col + step[1]), weight=float(np.hypot(*step)))
+    path = find_shortest_path(start, goal, cells)
+    if not nx.has_path(graph, tuple(start.tolist()), tuple(goal.tolist())):
+        assert path is None
+        return
+    assert (path[0].tolist(), path[-1].tolist()) == (start.tolist(), goal.tolist())
+    steps = np.diff(path, axis=0)
+    assert np.abs(steps).max() == 1
+    assert cells[path[:, 0], path[:, 1]].all()
+    shortest = nx.dijkstra_path_length(graph, tuple(start.tolist()), tuple(goal.tolist()))
+    assert np.hypot(*steps.T).sum() == pytest.approx(shortest)

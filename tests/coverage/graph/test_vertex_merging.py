@@ -160,3 +160,23 @@ def test_what_was_connected_stays_connected_and_no_edge_has_a_lost_end():
             old, new = group[a], group[b]
             group = {cell: new if own == old else own for cell, own in group.items()}
         assert len(set(group.values())) == 1
+
+
+def test_the_larger_end_of_a_path_with_a_vertex_between_stays():
+    graph = _graph({"a": (30, 10), "m": (30, 60), "b": (30, 64)}, ("m", "a"), ("m", "b"))
+    assert (30, 64) in _merged(graph, _clearance(5.0, r30c64=7.0))[0]
+    # A smaller one goes.
+    assert (30, 60) in _merged(graph, _clearance(5.0, r30c64=4.0))[0]
+
+
+def test_a_loop_of_a_junction_that_is_merged_leads_from_the_other_one_and_back():
+    vertices = {"l": (30, 40), "r": (30, 46), "a": (30, 2), "b": (2, 40), "c": (58, 46)}
+    ring = [(20, 56), (20, 76), (40, 76), (40, 56)]
+    graph = _graph(vertices, ("l", "r"), ("l", "a"), ("l", "b"), ("r", "c"), ("r", "r", *ring))
+    cells, edges = _merged(graph, _clearance(5.0, r30c40=6.0))
+    assert (30, 46) not in cells
+    assert edges.count(((30, 40), (30, 40))) == 1
+    found = merge_thin(graph, _clearance(5.0, r30c40=6.0), doorway=DOORWAY, corner_ratio=0.5)
+    (chain,) = [chain for (u, v), chain in zip(found.edges.tolist(), found.chains, strict=True) if u == v]
+    # Six cells there, the ring of four times ten or twenty, and six back.
+    assert len(chain) == 6 + len(_chain((30, 46), *ring, (30, 46))) + 6

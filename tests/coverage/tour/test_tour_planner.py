@@ -165,9 +165,10 @@ def test_a_neck_parts_two_rooms_up_to_the_width_of_double_doors(draw, plain, nec
     assert count_rooms(grid, plain.graph) == rooms
 
 
-@pytest.mark.parametrize(("wide", "rooms"), [(0.85, 1), (1.3, 2)])
+@pytest.mark.parametrize(("wide", "rooms"), [(0.9, 1), (1.3, 2)])
 def test_what_is_narrower_than_a_room_is_part_of_the_one_beside_it(draw, plain, wide, rooms):
-    grid = draw(13.0, 7.0, [(1.0, 1.0, 6.0, 6.0), (6.2, 1.0, 6.2 + wide, 6.0), (5.9, 3.1, 6.3, 3.9)])
+    # A neck of 0.5 m: the room behind it is wider by the half, but no room.
+    grid = draw(13.0, 7.0, [(1.0, 1.0, 6.0, 6.0), (6.2, 1.0, 6.2 + wide, 6.0), (5.9, 3.25, 6.3, 3.75)])
     assert count_rooms(grid, plain.graph) == rooms
 
 

@@ -220,6 +220,8 @@ def test_a_direction_is_as_clear_as_the_share_of_wall_around_it_that_lies_in_it(
     found = _measure_concentration(angles, lengths, np.radians([50.0, 0.0, 120.0]), math.radians(12.0))
     # Within 3 degrees of 50: 1 and 2 m; within 12: 4 and 8 m more. Around 0 all; around 120 none.
     assert found == pytest.approx([3.0 / 15.0, 1.0, 0.0])
+    # However little there is.
+    assert _measure_concentration(angles[:1], np.array([0.2]), angles[:1], 0.2) == pytest.approx([1.0])
 
 
 @pytest.mark.parametrize("seam", [0.0, 1.0])
