@@ -70,7 +70,7 @@ def test_jogs_of_the_drawing_are_straightened_and_others_stay() -> None:
         (made,) = clean_outlines([outline], [], names=["a"])
         assert made is not None
         assert (len(made.exterior.coords) < len(outline.exterior.coords)) == straightened
-        assert made.symmetric_difference(outline).area < 0.12**2
+        assert made.symmetric_difference(outline).area < 0.12
 
 
 def test_a_room_inside_another_is_lost_and_named() -> None:
