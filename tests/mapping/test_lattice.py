@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.mapping import lattice as module
 from closedrooms.mapping.lattice import GROWTH, Lattice
 
 # Off the lines between cells, where rounding decides.
@@ -59,3 +60,36 @@ def test_it_covers_a_box_with_its_margin_keeps_what_it_had_and_then_stays(
 def test_a_window_larger_than_any_building_is_refused() -> None:
     with pytest.raises(InvalidInputError, match="cells"):
         Lattice(0.05).cover(np.zeros(2), np.full(2, 2000.0), 0)
+
+
+@pytest.mark.parametrize("fill", [0, 7])
+def test_arrays_grow_with_their_window(fill: int) -> None:
+    values = np.arange(6, dtype=np.int16).reshape(2, 3)
+    padding = ((1, 2), (3, 4))
+    larger = module.grown(values, padding, fill)
+    assert larger.dtype == values.dtype
+    assert np.array_equal(larger, np.pad(values, padding, constant_values=fill))
+
+
+def test_a_window_begins_around_the_origin_and_grows_by_whole_steps() -> None:
+    lattice = Lattice(RESOLUTION)
+    half = GROWTH // 2
+    frame = lattice.frame
+    assert (frame.origin_x, frame.origin_y, frame.rows, frame.cols) == pytest.approx((-6.4, -6.4, GROWTH, GROWTH))
+    rows, cols = lattice.cells(np.array([[0.05, 0.05], [-0.05, 0.15], [-6.39, 6.39]]))
+    assert rows.tolist() == [half, half + 1, GROWTH - 1]
+    assert cols.tolist() == [half, half - 1, 0]
+    inside, outside = np.array([-6.15, -6.15]), np.array([6.15, 6.15])
+    assert lattice.cover(inside, outside, 2) is None
+    assert lattice.cover(inside, outside, 3) == ((GROWTH, GROWTH), (GROWTH, GROWTH))
+    assert (lattice.row0, lattice.col0, lattice.rows, lattice.cols) == (-half - GROWTH,) * 2 + (3 * GROWTH,) * 2
+    assert lattice.cover(np.array([0.05, 0.05]), np.array([0.05, 19.15]), 0) is None
+    assert lattice.cover(np.array([0.05, 0.05]), np.array([0.05, 19.25]), 0) == ((0, GROWTH), (0, 0))
+
+
+def test_a_window_may_have_so_many_cells_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MAX_CELLS", 2 * GROWTH * GROWTH)
+    Lattice(RESOLUTION).cover(np.array([0.05, 0.05]), np.array([6.45, 0.05]), 0)
+    monkeypatch.setattr(module, "MAX_CELLS", 2 * GROWTH * GROWTH - 1)
+    with pytest.raises(InvalidInputError, match=f"a map of {GROWTH} x {2 * GROWTH} cells"):
+        Lattice(RESOLUTION).cover(np.array([0.05, 0.05]), np.array([6.45, 0.05]), 0)

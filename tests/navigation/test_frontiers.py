@@ -7,7 +7,7 @@ from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.driving.costmap import NavigationMap
-from closedrooms.navigation.frontiers import Frontiers, find_frontiers, seen_from, still_unknown
+from closedrooms.navigation.frontiers import Frontiers, _edge, find_frontiers, seen_from, still_unknown
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
 
@@ -209,3 +209,20 @@ def test_what_lies_beyond_the_map_is_unknown() -> None:
     for resolution in (0.05, 0.2):
         config = NavigationConfig(frontier_resolution=resolution).for_robot(RobotConfig())
         assert still_unknown(grid, points, config) == pytest.approx(3 * resolution)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_edge_of_free_space_is_told_to_the_borders_of_the_map(seed: int) -> None:
+    kinds = np.random.default_rng(seed).integers(0, 3, size=(7, 9))
+    free, blocked = ((kinds == kind).astype(np.uint8) for kind in (0, 1))
+    patches, count = ndimage.label(kinds == 2)
+    sizes = np.append(0, ndimage.sum_labels(kinds == 2, patches, np.arange(1, count + 1))) * 0.1**2
+    expected = {}
+    for row, col in np.argwhere(kinds == 0).tolist():
+        near = [(row + 1, col), (row - 1, col), (row, col + 1), (row, col - 1)]
+        found = [patches[r, c] for r, c in near if 0 <= r < 7 and 0 <= c < 9 and patches[r, c]]
+        if found:
+            expected[row, col] = max(sizes[patch] for patch in found)
+    cells, areas = _edge(free, blocked, 0.1)
+    assert {tuple(cell): area for cell, area in zip(cells.tolist(), areas, strict=True)} == pytest.approx(expected)
+    assert cells.tolist() == sorted(cells.tolist())

@@ -7,7 +7,7 @@ from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.robot import RobotConfig
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.driving.costmap import Costmap, NavigationMap
-from closedrooms.navigation.driving.path_back import BACK_STEP, path_back
+from closedrooms.navigation.driving.path_back import BACK_STEP, GOAL_RADIUS, cells_near, path_back
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
 WALL = 80
@@ -69,3 +69,10 @@ def test_without_a_goal_that_the_robot_fits_on_there_is_none(apart: Costmap) -> 
     assert path_back(apart, way, goal_at(apart, (4.05, 1.0)), CONFIG) is None
     assert path_back(apart, way, goal_at(apart, (4.05, 1.0), (7.0, 3.0)), CONFIG) is not None
     assert path_back(apart, [], goal_at(apart, (7.0, 1.0)), CONFIG) is None
+
+
+@pytest.mark.parametrize("place", [(2.0, 2.0), (0.03, 0.07), (8.05, 4.05), (-0.2, 1.0), (4.0, 4.3), (-9.0, 1.0)])
+def test_goals_near_a_place_are_the_cells_within_their_radius(place: tuple[float, float], apart: Costmap) -> None:
+    centres = apart.frame.to_points(np.stack(np.indices(apart.frame.shape), axis=-1))
+    expected = np.hypot(*(centres - np.array(place)).transpose(2, 0, 1)) <= GOAL_RADIUS
+    assert np.array_equal(cells_near(place, apart), expected)

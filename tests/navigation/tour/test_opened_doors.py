@@ -4,8 +4,13 @@ import pytest
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
+from closedrooms.mapping.beams import clean
+from closedrooms.mapping.config import MapperConfig
+from closedrooms.mapping.glass import before_glass
+from closedrooms.mapping.graph.keyframe import Keyframe
+from closedrooms.mapping.log_odds_grid import EvidenceGrid
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.navigation.tour.opened_doors import ReopenedMap
+from closedrooms.navigation.tour.opened_doors import ReopenedMap, _outside
 
 # A corridor along x, 2 m wide; in its upper wall at y = 1 a door from x = 2.05 to x = 2.95, a room of 3 m behind it.
 DOOR = ClosedDoor("d00", (2.5, 1.0), ((2.05, 1.0), (2.95, 1.0)), 0.9)
@@ -109,3 +114,70 @@ def test_a_pane_hides_the_doorway_behind_it_but_a_leaf_of_glass_went_with_its_do
     cells = _leaf_cells(reopened.grid(), 0.03)
     known = np.mean(cells >= 0)
     assert known > 0.8 if is_open else known < 0.2
+
+
+class _Keyframes:
+    """A map of keyframes that a test moves about."""
+
+    def __init__(self, xs: list[float], segments: list) -> None:
+        scans = [_scan(Pose2(x, 0.0), segments, float(n)) for n, x in enumerate(xs)]
+        nothing = np.empty((0, 2))
+        self.keyframes = [
+            Keyframe(n, scan.stamp, Pose2(x, 0.0), clean(scan, max_range=20.0), nothing, nothing, 0.0)
+            for n, (x, scan) in enumerate(zip(xs, scans, strict=True))
+        ]
+        self.panes = np.empty((0, 2, 2))
+
+    def evidence(self, first: int) -> EvidenceGrid:
+        """What the keyframes from one on say where they are now."""
+        evidence = EvidenceGrid(MapperConfig())
+        for keyframe in self.keyframes[first:]:
+            evidence.add(before_glass(keyframe.beams, keyframe.pose, self.panes), keyframe.pose)
+        return evidence
+
+    def grid(self):
+        return self.evidence(0).grid()
+
+    def process(self, *_: object) -> Pose2:
+        return Pose2()
+
+
+def test_keyframes_that_moved_and_panes_that_were_found_are_counted_anew_and_others_once() -> None:
+    mapper = _Keyframes([0.5, 1.5, 2.5, 3.5], [*WALLS, *ROOM])
+    opened = ReopenedMap(mapper, [], MapperConfig())  # type: ignore[arg-type]
+    opened._doors = (DOOR,)
+    later, mapper.keyframes = mapper.keyframes[2:], mapper.keyframes[:2]
+    opened.note_opened(["d00", "d99"])
+    opened.note_opened(["d99"])
+    (opening,) = opened._openings
+    mapper.keyframes = [*mapper.keyframes, *later]
+
+    def check() -> None:
+        opened.grid()
+        frame = mapper.grid().frame
+        assert np.array_equal(opening.since.grid().on(frame).cells, mapper.evidence(2).grid().on(frame).cells)
+
+    check()
+    drawn = dict(opening.drawn)
+    check()
+    # What has not changed is not drawn again.
+    assert all(opening.drawn[index] is entry for index, entry in drawn.items())
+    assert sorted(drawn) == [2, 3]
+    mapper.keyframes[2].pose = Pose2(2.5, 0.3, 0.1)
+    check()
+    assert opening.drawn[2] is not drawn[2]
+    assert opening.drawn[3] is drawn[3]
+    mapper.panes = np.array([[[5.0, -1.0], [5.0, 1.0]]])
+    check()
+    mapper.panes = np.empty((0, 2, 2))
+    check()
+
+
+def test_panes_within_the_reach_of_a_leaf_went_with_their_door() -> None:
+    panes = np.array(
+        [[[2.1, 1.0], [2.9, 1.0]], [[2.1, 1.29], [2.9, 1.29]], [[2.1, 1.31], [2.9, 1.31]], [[5.0, 1.0], [6.0, 1.0]]]
+    )
+    assert np.array_equal(_outside(panes, [DOOR]), panes[2:])
+    assert _outside(panes, [ClosedDoor("d", (2.5, 1.0))]) is panes
+    assert _outside(panes[:0], [DOOR]).shape == (0, 2, 2)
+    assert _outside(panes, []) is panes

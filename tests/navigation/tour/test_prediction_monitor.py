@@ -6,6 +6,7 @@ from shapely.geometry import Polygon, box
 
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
+from closedrooms.navigation.tour import prediction_monitor
 from closedrooms.navigation.tour.prediction_monitor import PredictionMonitor, changed_rooms, difference
 from closedrooms.predictor.prediction import Prediction
 
@@ -111,3 +112,36 @@ def test_rooms_have_changed_of_which_half_a_square_metre_came_or_went() -> None:
     assert changed_rooms(before, after(0.6)) == changed_rooms(after(0.6), before) == ("a", "c")
     assert changed_rooms(before, before[:1]) == changed_rooms(before[:1], before) == ("b",)
     assert changed_rooms([Room(Polygon(), ("a",))], []) == ()
+
+
+def told_of(shares: list[dict[str, float]], monkeypatch: pytest.MonkeyPatch, *, apart: float = 2.0) -> list[object]:
+    """What is told of rooms of which shares are known, one look after the other."""
+    looks = iter(shares)
+    monkeypatch.setattr(prediction_monitor, "seen_share", lambda *_: next(looks))
+    monitor = PredictionMonitor()
+    return [news(monitor, apart * number, grid()) for number in range(len(shares))]
+
+
+@pytest.mark.parametrize(("known", "told"), [(0.59, False), (0.6, True)])
+def test_a_room_that_a_revision_adds_was_not_known_before(
+    known: float, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = told_of([{"a": 0.0}, {"a": 0.0, "b": known}, {"a": 0.0, "b": known}], monkeypatch)
+    assert found == [None, None, ("b",) if told else None]
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "told"), [(0.5, 0.79, False), (0.5, 0.81, True), (0.95, 0.959, False), (0.95, 0.961, True)]
+)
+def test_of_what_was_unknown_most_has_to_be_seen(
+    before: float, now: float, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # What was known beyond nine tenths counts as nine tenths.
+    assert told_of([{"a": before}, {"a": now}, {"a": now}], monkeypatch)[-1] == (("a",) if told else None)
+
+
+def test_two_seconds_without_more_than_a_fiftieth(monkeypatch: pytest.MonkeyPatch) -> None:
+    looks = [{"a": share} for share in (0.0, 0.65, 0.66, 0.67, 0.67)]
+    assert told_of(looks, monkeypatch, apart=1.0) == [None, None, None, ("a",), ("a",)]
+    looks = [{"a": share} for share in (0.0, 0.65, 0.66, 0.68, 0.68)]
+    assert told_of(looks, monkeypatch, apart=1.0) == [None] * 5

@@ -12,7 +12,7 @@ from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.coverage.config import CoverageConfig, GraphConfig
 from closedrooms.coverage.graph.line_of_sight import is_clear
 from closedrooms.coverage.tour.tour_planner import plan_coverage
-from closedrooms.navigation.tour.remaining_tour import RemainingTour, open_tour
+from closedrooms.navigation.tour.remaining_tour import RemainingTour, _was_near, open_tour
 
 FRAME = GridFrame(0.05, 0.0, 0.0, 170, 300)
 PLAIN = CoverageConfig(graph=GraphConfig(clutter_filter=False))
@@ -121,3 +121,32 @@ def test_stops_within_shapes_come_first_shape_by_shape_and_the_others_keep_their
     assert [tuple(place) for place in stops.left] == [*inside[0], *inside[1], *rest]
     stops.put_first([])
     assert [tuple(place) for place in stops.left] == [*inside[0], *inside[1], *rest]
+
+
+@pytest.mark.parametrize("upper", [True, False])
+def test_a_tour_solved_again_stays_in_the_part_where_the_robot_is(stops: RemainingTour, upper: bool) -> None:
+    cells = np.full(FRAME.shape, OCCUPIED, dtype=np.int8)
+    cells[20:60, 20:280] = FREE
+    cells[80:140, 20:280] = FREE
+    grid = OccupancyGrid(FRAME, cells)
+    here = (2.0, 5.5 if upper else 2.0)
+    assert stops.solve_again(grid, here, np.empty((0, 2)), PLAIN, reach=1.0)
+    assert len(stops) >= 1
+    assert ((stops.left[:, 1] > 3.5) == upper).all()
+    assert ((stops.path()[:, 1] > 3.5) == upper).all()
+
+
+@pytest.mark.parametrize("wall", [*range(12, 49, 4), 13, 21, 33, 47])
+def test_a_wall_of_one_cell_hides_what_was_driven_past(wall: int) -> None:
+    cells = np.full((20, 60), FREE, dtype=np.int8)
+    cells[:, wall] = OCCUPIED
+    walled = OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 20, 60), cells)
+    bare = OccupancyGrid(walled.frame, np.full((20, 60), FREE, dtype=np.int8))
+    vertex, far = np.array([0.525, 0.525]), np.array([[2.525, 0.525]])
+    assert _was_near(vertex, far, 2.0, bare)
+    assert not _was_near(vertex, far, 2.0, walled)
+    assert not _was_near(vertex, far, 1.99, bare)
+    assert not _was_near(vertex, np.empty((0, 2)), 2.0, bare)
+    # One of several places in free sight is enough, and beyond the map nothing is in the way.
+    assert _was_near(vertex, np.vstack((far, [[0.525, 0.7]])), 2.0, walled)
+    assert _was_near(vertex, np.array([[0.525, -0.9]]), 2.0, walled)
