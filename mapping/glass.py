@@ -7,16 +7,16 @@ normal and none of the others; what moves returns the same beams now and not the
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.graph.keyframe import Keyframe
-from closedrooms.mapping.lattice import grown
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
 from closedrooms.mapping.met_surfaces import Glimpse, MetSurfaces
 from closedrooms.mapping.pane_lines import FARTHEST, FRAME, LENGTH, WIDE, draw_lines, extend_line, find_candidates
@@ -49,6 +49,53 @@ CHANGED = 0.10
 HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE = 1, 2, 3, 4
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Said:
+    """What keyframes say about places: entries, shape (n,) each; about most places a keyframe says nothing.
+
+    Attributes:
+        keyframes: Index of the keyframe.
+        places: Index of the place.
+        codes: One of the codes above.
+    """
+
+    keyframes: npt.NDArray[np.int32]
+    places: npt.NDArray[np.int32]
+    codes: npt.NDArray[np.int8]
+
+    @staticmethod
+    def joined(parts: Sequence["Said"]) -> "Said":
+        """Join entries."""
+        return Said(
+            np.concatenate([part.keyframes for part in parts]),
+            np.concatenate([part.places for part in parts]),
+            np.concatenate([part.codes for part in parts]),
+        )
+
+    def kept(self, chosen: BoolArray) -> "Said":
+        """Keep some entries, shape (n,)."""
+        return Said(self.keyframes[chosen], self.places[chosen], self.codes[chosen])
+
+    def count_viewpoints(self, sensors: FloatArray, count: int) -> list[IntArray]:
+        """Count for each code from how many viewpoints keyframes said it of each place, shape (count,) each.
+
+        Args:
+            sensors: Where the keyframes were taken, shape (keyframes, 2) [m].
+            count: Number of places.
+        """
+        _, viewpoints = np.unique(np.floor(sensors / VIEWPOINT), axis=0, return_inverse=True)
+        seen_from = viewpoints.ravel()[self.keyframes]
+        counts = []
+        for code in (HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE):
+            mine = self.codes == code
+            once = np.unique(self.places[mine] * np.int64(len(sensors)) + seen_from[mine])
+            counts.append(np.bincount(once // max(len(sensors), 1), minlength=count))
+        return counts
+
+
+NOTHING_SAID = Said(np.zeros(0, dtype=np.int32), np.zeros(0, dtype=np.int32), np.zeros(0, dtype=np.int8))
+
+
 class Panes:
     """The panes found so far, map frame."""
 
@@ -64,8 +111,8 @@ class Panes:
         self._places: FloatArray = np.zeros((0, 2))
         self._normals: FloatArray = np.zeros((0, 2))
         self._asked: IntArray = np.zeros(0, dtype=np.int64)
-        # What keyframes (rows) say about the places that are asked about (columns): one of the codes above, or 0.
-        self._said: npt.NDArray[np.int8] = np.zeros((0, 0), dtype=np.int8)
+        # What keyframes say about the places that are asked about, and so many of those.
+        self._said, self._told = NOTHING_SAID, 0
         self._said_from: list[Pose2] = []
         self._sensors: FloatArray = np.zeros((0, 2))
         self._driven: FloatArray = np.zeros((0, 2))
@@ -119,28 +166,43 @@ class Panes:
 
     def _ask(self, keyframes: Sequence[Keyframe]) -> None:
         """Bring up to date what the keyframes say about the places: new ones about all, the others about new ones."""
-        rows, cols = self._said.shape
-        self._said = grown(self._said, ((0, len(keyframes) - rows), (0, len(self._asked) - cols)))
+        rows, cols = len(self._said_from), self._told
         poses = [keyframe.pose for keyframe in keyframes]
         anew = [k for k, (pose, said) in enumerate(zip(poses, self._said_from, strict=False)) if pose is not said]
         anew += range(rows, len(keyframes))
-        self._said_from = poses
+        self._said_from, self._told = poses, len(self._asked)
         self._sensors = np.concatenate((self._sensors, np.zeros((len(keyframes) - rows, 2))))
         for k in anew:
             self._sensors[k] = poses[k].transform(keyframes[k].beams.origin[None])[0]
-        self._ask_some(keyframes, anew, 0)
-        if cols < len(self._asked):
-            self._ask_some(keyframes, np.setdiff1d(np.arange(rows), anew).tolist(), cols)
+        places, normals = self._places[self._asked], self._normals[self._asked]
+        still = np.ones(len(keyframes), dtype=np.bool_)
+        still[anew] = False
+        self._said = Said.joined(
+            [
+                self._said.kept(still[self._said.keyframes]),
+                self._said_by(keyframes, anew, places, normals, 0),
+                self._said_by(keyframes, np.flatnonzero(still).tolist(), places, normals, cols),
+            ]
+        )
 
-    def _ask_some(self, keyframes: Sequence[Keyframe], chosen: Sequence[int], first: int) -> None:
-        """Find what some keyframes, by their indices, say about the places from the ``first`` one asked about on."""
-        asked = self._asked[first:]
-        places, normals = self._places[asked], self._normals[asked]
-        self._said[chosen, first:] = 0
-        middle, reach = (places.min(axis=0) + places.max(axis=0)) / 2.0, np.ptp(places, axis=0) / 2.0 + REACH
-        in_reach = (np.abs(self._sensors[chosen] - middle) < reach).all(axis=1)
-        for k in np.asarray(chosen)[in_reach].tolist():
-            self._said[k, first:] = self._codes(keyframes[k], places, normals)
+    def _said_by(
+        self, keyframes: Sequence[Keyframe], chosen: Sequence[int], places: FloatArray, normals: FloatArray, first: int
+    ) -> Said:
+        """Find what some keyframes, by their indices, say about places, shape (n, 2), from the ``first`` one on."""
+        parts = [NOTHING_SAID]
+        # Places from left to right: those within reach of a keyframe stand side by side.
+        order = first + np.argsort(places[first:, 0], kind="stable")
+        x = places[order, 0]
+        sensors = self._sensors[chosen, 0]
+        begins, ends = np.searchsorted(x, sensors - REACH), np.searchsorted(x, sensors + REACH, side="right")
+        for k, begin, end in zip(chosen, begins.tolist(), ends.tolist(), strict=True):
+            if begin < end:
+                asked = order[begin:end]
+                codes = self._codes(keyframes[k], places[asked], normals[asked])
+                told = np.flatnonzero(codes)
+                who = np.full(len(told), k, dtype=np.int32)
+                parts.append(Said(who, asked[told].astype(np.int32), codes[told]))
+        return Said.joined(parts)
 
     def _view(self, keyframe: Keyframe) -> View:
         if keyframe.index not in self._views:
@@ -182,7 +244,7 @@ class Panes:
         # In the order in which they were met, not in that in which they were asked about.
         order = np.argsort(self._asked)
         places, normals = self._places[self._asked[order]], self._normals[self._asked[order]]
-        hit, askew, past, through = (counts[order] for counts in self._count_viewpoints(self._said, self._sensors))
+        hit, askew, past, through = (counts[order] for counts in self._said.count_viewpoints(self._sensors, self._told))
         hit = np.maximum(hit, 1)  # a glimpse between two keyframes at least
         glass = (past <= DOUBT * hit) & (through >= SEEN_THROUGH) & (askew <= DOUBT * through)
         no_pane = (past > 1) & (past > hit)
@@ -202,10 +264,11 @@ class Panes:
         """Check that a pane was not only hit before it was gone through, or after: as who stood there and left."""
         places = self._places[self._asked]
         on_line = (np.hypot(*(places - line[0]).T) + np.hypot(*(places - line[1]).T)) < math.dist(*line) + DEPTH
-        hits, throughs = (
-            np.flatnonzero((self._said[:, on_line] == code).any(axis=1)) for code in (HIT_NEAR, PAST_OBLIQUE)
-        )
-        return bool(len(hits) and len(throughs) and hits[0] < throughs[-1] and throughs[0] < hits[-1])
+        said = self._said.kept(on_line[self._said.places])
+        hits, throughs = (said.keyframes[said.codes == code] for code in (HIT_NEAR, PAST_OBLIQUE))
+        if not (len(hits) and len(throughs)):
+            return False
+        return bool(hits.min() < throughs.max() and throughs.min() < hits.max())
 
     def _open_along(self, lines: Sequence[FloatArray], keyframes: Sequence[Keyframe]) -> list[FloatArray]:
         """List for each line the places in it that keyframes went through near its normal, which it tells best."""
@@ -218,22 +281,10 @@ class Panes:
             on.append(a + np.arange(-FARTHEST, length + FARTHEST, self._resolution)[:, None] * along)
             facing.append(np.broadcast_to(np.array([-along[1], along[0]]), on[-1].shape))
         places, normals = np.concatenate(on), np.concatenate(facing)
-        said = np.stack([self._codes(keyframe, places, normals) for keyframe in keyframes])
-        hit, _, past, _ = self._count_viewpoints(said, self._sensors)
+        said = self._said_by(keyframes, range(len(keyframes)), places, normals, 0)
+        hit, _, past, _ = said.count_viewpoints(self._sensors, len(places))
         opened = np.split(past > hit, np.cumsum([len(some) for some in on])[:-1])
         return [some[here] for some, here in zip(on, opened, strict=True)]
-
-    @staticmethod
-    def _count_viewpoints(said: npt.NDArray[np.int8], sensors: FloatArray) -> list[IntArray]:
-        """Count for each code from how many viewpoints keyframes said it, shape (n,) each; ``said`` as above."""
-        _, viewpoints = np.unique(np.floor(sensors / VIEWPOINT), axis=0, return_inverse=True)
-        viewpoints = viewpoints.ravel()
-        order = np.argsort(viewpoints, kind="stable")
-        firsts, said = np.flatnonzero(np.diff(viewpoints[order], prepend=-1)), said[order]
-        return [
-            np.count_nonzero(np.logical_or.reduceat(said == code, firsts, axis=0), axis=0)
-            for code in (HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE)
-        ]
 
 
 def _alike(line: FloatArray, others: FloatArray) -> FloatArray | None:

@@ -41,8 +41,9 @@ if TYPE_CHECKING:
 
 # A map every so often: what the eye can follow [s].
 MAP_PERIOD = 2.0
-# Maps of more than five million cells come less often, or the recording would take longer than the run [s per cell].
-PERIOD_A_CELL = MAP_PERIOD / 5e6
+# Larger maps come less often, by the square of their size in cells: a larger one takes longer to drive through and to
+# draw (one of 40 million cells 25 s, when a loop has moved all of it).
+LARGE_MAP = 5_000_000
 NOTHING = np.zeros((0, 2))
 MAPS = {"closed": "map with its closed doors", "predicted": "predicted map", "truth": "true map"}
 
@@ -184,7 +185,7 @@ class Recorder:
         if not final and not self.wants_map(stamp):
             return
         first, self._last_map = not self._holds.mapping, stamp
-        self._map_period = max(MAP_PERIOD, PERIOD_A_CELL * grid.cells.size)
+        self._map_period = MAP_PERIOD * max(1.0, grid.cells.size / LARGE_MAP) ** 2
         self._stream.at(stamp, self._stage)
         self._stream.log("map/grid", drawables.grid_map(grid))
         if first:
