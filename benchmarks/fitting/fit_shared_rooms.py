@@ -7,7 +7,7 @@ FIT and CHOOSE are folders of samples, as ``drawn_maps.py`` writes them; a build
 three maps those with rooms of several doors count all, of the others every ``--every``-th. What is printed beside the
 weights was found with other buildings (eight folds over groups of buildings), and on samples of the use ``choose``. The
 method ``learned`` has weights of its own (``predictor/learned/ratings.py``): what it measures holds what its network
-says.
+says. The program's are of 318 maps drawn in this way, 88 of them with a room of several doors; others counted twice.
 """
 
 import argparse

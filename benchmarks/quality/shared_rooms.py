@@ -124,8 +124,8 @@ def main() -> None:
     options = parser.parse_args()
     heads = [
         "world", "rooms with several doors", "pairs of their doors", "joined", f"pairs to two rooms within {NEAR:g} m",
-        "joined wrongly", "IoU of rooms with several doors", "of these, without joining", "IoU of rooms with one door",
-        "of those, without joining",
+        "joined wrongly", "IoU of rooms with several doors", "of these without joining", "IoU of rooms with one door",
+        "of those without joining",
     ]  # fmt: skip
     print(f"| {' | '.join(heads)} |\n| --- | {'---: | ' * (len(heads) - 1)}", flush=True)
     whole = Tally()

@@ -24,10 +24,10 @@ BESIDE_DOOR = in_cells(3.0)
 # So many of the strongest positions of a side are tried, so far apart [cells], with so much wall at least [cells].
 STRONGEST, APART, LEAST = 12, in_cells(0.2), 8.0
 # Sides are tried where nothing shows any, too: so far from the door [cells], and so far before the next door of the
-# wall: a wall further, and right before it. Backs are tried at the depths that rooms often have, and closets [cells].
-SIDES = tuple(in_cells(width) for width in (0.5, 0.9, 1.4, 2.0, 4.0))
+# wall: a wall further, and right before it. Backs are tried at the depths that rooms often have [cells].
+SIDES = tuple(in_cells(width) for width in (0.5, 2.0, 4.0))
 BEFORE_NEXT, AT_NEXT = in_cells(0.6), in_cells(0.4)
-BACKS = tuple(in_cells(depth) for depth in (1.1, 1.6, 2.0, 2.5, 3.5, 4.5, 5.5, 6.5, 8.0, 10.0))
+BACKS = tuple(in_cells(depth) for depth in (2.5, 3.5, 4.5, 5.5, 6.5, 8.0, 10.0))
 
 NONE = np.zeros(0, dtype=np.int64)
 

@@ -121,10 +121,12 @@ def rate_shared(proposals: Proposals, thickness: int) -> dict[Doors, float]:
 def group_doors(rated: Mapping[Doors, float], proposals: Proposals) -> dict[Doors, Hypotheses]:
     """Group doors into rooms with several, no door twice, with the rectangles of each room.
 
-    The larger sets go first: that all of some doors share a room is never likelier than that two of them do.
+    The sets that promise most go first: by how many rooms they save and by how much likelier they are than needed, so
+    that three doors that are just likely enough part no likely pair.
     """
     groups: dict[Doors, Hypotheses] = {}
-    for doors, chance in sorted(rated.items(), key=lambda item: (-len(item[0]), -round(item[1], 9), item[0])):
-        if chance > SHARED and not any({*doors} & {*other} for other in groups):
+    promise = {doors: (len(doors) - 1) * (chance - SHARED) for doors, chance in rated.items()}
+    for doors, worth in sorted(promise.items(), key=lambda item: (-round(item[1], 9), item[0])):
+        if worth > 0.0 and not any({*doors} & {*other} for other in groups):
             groups[doors] = join_hypotheses(proposals.shared[doors])
     return groups

@@ -13,7 +13,7 @@ from closedrooms.predictor.best.door_pose import DoorsSeen, FramedDoor
 from closedrooms.predictor.best.hypotheses import Hypotheses, Proposals
 from closedrooms.predictor.best.method import predict_best
 from closedrooms.predictor.best.selection import find_rivals
-from closedrooms.predictor.best.shared_rooms import group_doors
+from closedrooms.predictor.best.shared_rooms import SHARED, group_doors
 from closedrooms.predictor.config import BestConfig
 from closedrooms.predictor.methods import predict
 from closedrooms.predictor.prediction import Prediction
@@ -177,12 +177,15 @@ def _options(scores: list[float]) -> Hypotheses:
     return Hypotheses(boxes, corners, np.array(scores), 0.0, 0, 5.0, 0.0, np.zeros((count, 3)))
 
 
-def test_larger_sets_of_doors_go_first_and_no_door_goes_twice() -> None:
+def test_sets_of_doors_that_promise_most_go_first_and_no_door_goes_twice() -> None:
     shared = {doors: [_options([1.0])] for doors in ((0, 1), (1, 2), (0, 1, 2), (3, 4), (4, 5))}
     proposals = Proposals([_options([2.0, 1.0])] * 6, shared)
     rated = {(0, 1): 0.95, (1, 2): 0.9, (0, 1, 2): 0.85, (3, 4): 0.82, (4, 5): 0.88}
     assert set(group_doors(rated, proposals)) == {(0, 1, 2), (4, 5)}
-    assert set(group_doors(rated | {(0, 1, 2): 0.2}, proposals)) == {(0, 1), (4, 5)}
+    # Three doors that are just likely enough part no likely pair; what is not likely enough is nothing.
+    for chance in (0.5, SHARED):
+        assert set(group_doors(rated | {(0, 1, 2): chance}, proposals)) == {(0, 1), (4, 5)}
+    assert group_doors(dict.fromkeys(rated, SHARED), proposals) == {}
 
 
 def test_what_a_room_is_thought_to_be_adds_up_to_one() -> None:
