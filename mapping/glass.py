@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from closedrooms.core.arrays import FloatArray, IntArray
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.graph.keyframe import Keyframe
@@ -98,7 +98,9 @@ class Panes:
         at = [pose @ glimpse.keyframe_T_robot for pose, glimpse in zip(poses, new, strict=True)]
         self._driven = np.concatenate((self._driven, np.array([(p.x, p.y) for p in at]).reshape(-1, 2)))
         # What was met near its normal, and scans went through it all the same.
-        places, normals = self._met.near_normal(*evidence.crossed(SOLID, share=CROSSED_SHARE), OBLIQUE)
+        within = _corners(evidence.grid().frame) if last else None
+        asked = evidence.crossed(SOLID, share=CROSSED_SHARE, within=within)
+        places, normals = self._met.near_normal(*asked, OBLIQUE)
         if len(places):
             self._places = np.concatenate((self._places, places))
             self._normals = np.concatenate((self._normals, normals))
@@ -234,6 +236,12 @@ class Panes:
             np.count_nonzero(np.logical_or.reduceat(said == code, firsts, axis=0), axis=0)
             for code in (HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE)
         ]
+
+
+def _corners(frame: GridFrame) -> tuple[FloatArray, FloatArray]:
+    """Compute the middles of the lower left and the upper right cell of a map, ``(x, y)`` [m]."""
+    ends = frame.to_points(np.array([(0, 0), (frame.rows - 1, frame.cols - 1)]))
+    return ends[0], ends[1]
 
 
 def _alike(line: FloatArray, others: FloatArray) -> FloatArray | None:
