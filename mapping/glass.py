@@ -184,7 +184,7 @@ class Panes:
         # In the order in which they were met, not in that in which they were asked about.
         order = np.argsort(self._asked)
         places, normals = self._places[self._asked[order]], self._normals[self._asked[order]]
-        hit, askew, past, through = (counts[order] for counts in self._count_viewpoints(self._said, self._sensors))
+        hit, askew, past, through = self._count_viewpoints(self._said, self._sensors)[:, order]
         hit = np.maximum(hit, 1)  # a glimpse between two keyframes at least
         glass = (past <= DOUBT * hit) & (through >= SEEN_THROUGH) & (askew <= DOUBT * through)
         no_pane = (past > 1) & (past > hit)
@@ -226,16 +226,15 @@ class Panes:
         return [some[here] for some, here in zip(on, opened, strict=True)]
 
     @staticmethod
-    def _count_viewpoints(said: npt.NDArray[np.int8], sensors: FloatArray) -> list[IntArray]:
-        """Count for each code from how many viewpoints keyframes said it, shape (n,) each; ``said`` as above."""
+    def _count_viewpoints(said: npt.NDArray[np.int8], sensors: FloatArray) -> IntArray:
+        """Count from how many viewpoints keyframes said each code, shape (codes, n); ``said`` as above."""
         _, viewpoints = np.unique(np.floor(sensors / VIEWPOINT), axis=0, return_inverse=True)
         viewpoints = viewpoints.ravel()
-        order = np.argsort(viewpoints, kind="stable")
-        firsts, said = np.flatnonzero(np.diff(viewpoints[order], prepend=-1)), said[order]
-        return [
-            np.count_nonzero(np.logical_or.reduceat(said == code, firsts, axis=0), axis=0)
-            for code in (HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE)
-        ]
+        rows, cols = np.nonzero(said)
+        spoken = np.zeros((PAST_OBLIQUE + 1, int(viewpoints.max(initial=0)) + 1, said.shape[1]), dtype=np.bool_)
+        spoken[said[rows, cols], viewpoints[rows], cols] = True
+        counts: IntArray = spoken[HIT_NEAR:].sum(axis=1)
+        return counts
 
 
 def _corners(frame: GridFrame) -> tuple[FloatArray, FloatArray]:
