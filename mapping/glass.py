@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.graph.keyframe import Keyframe
@@ -145,7 +145,9 @@ class Panes:
         at = [pose @ glimpse.keyframe_T_robot for pose, glimpse in zip(poses, new, strict=True)]
         self._driven = np.concatenate((self._driven, np.array([(p.x, p.y) for p in at]).reshape(-1, 2)))
         # What was met near its normal, and scans went through it all the same.
-        places, normals = self._met.near_normal(*evidence.crossed(SOLID, share=CROSSED_SHARE), OBLIQUE)
+        within = _corners(evidence.grid().frame) if last else None
+        asked = evidence.crossed(SOLID, share=CROSSED_SHARE, within=within)
+        places, normals = self._met.near_normal(*asked, OBLIQUE)
         if len(places):
             self._places = np.concatenate((self._places, places))
             self._normals = np.concatenate((self._normals, normals))
@@ -285,6 +287,12 @@ class Panes:
         hit, _, past, _ = said.count_viewpoints(self._sensors, len(places))
         opened = np.split(past > hit, np.cumsum([len(some) for some in on])[:-1])
         return [some[here] for some, here in zip(on, opened, strict=True)]
+
+
+def _corners(frame: GridFrame) -> tuple[FloatArray, FloatArray]:
+    """Compute the middles of the lower left and the upper right cell of a map, ``(x, y)`` [m]."""
+    ends = frame.to_points(np.array([(0, 0), (frame.rows - 1, frame.cols - 1)]))
+    return ends[0], ends[1]
 
 
 def _alike(line: FloatArray, others: FloatArray) -> FloatArray | None:

@@ -36,13 +36,15 @@ class GlassWorld(SegmentWorld):
         return np.where(incidence < SEEN, np.minimum(solid, pane), solid)
 
 
-def mapped(world: SegmentWorld, route: list[tuple[float, float]], *, glass: bool = True) -> tuple[OccupancyGrid, Pose2]:
-    """Map a drive, drawing now and then; returns the map and where the world lies in it."""
+def mapped(
+    world: SegmentWorld, route: list[tuple[float, float]], *, glass: bool = True, drawn: int = 5
+) -> tuple[OccupancyGrid, Pose2]:
+    """Map a drive, drawing every so many scans; returns the map and where the world lies in it."""
     drive = world.drive(route, noise=0.01, beams=720)
     mapper = Mapper(MapperConfig(glass=glass))
     for number, (scan, odometry) in enumerate(zip(drive.scans, drive.odometry, strict=True)):
         mapper.process(scan, Pose2(*odometry))
-        if number % 5 == 0:
+        if number % drawn == 0:
             mapper.grid()
     mapper.finish()
     (x0, y0), (x1, y1) = route[:2]
@@ -78,6 +80,12 @@ def test_without_it_the_room_behind_is_mapped_through_the_pane() -> None:
     grid, map_T_world = mapped(GlassWorld(HALL), ROUTE, glass=False)
     assert known_share(grid, map_T_world, ROOM_BEHIND) > 0.5
     assert occupied_share(grid, map_T_world, PANE) < 0.7
+
+
+def test_the_last_map_does_not_depend_on_how_often_it_was_drawn_before() -> None:
+    pane = (0.8, 6.0, 2.0, 6.0)
+    often, seldom = (mapped(GlassWorld(walls_beside(pane), pane), ROUTE, drawn=drawn)[0] for drawn in (5, 10**6))
+    assert (often.on(seldom.frame).cells == seldom.cells).all()
 
 
 def test_a_slanted_pane_is_one_too() -> None:
