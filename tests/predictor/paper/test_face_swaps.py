@@ -107,10 +107,8 @@ def test_of_ways_that_are_as_good_the_one_with_the_fewest_swaps_is_taken(faces):
     assert growth.bounded == [False, False]
 
 
-@pytest.mark.parametrize("names", ["ab", "ba"])
-def test_one_face_is_swapped_rather_than_two_that_are_as_large_together(faces, names):
-    # Rows of 4, 2, 1 and 1 m; a has two columns of 2 and 4 m, b one of 4 m beside them: 48 and 32 m2. The second face
-    # of a, or its third and fourth, make them alike.
+def _columns(faces, names="ab"):
+    """Rows of 4, 2, 1 and 1 m; a has two columns of 2 and 4 m, b one of 4 m beside them: 48 and 32 m2."""
     arrangement = faces.cut(xs=(-6.0, -4.0, 0.0, 4.0), ys=(0.0, 4.0, 6.0, 7.0, 8.0))
     columns = [[faces.at(arrangement, x, y) for y in (2.0, 5.0, 6.5, 7.5)] for x in (-5.0, -2.0, 2.0)]
     unknown = np.zeros(len(arrangement.faces), dtype=np.bool_)
@@ -118,13 +116,29 @@ def test_one_face_is_swapped_rather_than_two_that_are_as_large_together(faces, n
     places = {"a": (-5.0, 2.0), "b": (2.0, 2.0)}
     doors = [faces.entrance(arrangement, name, places[name], (places[name][0], -2.0)) for name in names]
     growth = Growth(arrangement, unknown, doors)
+    growth.owner[columns[0] + columns[1]] = names.index("a")
+    growth.owner[columns[2]] = names.index("b")
+    return growth, columns
+
+
+@pytest.mark.parametrize("names", ["ab", "ba"])
+def test_one_face_is_swapped_rather_than_two_that_are_as_large_together(faces, names):
+    # The second face of a, or its third and fourth, make them alike.
+    growth, columns = _columns(faces, names)
     a, b = names.index("a"), names.index("b")
-    growth.owner[columns[0] + columns[1]] = a
-    growth.owner[columns[2]] = b
     swap_faces(growth, CONFIG)
     assert growth.owner[columns[1]].tolist() == [a, b, a, a]
     assert growth.owner[columns[0]].tolist() == [a] * 4
     assert growth.owner[columns[2]].tolist() == [b] * 4
+
+
+@pytest.mark.parametrize(("most", "owners"), [(1, [0, 0, 0, 0]), (2, [0, 1, 0, 0])])
+def test_the_largest_faces_are_those_that_may_be_swapped(faces, most, owners):
+    # The first has 16 m2: with it b would have as much too much as a has now. The second has 8 m2.
+    growth, columns = _columns(faces)
+    swap_faces(growth, PaperConfig(exact_candidates=most))
+    assert growth.owner[columns[1]].tolist() == owners
+    assert growth.bounded == [True, True]
 
 
 def test_rooms_as_large_as_each_other_stay_as_they_are(faces):
