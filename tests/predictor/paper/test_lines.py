@@ -83,6 +83,10 @@ def test_the_weighted_median_is_the_middle_of_the_values_each_as_often_as_it_wei
     assert _median(values, weights / 8) == pytest.approx(np.median(np.repeat(values, weights.astype(int))))
 
 
+def test_the_median_of_what_weighs_nothing_is_still_one_of_it():
+    assert _median(np.array([2.0]), np.array([0.0])) == 2.0
+
+
 def test_the_closest_neighbours_join_of_equal_gaps_those_with_most_wall():
     gaps = np.array([1.0, 0.5, 1.0, 0.5, 0.5])
 
