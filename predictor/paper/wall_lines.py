@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from closedrooms.core.arrays import FloatArray, IntArray, handed_over
 from closedrooms.core.grid import FREE, OCCUPIED, OccupancyGrid
 from closedrooms.predictor.config import FacesConfig
@@ -44,9 +46,7 @@ def find_structure(grid: OccupancyGrid, config: FacesConfig) -> WallLines | None
         rose = find_rose(grid)
         if rose is None:
             return None
-        walls = grid.cells.copy()
-        walls[grid.occupied & ~rose.structural] = FREE
-        walls[rose.structural] = OCCUPIED
+        walls = np.where(rose.structural, OCCUPIED, FREE).astype(np.int8)
         segments = find_segments(OccupancyGrid(grid.frame, handed_over(walls)), config.lines)
         directions = rose_directions(segments, rose, config.lines)
     else:
