@@ -8,6 +8,7 @@ from closedrooms.core.shapes import cells_inside
 from closedrooms.predictor.best.features import FEATURES
 from closedrooms.predictor.confidence.belief import Belief, Spread
 from closedrooms.predictor.confidence.calibration import Curve, calibration_of, read_calibrations
+from closedrooms.predictor.confidence.judge import judge
 from closedrooms.predictor.confidence.room_features import NAMES, measure_rooms
 from closedrooms.predictor.confidence.shape_variants import FACTORS, SAME, RoomVariants
 from closedrooms.predictor.config import FacesConfig
@@ -155,3 +156,19 @@ def test_variants_are_the_room_itself_and_longer_and_wider_ones(scene):
     assert areas[deeper] == pytest.approx(2 * room.polygon.area, rel=0.15)
     assert variants.inward == pytest.approx([0.0, -1.0], abs=0.05)
     assert variants.overlaps_with(room.polygon).argmax() == SAME
+
+
+def test_confidence_and_probabilities_are_told_to_six_digits(scene):
+    prediction = METHODS["best"].resolved_function(scene.grid, scene.doors, METHODS["best"].config())
+    usual, straight = calibration_of("best"), Curve(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
+    numbers = replace(
+        usual, weights=np.zeros_like(usual.weights), intercept=0.12345678, confidence=straight, nearest=straight
+    )
+    judged = judge("best", scene.grid, scene.doors, prediction, numbers)
+    assert {room.confidence for room in judged.rooms} == {0.123457}
+    for room, belief in zip(judged.rooms, prediction.beliefs, strict=True):
+        told = [other.probability for other in room.alternatives]
+        assert told == [round(other.probability, 6) for other in belief.alternatives]
+        assert any(round(value, 5) != value for value in told)
+    # What has been judged is not judged again.
+    assert judge("best", scene.grid, scene.doors, judged, numbers) is judged

@@ -9,7 +9,7 @@ from shapely.geometry import box
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.predictor.confidence.belief import Belief, Spread
-from closedrooms.predictor.confidence.room_features import NAMES, measure_rooms
+from closedrooms.predictor.confidence.room_features import NAMES, _mark_near, measure_rooms
 
 NOWHERE = Spread(np.zeros(2), np.array([1.0, 0.0]), 1.0, np.zeros((1, 1)))
 
@@ -83,3 +83,21 @@ def test_a_room_of_nothing_is_measured_as_a_speck_and_no_rooms_as_no_rows():
     )
     assert rows[:, len(NAMES) :].tolist() == [[7.0, 8.0], [9.0, 10.0]]
     assert rows[:, 0].tolist() == [0.1, 0.2]
+
+
+@pytest.mark.parametrize("place", [(2, 3, 3, 9), (2, 3, 9, 4), (-4, 1, -1, 2), (40, 3, 41, 5)])
+def test_cells_near_known_ones_are_marked_in_a_window_around_the_rooms(place):
+    # Half a metre are two cells; the window reaches a metre beyond the rooms.
+    rng = np.random.default_rng(0)
+    frame = GridFrame(0.25, 0.0, 0.0, 40, 50)
+    grid = OccupancyGrid(frame, np.where(rng.random((40, 50)) < 0.05, 0, -1).astype(np.int8))
+    window, near = _mark_near(grid, (Room(box(*place), ("d",)),))
+    col, row = math.floor((place[0] - 1.0) / 0.25), math.floor((place[1] - 1.0) / 0.25)
+    end_col, end_row = math.floor((place[2] + 1.0) / 0.25), math.floor((place[3] + 1.0) / 0.25)
+    assert window == frame.cropped(row, col, end_row - row + 1, end_col - col + 1)
+    known = np.argwhere(grid.known)
+    known = known[(known >= (row, col)).all(axis=1) & (known <= (end_row, end_col)).all(axis=1)]
+    for r, c in np.ndindex(near.shape):
+        apart = np.abs(known - (r + row, c + col)).max(axis=1).min(initial=9)
+        # A disc of two cells: one cell each way is in it, three are not.
+        assert near[r, c] if apart <= 1 else apart <= 2 or not near[r, c]
