@@ -8,9 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import box
 
-from closedrooms.core.grid import GridFrame
+from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
+from closedrooms.core.room import Room
 from closedrooms.predictor.confidence.belief import Belief, Spread, choose_diverse, share_nearest
 from closedrooms.predictor.confidence.judge import join_spreads
+from closedrooms.predictor.confidence.shape_variants import RoomVariants
 
 UPRIGHT, TURNED = np.array([1.0, 0.0]), np.array([0.0, 1.0])
 
@@ -129,3 +131,21 @@ def test_what_lies_between_the_lattice_of_the_map_is_joined_whole():
     assert joint[0].tolist() == pytest.approx([0.25, 0.5, 0.5, 0.25], abs=0.02)
     assert joint[1].tolist() == pytest.approx([0.5, 1.0, 1.0, 0.5], abs=0.02)
     assert joint[2].tolist() == pytest.approx([0.25, 0.5, 0.5, 0.25], abs=0.02)
+
+
+def test_shapes_may_grow_into_unknown_cells_a_wall_away_from_free_ones_and_not_into_walls():
+    rng = np.random.default_rng(2)
+    dice = rng.random((80, 80))
+    cells = np.where(dice < 0.02, FREE, np.where(dice < 0.2, OCCUPIED, UNKNOWN)).astype(np.int8)
+    # In cells of 0.2 m, as the raster has them.
+    grid = OccupancyGrid(GridFrame(0.2, -8.0, -8.0, 80, 80), cells)
+    room = Room(box(-1.0, 0.0, 1.0, 2.0), ("d",))
+    variants = RoomVariants(grid, room, (0.0, 0.0))
+    found = variants._find_open(grid)
+    at = grid.frame.to_cells(variants._centres())
+    inside = grid.frame.contains(at)
+    values = np.full(inside.shape, UNKNOWN)
+    values[inside] = cells[at[inside][:, 0], at[inside][:, 1]]
+    for row, col in np.ndindex(found.shape):
+        around = values[max(row - 1, 0) : row + 2, max(col - 1, 0) : col + 2]
+        assert found[row, col] == (not (around == FREE).any() and values[row, col] != OCCUPIED)
