@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely.geometry import box
+from shapely.geometry import Polygon, box
 
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.predictor.confidence.belief import Belief, Spread, choose_diverse, share_nearest
 from closedrooms.predictor.confidence.judge import join_spreads
-from closedrooms.predictor.confidence.shape_variants import RoomVariants
+from closedrooms.predictor.confidence.shape_variants import RoomVariants, _find_inward, _find_largest
 
 UPRIGHT, TURNED = np.array([1.0, 0.0]), np.array([0.0, 1.0])
 
@@ -149,3 +149,26 @@ def test_shapes_may_grow_into_unknown_cells_a_wall_away_from_free_ones_and_not_i
     for row, col in np.ndindex(found.shape):
         around = values[max(row - 1, 0) : row + 2, max(col - 1, 0) : col + 2]
         assert found[row, col] == (not (around == FREE).any() and values[row, col] != OCCUPIED)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 30.0, 100.0])
+@pytest.mark.parametrize("side", range(4))
+def test_the_way_into_a_room_leads_across_the_side_that_its_door_is_in(degrees, side):
+    # 6 x 2 m: doors off the middle of a side, a little outside of it.
+    places = [(1.5, -1.1), (3.1, 0.4), (-1.5, 1.1), (-3.1, -0.4)]
+    ways = [(0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.0)]
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    turn = np.array([[c, s], [-s, c]])
+    corners = np.array([(-3.0, -1.0), (3.0, -1.0), (3.0, 1.0), (-3.0, 1.0)]) @ turn + (7.0, -2.0)
+    found = _find_inward(Polygon(corners), np.array(places[side]) @ turn + (7.0, -2.0))
+    assert found == pytest.approx(np.array(ways[side]) @ turn)
+
+
+def test_of_several_pieces_the_largest_stays():
+    mask = np.zeros((9, 9), dtype=np.bool_)
+    mask[0:2, 0:2] = mask[4:8, 4:8] = True
+    mask[3, 3] = True  # a corner joins nothing
+    expected = np.zeros_like(mask)
+    expected[4:8, 4:8] = True
+    assert np.array_equal(_find_largest(mask), expected)
+    assert _find_largest(expected) is expected
