@@ -367,3 +367,30 @@ def test_tabu_search_refuses_more_places_than_it_has_memory_for(monkeypatch):
     monkeypatch.setattr(tour_planner, "MOST_TOGETHER", 20)
     with pytest.raises(InvalidInputError, match="30 vertices for the method ortools; expected at most 20"):
         solve_tour(_random_graph(8, 30, 15), TourConfig(method="ortools"))
+
+
+@pytest.mark.parametrize(
+    ("method", "asked"),
+    [
+        ("ortools", {"solutions": 7, "convergence": None, "seconds": None}),
+        ("paper", {"solutions": None, "convergence": 9, "seconds": 2.5}),
+    ],
+)
+def test_tabu_search_is_asked_as_its_method_says_and_is_optimal_where_the_bound_is_met(monkeypatch, method, asked):
+    config = TourConfig(method=method, solution_limit=7, convergence=9, seconds=2.5)
+    words = []
+
+    def at_random(distances, **options):
+        words.append(options)
+        return [0, *(np.random.default_rng(0).permutation(len(distances) - 1) + 1).tolist()], "time"
+
+    monkeypatch.setattr(tour_planner, "run_tabu_search", at_random)
+    poor = solve_tour(_random_graph(8, 30, 15), config)
+    assert words == [asked]
+    assert poor.length > 2.5 * poor.lower_bound
+    assert (poor.search, poor.method) == ("time", method)
+    # Along a path there and back is the shortest.
+    monkeypatch.setattr(tour_planner, "run_tabu_search", lambda distances, **_: (list(range(len(distances))), "time"))
+    line = make_graph(np.column_stack((np.arange(15.0), np.zeros(15))), np.array([(i, i + 1) for i in range(14)]))
+    best = solve_tour(line, config)
+    assert (best.search, best.length) == ("optimal", pytest.approx(28.0))
