@@ -14,7 +14,7 @@ from closedrooms.coverage.tour import biconnected, tour_planner
 from closedrooms.coverage.tour.biconnected import cut_block, find_blocks, measure_paths
 from closedrooms.coverage.tour.exact_tour import MOST_PLACES, find_shortest_tour
 from closedrooms.coverage.tour.local_search import LocalSearch, search_tour
-from closedrooms.coverage.tour.lower_bound import find_lower_bound
+from closedrooms.coverage.tour.lower_bound import _one_tree, find_lower_bound
 from closedrooms.coverage.tour.routing import find_christofides_tour, run_tabu_search
 from closedrooms.coverage.tour.tour_planner import solve_tour
 
@@ -380,17 +380,31 @@ def test_tabu_search_is_asked_as_its_method_says_and_is_optimal_where_the_bound_
     config = TourConfig(method=method, solution_limit=7, convergence=9, seconds=2.5)
     words = []
 
-    def at_random(distances, **options):
+    def a_little_worse(distances, **options):
         words.append(options)
-        return [0, *(np.random.default_rng(0).permutation(len(distances) - 1) + 1).tolist()], "time"
+        tour = find_christofides_tour(distances)
+        tour[5], tour[9] = tour[9], tour[5]
+        return tour, "time"
 
-    monkeypatch.setattr(tour_planner, "run_tabu_search", at_random)
+    monkeypatch.setattr(tour_planner, "run_tabu_search", a_little_worse)
     poor = solve_tour(_random_graph(8, 30, 15), config)
     assert words == [asked]
-    assert poor.length > 2.5 * poor.lower_bound
+    assert 1.05 * poor.lower_bound < poor.length < 1.9 * poor.lower_bound
     assert (poor.search, poor.method) == ("time", method)
     # Along a path there and back is the shortest.
     monkeypatch.setattr(tour_planner, "run_tabu_search", lambda distances, **_: (list(range(len(distances))), "time"))
     line = make_graph(np.column_stack((np.arange(15.0), np.zeros(15))), np.array([(i, i + 1) for i in range(14)]))
     best = solve_tour(line, config)
     assert (best.search, best.length) == ("optimal", pytest.approx(28.0))
+
+
+@given(seed=st.integers(0, 10_000), n=st.integers(4, 12))
+@settings(max_examples=30, deadline=None)
+def test_a_one_tree_is_a_spanning_tree_without_the_first_vertex_and_its_two_shortest_edges(seed, n):
+    weights = _distances(_points(seed, n))
+    total, degrees = _one_tree(weights)
+    tree = nx.minimum_spanning_tree(nx.from_numpy_array(weights[1:, 1:]))
+    two = np.argsort(weights[0, 1:])[:2]
+    assert total == pytest.approx(tree.size(weight="weight") + weights[0, 1:][two].sum())
+    expected = np.array([2, *(tree.degree(v) + (v in two) for v in range(n - 1))])
+    assert degrees.tolist() == expected.tolist()
