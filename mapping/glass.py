@@ -7,20 +7,20 @@ normal and none of the others; what moves returns the same beams now and not the
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
-from closedrooms.core.arrays import FloatArray, IntArray
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.graph.keyframe import Keyframe
-from closedrooms.mapping.lattice import grown
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
 from closedrooms.mapping.met_surfaces import Glimpse, MetSurfaces
-from closedrooms.mapping.scan_view import View
+from closedrooms.mapping.pane_lines import FARTHEST, FRAME, LENGTH, WIDE, draw_lines, extend_line, find_candidates
+from closedrooms.mapping.scan_view import LATERAL, View
 
 NEAR, OBLIQUE = math.radians(9.0), math.radians(22.0)
 """Incidence up to which a pane returns every beam, and from which on it returns none [rad]."""
@@ -28,32 +28,72 @@ ASKEW = math.radians(30.0)
 """Incidence from which on a beam that ends there tells a wall [rad]: normals are known to some 8 degrees."""
 DEPTH = 0.15
 """Distance from a place up to which a beam that ends there hits it [m]: three cells; twice as far it went past."""
+EXACT = 0.08
+"""The same of a beam that meets it askew [m]: the end of a wall beside a pane is hit not far beyond."""
 REACH = 12.0
 """Distance from which a scan says something about a place [m]."""
+CROSSED_SHARE = 0.1
+"""Scans that went through a place, for each that saw a surface there, from which on it is asked about."""
 SEEN_THROUGH = 1
 """Fewest scans that went through it at an angle."""
 DOUBT = 0.34
 """Scans of the wrong kind for each of the right kind from which on a place is no pane."""
-LENGTH = 0.5
-"""Shortest pane [m]: a person is 0.4 m wide."""
-FEWEST = 4
-"""Fewest places of a pane."""
-THICK = 0.12
-"""Standard deviation across a pane up to which its cells are in line [m]: walls are seen from both sides."""
 SOLID = 0.10
 """Distance from a solid surface up to which what was seen through is its noise [m]."""
-FRAME = 0.5
-"""How far beyond what was hit a pane goes on up to the solid wall in its line [m]: less than a door is wide."""
-MARGIN = 0.05
-"""How far a pane goes on in any case [m]: a cell, or beams slip through between its end and the wall."""
-FARTHEST = 2.0
-"""How far beyond what was hit a pane goes on at most, all in all [m]."""
-SAMPLES = 16
-"""Places on a pane at which a scan is asked whether it went through."""
+VIEWPOINT = 0.2
+"""Size of the squares of which each counts as one place to see from [m]: a robot that turns on the spot learns nothing
+new of what it hits."""
 CHANGED = 0.10
 """Change of an end of a pane from which on the scans are drawn anew [m]."""
 
 HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE = 1, 2, 3, 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Said:
+    """What keyframes say about places: entries, shape (n,) each; about most places a keyframe says nothing.
+
+    Attributes:
+        keyframes: Index of the keyframe.
+        places: Index of the place.
+        codes: One of the codes above.
+    """
+
+    keyframes: npt.NDArray[np.int32]
+    places: npt.NDArray[np.int32]
+    codes: npt.NDArray[np.int8]
+
+    @staticmethod
+    def joined(parts: Sequence["Said"]) -> "Said":
+        """Join entries."""
+        return Said(
+            np.concatenate([part.keyframes for part in parts]),
+            np.concatenate([part.places for part in parts]),
+            np.concatenate([part.codes for part in parts]),
+        )
+
+    def kept(self, chosen: BoolArray) -> "Said":
+        """Keep some entries, shape (n,)."""
+        return Said(self.keyframes[chosen], self.places[chosen], self.codes[chosen])
+
+    def count_viewpoints(self, sensors: FloatArray, count: int) -> list[IntArray]:
+        """Count for each code from how many viewpoints keyframes said it of each place, shape (count,) each.
+
+        Args:
+            sensors: Where the keyframes were taken, shape (keyframes, 2) [m].
+            count: Number of places.
+        """
+        _, viewpoints = np.unique(np.floor(sensors / VIEWPOINT), axis=0, return_inverse=True)
+        seen_from = viewpoints.ravel()[self.keyframes]
+        counts = []
+        for code in (HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE):
+            mine = self.codes == code
+            once = np.unique(self.places[mine] * np.int64(len(sensors)) + seen_from[mine])
+            counts.append(np.bincount(once // max(len(sensors), 1), minlength=count))
+        return counts
+
+
+NOTHING_SAID = Said(np.zeros(0, dtype=np.int32), np.zeros(0, dtype=np.int32), np.zeros(0, dtype=np.int8))
 
 
 class Panes:
@@ -71,88 +111,100 @@ class Panes:
         self._places: FloatArray = np.zeros((0, 2))
         self._normals: FloatArray = np.zeros((0, 2))
         self._asked: IntArray = np.zeros(0, dtype=np.int64)
-        # What keyframes (rows) say about the places that are asked about (columns): one of the codes above, or 0.
-        self._said: npt.NDArray[np.int8] = np.zeros((0, 0), dtype=np.int8)
+        # What keyframes say about the places that are asked about, and so many of those.
+        self._said, self._told = NOTHING_SAID, 0
         self._said_from: list[Pose2] = []
         self._sensors: FloatArray = np.zeros((0, 2))
+        self._driven: FloatArray = np.zeros((0, 2))
         self.segments: FloatArray = np.zeros((0, 2, 2))
 
     def glimpse(self, glimpse: Glimpse) -> None:
         """Take note of the surfaces that a scan met."""
         self._glimpses.append(glimpse)
 
-    def update(self, keyframes: Sequence[Keyframe], evidence: EvidenceGrid, *, moved: bool) -> FloatArray:
+    def update(
+        self, keyframes: Sequence[Keyframe], evidence: EvidenceGrid, *, moved: bool, last: bool = False
+    ) -> FloatArray:
         """Take in what was seen since, and find the panes.
 
         Args:
             keyframes: All of them.
             evidence: The map as it stands, drawn.
             moved: Whether poses were corrected since.
+            last: Whether nothing more will be seen.
 
         Returns:
             The panes that are new, gone or of another length, as they were and as they are, shape (n, 2, 2).
         """
         if moved:
             self._met.clear()
+            self._driven = self._driven[:0]
         new = self._glimpses[len(self._met) :]
-        self._met.add(new, [keyframes[glimpse.keyframe].pose for glimpse in new])
+        poses = [keyframes[glimpse.keyframe].pose for glimpse in new]
+        self._met.add(new, poses)
+        at = [pose @ glimpse.keyframe_T_robot for pose, glimpse in zip(poses, new, strict=True)]
+        self._driven = np.concatenate((self._driven, np.array([(p.x, p.y) for p in at]).reshape(-1, 2)))
         # What was met near its normal, and scans went through it all the same.
-        places, normals = self._met.near_normal(*evidence.crossed(SOLID), OBLIQUE)
+        within = _corners(evidence.grid().frame) if last else None
+        asked = evidence.crossed(SOLID, share=CROSSED_SHARE, within=within)
+        places, normals = self._met.near_normal(*asked, OBLIQUE)
         if len(places):
             self._places = np.concatenate((self._places, places))
             self._normals = np.concatenate((self._normals, normals))
-            self._asked = np.concatenate((self._asked, np.setdiff1d(self._in_question(), self._asked)))
+            self._asked = np.concatenate(
+                (self._asked, np.setdiff1d(find_candidates(self._places, self._resolution), self._asked))
+            )
         if not len(self._asked):
             return self.segments[:0]
         self._ask(keyframes)
-        before, found = self.segments, self._find(evidence.grid())
+        before, found = self.segments, self._find(evidence.grid(), keyframes, last=last)
         # A pane that is as before keeps its ends, so that nothing is drawn anew for it.
-        kept = [_like(line, before) for line in found]
+        kept = [_alike(line, before) for line in found]
         self.segments = np.array([line if old is None else old for line, old in zip(found, kept, strict=True)])
         self.segments = self.segments.reshape(-1, 2, 2)
-        gone = [line for line in before if _like(line, self.segments) is None]
+        gone = [line for line in before if _alike(line, self.segments) is None]
         new = [line for line, old in zip(found, kept, strict=True) if old is None]
         return np.array(gone + new).reshape(-1, 2, 2)
 
-    def _in_question(self) -> IntArray:
-        """List the places that could be on a pane, or where one could go on: few are so many side by side."""
-        reach = FARTHEST + FRAME
-        near = np.zeros(len(self._places), dtype=np.bool_)
-        groups = _groups(self._places, self._resolution)
-        order = np.argsort(groups, kind="stable")
-        firsts = np.flatnonzero(np.diff(groups[order], prepend=-1))
-        lows = np.minimum.reduceat(self._places[order], firsts, axis=0)
-        highs = np.maximum.reduceat(self._places[order], firsts, axis=0)
-        large = np.diff(firsts, append=len(groups)) >= FEWEST
-        large &= np.hypot(*(highs - lows).T) >= LENGTH
-        for low, high in zip(lows[large], highs[large], strict=True):
-            near |= ((self._places > low - reach) & (self._places < high + reach)).all(axis=1)
-        return np.flatnonzero(near)
-
     def _ask(self, keyframes: Sequence[Keyframe]) -> None:
         """Bring up to date what the keyframes say about the places: new ones about all, the others about new ones."""
-        rows, cols = self._said.shape
-        self._said = grown(self._said, ((0, len(keyframes) - rows), (0, len(self._asked) - cols)))
+        rows, cols = len(self._said_from), self._told
         poses = [keyframe.pose for keyframe in keyframes]
         anew = [k for k, (pose, said) in enumerate(zip(poses, self._said_from, strict=False)) if pose is not said]
         anew += range(rows, len(keyframes))
-        self._said_from = poses
+        self._said_from, self._told = poses, len(self._asked)
         self._sensors = np.concatenate((self._sensors, np.zeros((len(keyframes) - rows, 2))))
         for k in anew:
             self._sensors[k] = poses[k].transform(keyframes[k].beams.origin[None])[0]
-        self._ask_some(keyframes, anew, 0)
-        if cols < len(self._asked):
-            self._ask_some(keyframes, np.setdiff1d(np.arange(rows), anew).tolist(), cols)
+        places, normals = self._places[self._asked], self._normals[self._asked]
+        still = np.ones(len(keyframes), dtype=np.bool_)
+        still[anew] = False
+        self._said = Said.joined(
+            [
+                self._said.kept(still[self._said.keyframes]),
+                self._said_by(keyframes, anew, places, normals, 0),
+                self._said_by(keyframes, np.flatnonzero(still).tolist(), places, normals, cols),
+            ]
+        )
 
-    def _ask_some(self, keyframes: Sequence[Keyframe], chosen: Sequence[int], first: int) -> None:
-        """Find what some keyframes, by their indices, say about the places from the ``first`` one asked about on."""
-        asked = self._asked[first:]
-        places, normals = self._places[asked], self._normals[asked]
-        self._said[chosen, first:] = 0
-        middle, reach = (places.min(axis=0) + places.max(axis=0)) / 2.0, np.ptp(places, axis=0) / 2.0 + REACH
-        in_reach = (np.abs(self._sensors[chosen] - middle) < reach).all(axis=1)
-        for k in np.asarray(chosen)[in_reach].tolist():
-            self._said[k, first:] = self._codes(keyframes[k], places, normals)
+    def _said_by(
+        self, keyframes: Sequence[Keyframe], chosen: Sequence[int], places: FloatArray, normals: FloatArray, first: int
+    ) -> Said:
+        """Find what some keyframes, by their indices, say about places, shape (n, 2), from the ``first`` one on."""
+        parts = [NOTHING_SAID]
+        # Places from left to right: those within reach of a keyframe stand side by side.
+        order = first + np.argsort(places[first:, 0], kind="stable")
+        x = places[order, 0]
+        sensors = self._sensors[chosen, 0]
+        begins, ends = np.searchsorted(x, sensors - REACH), np.searchsorted(x, sensors + REACH, side="right")
+        for k, begin, end in zip(chosen, begins.tolist(), ends.tolist(), strict=True):
+            if begin < end:
+                asked = order[begin:end]
+                codes = self._codes(keyframes[k], places[asked], normals[asked])
+                told = np.flatnonzero(codes)
+                who = np.full(len(told), k, dtype=np.int32)
+                parts.append(Said(who, asked[told].astype(np.int32), codes[told]))
+        return Said.joined(parts)
 
     def _view(self, keyframe: Keyframe) -> View:
         if keyframe.index not in self._views:
@@ -161,10 +213,7 @@ class Panes:
 
     def seen_through(self, keyframe: Keyframe, segments: FloatArray) -> bool:
         """Check whether beams of a keyframe went through one of the panes, map frame, shape (n, 2, 2) [m]."""
-        shares = np.linspace(0.0, 1.0, SAMPLES)[:, None, None]
-        places = segments[:, 0] + shares * (segments[:, 1] - segments[:, 0])
-        local = keyframe.pose.inverse().transform(places.reshape(-1, 2))
-        return bool(np.any(self._view(keyframe).beyond(local, 0.0) > DEPTH))
+        return before_glass(keyframe.beams, keyframe.pose, segments) is not keyframe.beams
 
     def _codes(
         self, keyframe: Keyframe, places: FloatArray, normals: FloatArray
@@ -176,14 +225,15 @@ class Panes:
         if not len(near):
             return codes
         view, local = self._view(keyframe), keyframe.pose.inverse().transform(places[near])
-        beyond = view.beyond(local)
         met = np.abs((offsets[near] * normals[near]).sum(axis=1)) / np.maximum(away[near], 1e-9)
         incidence = np.arccos(np.minimum(met, 1.0))
+        # A place that lies before or behind the pane by the noise is seen as far aside as the pane is askew.
+        beyond = view.beyond(local, LATERAL * np.where(incidence < OBLIQUE, 1.0, np.sin(incidence)))
         with np.errstate(invalid="ignore"):
             hit, past = np.abs(beyond) <= DEPTH, beyond > 2.0 * DEPTH
         # Of a place that is near, so many beams are beside it that some meet the pane near its normal.
         askew = np.flatnonzero(hit & (incidence >= ASKEW))
-        hit[askew] = np.abs(view.beyond(local[askew], 0.0)) <= DEPTH
+        hit[askew] = np.abs(view.beyond(local[askew], 0.0)) <= EXACT
         found = np.zeros(len(near), dtype=np.int8)
         found[hit & (incidence < OBLIQUE)] = HIT_NEAR
         found[hit & (incidence >= ASKEW)] = HIT_OBLIQUE
@@ -192,94 +242,60 @@ class Panes:
         codes[near] = found
         return codes
 
-    def _find(self, grid: OccupancyGrid) -> FloatArray:
+    def _find(self, grid: OccupancyGrid, keyframes: Sequence[Keyframe], *, last: bool) -> FloatArray:
         # In the order in which they were met, not in that in which they were asked about.
         order = np.argsort(self._asked)
         places, normals = self._places[self._asked[order]], self._normals[self._asked[order]]
-        codes = (HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE)
-        hit, askew, past, through = (np.count_nonzero(self._said == code, axis=0)[order] for code in codes)
+        hit, askew, past, through = (counts[order] for counts in self._said.count_viewpoints(self._sensors, self._told))
         hit = np.maximum(hit, 1)  # a glimpse between two keyframes at least
         glass = (past <= DOUBT * hit) & (through >= SEEN_THROUGH) & (askew <= DOUBT * through)
         no_pane = (past > 1) & (past > hit)
-        lines = _lines(places[glass], normals[glass], self._resolution)
         may_be = places[~no_pane & (through >= SEEN_THROUGH)]
-        segments = [self._extended(line, grid, places[no_pane], may_be) for line in lines]
+        lines = draw_lines(places[glass], normals[glass], self._resolution)
+        opened = self._open_along(lines, keyframes) if last else [places[no_pane]] * len(lines)
+        segments = []
+        for line, against in zip(lines, opened, strict=True):
+            long = math.dist(*line) >= LENGTH
+            gap = WIDE if last and long else FRAME
+            segment, bounded = extend_line(line, grid, may_be, against, self._driven, gap)
+            if long or (bounded and self._alternates(line)):
+                segments.append(segment)
         return np.array(segments).reshape(-1, 2, 2)
 
-    @staticmethod
-    def _extended(line: FloatArray, grid: OccupancyGrid, no_pane: FloatArray, may_be: FloatArray) -> FloatArray:
-        """Let a pane go on up to the solid wall in its line, where no scan speaks against it."""
-        along = line[1] - line[0]
-        along = along / np.hypot(*along)
-        across = np.array([-along[1], along[0]])
-        frame, occupied = grid.frame, grid.occupied
-        step = frame.resolution
-        ends = []
-        for end, direction in ((line[0], -along), (line[1], along)):
-            solid = 0.0
-            for t in np.arange(step, FARTHEST, step):
-                place = end + t * direction
-                if t - solid > FRAME or (len(no_pane) and np.hypot(*(no_pane - place).T).min() < step):
-                    break
-                cells = frame.to_cells(place + np.array([-step, 0.0, step])[:, None] * across)
-                inside = ((cells >= 0) & (cells < np.array(frame.shape))).all(axis=1)
-                if occupied[cells[inside, 0], cells[inside, 1]].any() or np.hypot(*(may_be - place).T).min() < step:
-                    solid = float(t)
-            ends.append(end + (solid + MARGIN) * direction)
-        return np.array(ends)
+    def _alternates(self, line: FloatArray) -> bool:
+        """Check that a pane was not only hit before it was gone through, or after: as who stood there and left."""
+        places = self._places[self._asked]
+        on_line = (np.hypot(*(places - line[0]).T) + np.hypot(*(places - line[1]).T)) < math.dist(*line) + DEPTH
+        said = self._said.kept(on_line[self._said.places])
+        hits, throughs = (said.keyframes[said.codes == code] for code in (HIT_NEAR, PAST_OBLIQUE))
+        if not (len(hits) and len(throughs)):
+            return False
+        return bool(hits.min() < throughs.max() and throughs.min() < hits.max())
+
+    def _open_along(self, lines: Sequence[FloatArray], keyframes: Sequence[Keyframe]) -> list[FloatArray]:
+        """List for each line the places in it that keyframes went through near its normal, which it tells best."""
+        if not lines:
+            return []
+        on, facing = [], []
+        for a, b in lines:
+            length = math.dist(a, b)
+            along = (b - a) / length
+            on.append(a + np.arange(-FARTHEST, length + FARTHEST, self._resolution)[:, None] * along)
+            facing.append(np.broadcast_to(np.array([-along[1], along[0]]), on[-1].shape))
+        places, normals = np.concatenate(on), np.concatenate(facing)
+        said = self._said_by(keyframes, range(len(keyframes)), places, normals, 0)
+        hit, _, past, _ = said.count_viewpoints(self._sensors, len(places))
+        opened = np.split(past > hit, np.cumsum([len(some) for some in on])[:-1])
+        return [some[here] for some, here in zip(on, opened, strict=True)]
 
 
-def _lines(places: FloatArray, normals: FloatArray, resolution: float) -> list[FloatArray]:
-    """Join places side by side that face the same way to straight lines, shape (2, 2) each."""
-    lines: list[FloatArray] = []
-    if not len(places):
-        return lines
-    angles = np.arctan2(normals[:, 1], normals[:, 0]) % math.pi
-    left = np.ones(len(places), dtype=np.bool_)
-    while left.any():
-        bins = np.bincount((angles[left] / math.pi * 18).astype(np.int64) % 18, minlength=18)
-        around = bins + np.roll(bins, 1) + np.roll(bins, -1)
-        facing = (np.argmax(around) + 0.5) / 18 * math.pi
-        off = np.abs((angles - facing + math.pi / 2.0) % math.pi - math.pi / 2.0)
-        chosen = left & (off < math.pi / 9.0)
-        left &= ~chosen
-        for group in _touching(places[chosen], resolution):
-            line = _line(group)
-            if line is not None:
-                lines.append(line)
-    return lines
+def _corners(frame: GridFrame) -> tuple[FloatArray, FloatArray]:
+    """Compute the middles of the lower left and the upper right cell of a map, ``(x, y)`` [m]."""
+    ends = frame.to_points(np.array([(0, 0), (frame.rows - 1, frame.cols - 1)]))
+    return ends[0], ends[1]
 
 
-def _touching(places: FloatArray, resolution: float) -> list[FloatArray]:
-    """Part places into groups that hang together, see :func:`_groups`."""
-    groups = _groups(places, resolution)
-    return [places[groups == number] for number in np.unique(groups)]
-
-
-def _groups(places: FloatArray, resolution: float) -> IntArray:
-    """Number places, shape (n,), by groups that hang together over gaps of at most four cells."""
-    cells = np.floor(places / resolution).astype(np.int64)
-    cells -= cells.min(axis=0) - 3
-    mask = np.zeros(cells.max(axis=0) + 4, dtype=np.uint8)
-    mask[cells[:, 0], cells[:, 1]] = 1
-    _, labels = cv2.connectedComponents(cv2.dilate(mask, np.ones((5, 5), dtype=np.uint8)), connectivity=8)
-    return np.asarray(labels)[cells[:, 0], cells[:, 1]].astype(np.int64)
-
-
-def _line(places: FloatArray) -> FloatArray | None:
-    """Draw the line through places, where they are in line, dense and long enough."""
-    if len(places) < FEWEST:
-        return None
-    middle = places.mean(axis=0)
-    _, spread, axes = np.linalg.svd(places - middle, full_matrices=False)
-    t = (places - middle) @ axes[0]
-    length = float(np.ptp(t))
-    if length < LENGTH or spread[1] / math.sqrt(len(places)) > THICK:
-        return None
-    return np.asarray(middle + np.outer([t.min(), t.max()], axes[0]))
-
-
-def _like(line: FloatArray, others: FloatArray) -> FloatArray | None:
+def _alike(line: FloatArray, others: FloatArray) -> FloatArray | None:
     """Find the pane that has nearly the same ends, in either order."""
     for other in others:
         if min(np.abs(line - other).max(), np.abs(line - other[::-1]).max()) < CHANGED:

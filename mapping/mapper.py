@@ -61,7 +61,7 @@ class Mapper:
         self._trusted = True
         self._lost = 0
         self._evidence = EvidenceGrid(self._config)
-        self._corrected = False
+        self._corrected = self._finished = False
         self._glimpsed = Pose2()
         self._panes = Panes(self._config.resolution)
         self._pose = Pose2()
@@ -319,6 +319,7 @@ class Mapper:
 
     def _insert(self, keyframe: Keyframe) -> None:
         """Add a keyframe to graph and local map, and close a loop where there is one."""
+        self._finished = False
         if self.keyframes:
             latest = self.keyframes[-1]
             chord = latest.pose.distance(keyframe.pose)
@@ -360,7 +361,7 @@ class Mapper:
         grid = self._draw()
         if not (new and self._config.glass):
             return grid
-        changed = self._panes.update(self.keyframes, self._evidence, moved=self._corrected)
+        changed = self._panes.update(self.keyframes, self._evidence, moved=self._corrected, last=self._finished)
         self._corrected = False
         if not len(changed):
             return grid
@@ -400,6 +401,7 @@ class Mapper:
         if self._graph.optimise():
             self._poses_moved()
         if self._config.glass:
+            self._finished = True
             self._panes.start_again()
             for keyframe in self.keyframes:
                 if keyframe.shown is not keyframe.beams:  # what no pane has cut need not be drawn anew

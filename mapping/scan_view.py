@@ -43,12 +43,12 @@ class View:
             self._levels[level] = np.asarray(shortest[0], dtype=np.float64)
         return self._levels[level]
 
-    def beyond(self, points: FloatArray, lateral: float = LATERAL) -> FloatArray:
+    def beyond(self, points: FloatArray, lateral: FloatArray | float = LATERAL) -> FloatArray:
         """Measure how far beams went beyond places, all those within ``lateral`` [m] of each.
 
         Args:
             points: Robot frame, shape (n, 2) [m].
-            lateral: Half width of what is looked at [m].
+            lateral: Half width of what is looked at [m], one or shape (n,).
 
         Returns:
             Shape (n,) [m]: around 0 where the scan ended there, negative where it ended before, NaN out of its view.
@@ -60,13 +60,17 @@ class View:
         at = np.searchsorted(self._bearings, bearing)
         at = np.clip(at, 1, len(self._bearings) - 1)
         at -= bearing - self._bearings[at - 1] < self._bearings[at] - bearing
-        half = lateral / np.maximum(distance, 1e-6) / self._step
-        level = np.ceil(np.log2(np.maximum(half, 1.0))).astype(np.int64)
+        half = np.ceil(np.maximum(lateral / np.maximum(distance, 1e-6) / self._step, 1.0))
         seen = (np.abs(self._bearings[at] - bearing) < 2.0 * self._step) & (half <= WIDEST)
+        level = np.log2(half).astype(np.int64)
         limit = np.full(len(points), np.nan)
         for number in np.unique(level[seen]).tolist():
-            of_level = seen & (level == number)
-            limit[of_level] = self._lowest(number)[at[of_level]]
+            of_level = np.flatnonzero(seen & (level == number))
+            # Two windows of a power of two that overlap.
+            aside, lowest = half[of_level].astype(np.int64) - (1 << number), self._lowest(number)
+            last = len(lowest) - 1
+            low, high = np.maximum(at[of_level] - aside, 0), np.minimum(at[of_level] + aside, last)
+            limit[of_level] = np.minimum(lowest[low], lowest[high])
         result: FloatArray = limit - distance
         return result
 

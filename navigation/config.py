@@ -89,8 +89,10 @@ class NavigationConfig:
     time_limit: float = 7200.0
     """Simulated time after which a run ends with the status ``limit`` [s]."""
 
-    cpu_limit: float = 720.0
-    """The same in processor time [s]; a run that ends by it may end elsewhere the next time."""
+    cpu_limit: float = 900.0
+    """The same in processor time, exploring and driving together [s]: half of the half hour that a run may take at
+    most; reading a large plan, predicting and planning take their part. A run that ends by it may end elsewhere the
+    next time."""
 
     most_cells: int = 40_000_000
     """Cells of the map from which on a run ends with the status ``limit``: 100,000 m2 at 0.05 m."""

@@ -89,6 +89,7 @@ class LoopLog:
         path: Where the robot was then, as estimated on the way, map frame, shape (n, 2) [m].
         distance: Travelled distance as estimated [m].
         wall_seconds: Wall-clock time by step: ``sense``, ``map``, ``navigate``, ``observe``, ``move``.
+        cpu_seconds: Processor time spent, that of the runs before it included [s].
     """
 
     status: LoopStatus
@@ -97,6 +98,7 @@ class LoopLog:
     path: FloatArray
     distance: float
     wall_seconds: dict[str, float] = field(default_factory=dict)
+    cpu_seconds: float = 0.0
 
     @property
     def seconds(self) -> float:
@@ -117,6 +119,7 @@ def run_loop(
     *,
     on_step: Callable[[Step], None] | None = None,
     stop: Callable[[Step], EarlyEnd | None] | None = None,
+    spent: float = 0.0,
 ) -> LoopLog:
     """Sense, map, decide and move until the decider has done what it wanted, or a limit is met.
 
@@ -127,13 +130,14 @@ def run_loop(
         config: Limits of simulated time, processor time and the map's size.
         on_step: Told of every step.
         stop: Asked after every step whether the run ends.
+        spent: Processor time that runs before it have taken [s]: ``config.cpu_limit`` counts it.
 
     Returns:
         Status and figures; the map stays in ``mapper``.
     """
     stamps: list[float] = []
     poses: list[Pose2] = []
-    clock, limits = StepClock(), Limits(config, mapper)
+    clock, limits = StepClock(), Limits(config, mapper, spent)
     while True:
         observation = robot.observe()
         clock.lap("sense")
@@ -148,32 +152,42 @@ def run_loop(
             on_step(step)
         clock.lap("observe")
         if decider.status is not None:
-            return _log(decider.status, REASONS[decider.status], stamps, poses, clock)
+            return _log(decider.status, REASONS[decider.status], stamps, poses, clock, limits.cpu_seconds)
         stopped = limits.check(step) or (None if stop is None else stop(step))
         if stopped is not None:
-            return _log(stopped.status, stopped.reason, stamps, poses, clock)
+            return _log(stopped.status, stopped.reason, stamps, poses, clock, limits.cpu_seconds)
         robot.step(v, w, robot.period)
         clock.lap("move")
 
 
 def _log(
-    status: LoopStatus, reason: str, stamps: Sequence[float], poses: Sequence[Pose2], clock: "StepClock"
+    status: LoopStatus,
+    reason: str,
+    stamps: Sequence[float],
+    poses: Sequence[Pose2],
+    clock: "StepClock",
+    cpu_seconds: float,
 ) -> LoopLog:
     """Sum up a run that has ended."""
     path = np.array([(pose.x, pose.y) for pose in poses])
     distance = sum(a.distance(b) for a, b in pairwise(poses))
-    return LoopLog(status, reason, np.array(stamps), path, distance, clock.seconds)
+    return LoopLog(status, reason, np.array(stamps), path, distance, clock.seconds, cpu_seconds)
 
 
 class Limits:
     """Limits of a run: simulated time, processor time, and size of the map."""
 
-    def __init__(self, config: NavigationConfig, mapper: MapMaker) -> None:
+    def __init__(self, config: NavigationConfig, mapper: MapMaker, spent: float = 0.0) -> None:
         self._config = config
         self._mapper = mapper
         self._cells = 0
         self._begun_at: float | None = None
-        self._begun = process_time()
+        self._begun = process_time() - spent
+
+    @property
+    def cpu_seconds(self) -> float:
+        """Processor time spent by now [s]."""
+        return process_time() - self._begun
 
     def grid(self) -> OccupancyGrid:
         """Draw the map so far, and note its size."""
@@ -190,7 +204,7 @@ class Limits:
             return EarlyEnd("limit", f"not done after {config.time_limit:g} simulated seconds (time_limit)")
         if self._cells > config.most_cells:
             return EarlyEnd("limit", f"the map has {self._cells} cells, more than {config.most_cells} (most_cells)")
-        if process_time() - self._begun >= config.cpu_limit:
+        if self.cpu_seconds >= config.cpu_limit:
             return EarlyEnd("limit", f"not done after {config.cpu_limit:g} s of processor time (cpu_limit)")
         return None
 

@@ -74,12 +74,13 @@ class Porter:
 
 @dataclass(frozen=True, kw_only=True)
 class DriveSettings:
-    """Settings of a drive: the configurations of the stages that go on while it lasts."""
+    """Settings of a drive: the configurations of the stages that go on while it lasts, and the exploration's time."""
 
     navigation: RobotNavigation
     mapper: MapperConfig
     predictor: Predict
     coverage: CoverageConfig
+    spent: float = 0.0
 
 
 def drive_tour(
@@ -110,6 +111,7 @@ def drive_tour(
         log, reopened, follower, settings.navigation,
         on_step=on_step,
         stop=lambda _: outline.check(log.sim.world_T_robot),
+        spent=settings.spent,
     )  # fmt: skip
     lengths = f"{plan.tour.length:.1f} m planned, {driven.distance:.1f} m driven"
     recorder.note(f"tour {driven.status}: {lengths}", float(driven.stamps[-1]))

@@ -182,6 +182,7 @@ def _find_out(
             mapper=config.mapper,
             predictor=partial(predict, method=config.method, config=config.predictor),
             coverage=_coverage_for_robot(config),
+            spent=survey.exploration.cpu_seconds,
         )
         return replace(found, driven=drive_tour(log, mapper, tour, closed, settings, recorder))
 

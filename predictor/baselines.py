@@ -95,32 +95,28 @@ def _seen(start: InitialFaces, room: int) -> Shape:
     box = np.zeros(grid.frame.shape, dtype=np.bool_)
     box[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1] = True
     open_ = grid.unknown & box
-    reach = np.hypot(rows[-1] - rows[0] + 1, cols[-1] - cols[0] + 1) * resolution
-    reached = _reach(grid, open_, eye, rays, np.arange(0.0, reach, resolution))
+    reached = _reach(grid, open_, eye, rays)
     ends = eye + reached[:, None] * rays
     star = Polygon(np.vstack((eye, ends))).buffer(0)
     parts = [part for part in shapely.get_parts(star).tolist() if part.area > resolution**2]
     return max(parts, key=lambda part: part.area) if parts else Polygon()
 
 
-def _reach(grid: OccupancyGrid, open_: BoolArray, eye: FloatArray, rays: FloatArray, steps: FloatArray) -> FloatArray:
-    """Find the step [m] at which each ray, shape (n, 2), first meets a cell that is not open, else the last.
+def _reach(grid: OccupancyGrid, open_: BoolArray, eye: FloatArray, rays: FloatArray) -> FloatArray:
+    """Find how far [m] each ray, shape (n, 2), goes, in steps of a cell, until it meets a cell that is not open.
 
-    A stretch at a time: most rays end on their first metres.
+    A stretch at a time: most rays end on their first metres, and all at the side of the grid.
     """
-    reached = np.full(len(rays), steps[-1])
-    going = np.arange(len(rays))
-    for first in range(0, len(steps), STRETCH):
-        part = steps[first : first + STRETCH]
+    reached, going, first = np.zeros(len(rays)), np.arange(len(rays)), 0
+    while going.size:
+        part = np.arange(first, first + STRETCH) * grid.frame.resolution
         cells = grid.frame.to_cells(eye + part[:, None, None] * rays[going])  # (steps, rays, 2)
         inside = grid.frame.contains(cells)
         passes = np.zeros(inside.shape, dtype=np.bool_)
         passes[inside] = open_[cells[inside, 0], cells[inside, 1]]
         ended = ~passes.all(axis=0)
         reached[going[ended]] = part[passes.argmin(axis=0)[ended]]
-        going = going[~ended]
-        if not len(going):
-            break
+        going, first = going[~ended], first + STRETCH
     return reached
 
 

@@ -74,4 +74,4 @@ def _find_wide_parts(shape: BaseGeometry) -> list[Polygon]:
     """Find the parts of a shape without what is narrower than :data:`NARROWEST`."""
     opened = shape.buffer(-NARROWEST / 2, join_style="mitre").buffer(NARROWEST / 2, join_style="mitre")
     parts = shapely.get_parts(shape.intersection(opened)).tolist()
-    return [part for part in parts if isinstance(part, Polygon) and not part.is_empty]
+    return [part for part in parts if isinstance(part, Polygon)]

@@ -2,14 +2,14 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from closedrooms.core.arrays import FloatArray
+from closedrooms.core.arrays import FloatArray, IntArray
 
 # The disc stays this far from everything, so that rounding never lets it in [m].
 SKIN = 1e-4
@@ -17,6 +17,8 @@ SKIN = 1e-4
 TOUCH = 1e-7
 # Cells of the look-up table of edges [m].
 CELL = 0.5
+# Cells that are looked at together when edges are sorted into them.
+MOST_CELLS = 1_000_000
 # Slides along a corner settle within a few turns; what is left of the motion after so many is given up.
 MAX_TURNS = 12
 
@@ -62,9 +64,10 @@ class Obstacles:
         self._cells: defaultdict[tuple[int, int], list[SolidEdge]] = defaultdict(list)
         self._leaf_cells: defaultdict[tuple[int, int], list[LeafName]] = defaultdict(list)
         self._leaves: dict[LeafName, list[SolidEdge]] = {}
-        for edge in static.tolist():
-            for cell in self._cells_near(edge):
-                self._cells[cell].append(tuple(edge))
+        for part in _batches(static, reach):
+            names: list[SolidEdge] = [tuple(edge) for edge in part.tolist()]
+            for number, row, col in zip(*(numbers.tolist() for numbers in _cells_near(part, reach)), strict=True):
+                self._cells[row, col].append(names[number])
 
     def add_leaf(self, name: LeafName, box: tuple[float, float, float, float]) -> None:
         """Announce a leaf that stays within ``box`` (x_min, y_min, x_max, y_max) [m]."""
@@ -86,18 +89,30 @@ class Obstacles:
             return fixed
         return [*fixed, *(edge for name in leaves for edge in self._leaves[name])]
 
-    def _cells_near(self, edge: Sequence[float]) -> Iterable[tuple[int, int]]:
-        """List the cells from which ``edge`` can be within reach."""
-        ax, ay, bx, by = edge
-        box = (min(ax, bx), min(ay, by), max(ax, bx), max(ay, by))
-        x0, y0, x1, y1 = (math.floor(v / CELL) for v in _grown(box, self.reach))
-        i, j = np.meshgrid(np.arange(x0, x1 + 1), np.arange(y0, y1 + 1), indexing="ij")
-        cx, cy = (i + 0.5) * CELL, (j + 0.5) * CELL
-        dx, dy = bx - ax, by - ay
-        squared = dx * dx + dy * dy
-        t = np.clip(((cx - ax) * dx + (cy - ay) * dy) / squared, 0.0, 1.0) if squared > 0 else np.zeros(cx.shape)
-        close = np.hypot(cx - ax - t * dx, cy - ay - t * dy) <= self.reach + CELL * math.sqrt(0.5) + 1e-9
-        return zip(i[close].tolist(), j[close].tolist(), strict=True)
+
+def _batches(edges: FloatArray, reach: float) -> Iterator[FloatArray]:
+    """Cut edges, shape (n, 4), into batches that together have no more than ``MOST_CELLS`` cells around them."""
+    spans = np.abs(edges[:, 2:] - edges[:, :2]) + 2.0 * reach
+    batch = np.cumsum((spans / CELL + 2.0).prod(axis=1)) // MOST_CELLS
+    return iter(np.split(edges, np.flatnonzero(np.diff(batch)) + 1) if len(edges) else ())
+
+
+def _cells_near(edges: FloatArray, reach: float) -> tuple[IntArray, IntArray, IntArray]:
+    """List the cells from which each edge, shape (n, 4), can be within reach: edges' numbers, rows and columns."""
+    low = np.floor((np.minimum(edges[:, :2], edges[:, 2:]) - reach) / CELL).astype(np.int64)
+    high = np.floor((np.maximum(edges[:, :2], edges[:, 2:]) + reach) / CELL).astype(np.int64)
+    width = high - low + 1
+    count = width.prod(axis=1)
+    number = np.repeat(np.arange(len(edges)), count)
+    place = np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count)
+    i, j = low[number, 0] + place // width[number, 1], low[number, 1] + place % width[number, 1]
+    cx, cy = (i + 0.5) * CELL, (j + 0.5) * CELL
+    ax, ay, bx, by = edges[number].T
+    dx, dy = bx - ax, by - ay
+    squared = dx * dx + dy * dy
+    t = np.clip(((cx - ax) * dx + (cy - ay) * dy) / np.where(squared > 0.0, squared, 1.0), 0.0, 1.0)
+    close = np.hypot(cx - ax - t * dx, cy - ay - t * dy) <= reach + CELL * math.sqrt(0.5) + 1e-9
+    return number[close], i[close], j[close]
 
 
 def _grown(box: Sequence[float], margin: float) -> tuple[float, float, float, float]:

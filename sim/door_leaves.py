@@ -196,7 +196,9 @@ def _pocket(jamb: FloatArray, outward: FloatArray, length: float, half: float, w
     depths = np.arange(1, math.ceil(length / TRIAL) + 1) * (length / math.ceil(length / TRIAL))
     strips = [_rectangle(jamb, jamb + depth * direction, half - min(PROUD, half / 2)) for depth in depths]
     start = 1e-6 * direction
-    inside = shapely.covers(walls.buffer(PROUD / 2), shapely.polygons(np.array(strips) + start))
+    near = shapely.box(*shapely.total_bounds(shapely.polygons(strips))).buffer(length, join_style="mitre")
+    solid = walls.intersection(near).buffer(PROUD / 2)  # of a whole building this takes seconds
+    inside = shapely.covers(solid, shapely.polygons(np.array(strips) + start))
     return float(depths[-1]) if inside.all() else float(np.r_[0.0, depths][int(np.argmin(inside))])
 
 

@@ -84,7 +84,7 @@ def test_values_have_slots(folder: str) -> None:
     loose = [
         name
         for name, said, node in dataclasses(folder)
-        if said.get("frozen") and not said.get("kw_only") and not said.get("slots") and not keeps_something(node)
+        if not said.get("kw_only") and not said.get("slots") and not keeps_something(node)
     ]
     assert loose == []
 

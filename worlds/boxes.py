@@ -9,7 +9,7 @@ import numpy as np
 from shapely.geometry import Point as PointShape
 
 from closedrooms.core.door import Point, Segment
-from closedrooms.worlds.geometry import LEAF_THICKNESS, WallAxes, distance_along
+from closedrooms.worlds.geometry import LEAF_THICKNESS, distance_along, wall_axes
 from closedrooms.worlds.plan import FloorPlan, PlanDoor
 
 # Passages this close to a wall's centre line are in it [m].
@@ -116,7 +116,7 @@ def _between(gaps: Sequence[tuple[float, float]], length: float) -> list[tuple[f
 
 def box_leaves(plan: FloorPlan, door: PlanDoor) -> list[BoxLeaf]:
     """Make the closed leaves of a door: one, or two of half the width for a double door."""
-    thickness = min(LEAF_THICKNESS, WallAxes(plan).thickness(door.segment) or LEAF_THICKNESS)
+    thickness = min(LEAF_THICKNESS, wall_axes(plan).thickness(door.segment) or LEAF_THICKNESS)
     first, second = door.segment
     if door.kind == "sliding":
         return [BoxLeaf(_box(first, second, thickness), None, 1)]

@@ -115,6 +115,10 @@ class FloorPlan:
     meta: dict[str, object] = field(default_factory=dict)
     remarks: tuple[Remark, ...] = field(default=(), compare=False)
 
+    def __hash__(self) -> int:
+        """Hash a few figures: what is computed once for each plan is kept by it, and some hold 60,000 walls."""
+        return hash((self.name, len(self.rooms), len(self.walls), len(self.doors), len(self.openings)))
+
     @property
     def passages(self) -> tuple[PlanDoor | Opening, ...]:
         """Doors and openings."""

@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Iterable
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -12,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
 from closedrooms.worlds.connectivity import connected_parts
-from closedrooms.worlds.geometry import room_interior
+from closedrooms.worlds.geometry import KEPT_PLANS, room_interior
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
 
 CIRCULATION = ("corridor", "hallway", "lobby", "entrance", "hall", "atrium", "foyer", "passage")
@@ -55,6 +56,7 @@ def start_pose(plan: FloorPlan) -> Pose2:
     return Pose2(round(float(centre[0]), 3), round(float(centre[1]), 3), round(_long_side(place), 4))
 
 
+@lru_cache(maxsize=KEPT_PLANS)
 def _main_room(plan: FloorPlan) -> tuple[PlanRoom, Polygon]:
     """Find the room that the robot starts in, and the part of its floor that it fits into."""
     passages = Counter(room for p in plan.passages if None not in p.rooms for room in p.rooms)

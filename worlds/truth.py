@@ -14,7 +14,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import fill_shapes
 from closedrooms.worlds.closing import hidden_rooms
-from closedrooms.worlds.geometry import LEAF_THICKNESS, WallAxes, areal, rectangles, room_interiors, wall_area
+from closedrooms.worlds.geometry import LEAF_THICKNESS, areal, rectangles, room_interiors, wall_area, wall_axes
 from closedrooms.worlds.plan import FloorPlan
 
 
@@ -29,7 +29,7 @@ def rasterise(plan: FloorPlan, frame: GridFrame, map_T_world: Pose2) -> Occupanc
         frame: Of the result, in the map frame.
         map_T_world: Building frame to map frame.
     """
-    lines = WallAxes(plan)
+    lines = wall_axes(plan)
     gaps = [lines.gap(p.segment) for p in plan.passages if None not in p.rooms]
     cells = np.full(frame.shape, UNKNOWN, dtype=np.int8)
     cells[_fill([*(room.polygon for room in plan.rooms), *gaps], frame, map_T_world)] = FREE
@@ -56,7 +56,7 @@ def true_rooms(plan: FloorPlan, closed: Collection[str], map_T_world: Pose2) -> 
         One room for each part of the building that only closed doors lead to, with their ids, in plan order. Rooms
         behind the same doors that are joined by open passages are one room.
     """
-    lines = WallAxes(plan)
+    lines = wall_axes(plan)
     result = []
     for names, doors in hidden_rooms(plan, closed):
         areas: list[BaseGeometry] = list(room_interiors(plan, names).values())

@@ -1,16 +1,17 @@
 """What a floor plan must satisfy before anything is built from it."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
 from shapely.strtree import STRtree
 
+from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import Segment
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.worlds.geometry import WallAxes, wall_area
+from closedrooms.worlds.geometry import WallAxes, wall_area, wall_axes
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
 
 # Jambs lie on a wall's centre line within this [m].
@@ -131,8 +132,9 @@ def passage_faults(plan: FloorPlan) -> dict[int, tuple[str, str]]:
     """
     rooms = {room.id: room.polygon for room in plan.rooms}
     thickest = max((wall.thickness for wall in plan.walls), default=0.0)
-    lines = WallAxes(plan)
+    lines = wall_axes(plan)
     on_wall = _on_walls(plan, [door.segment for door in plan.doors])
+    ends = np.array([passage.segment for passage in plan.passages], dtype=np.float64).reshape(-1, 2, 2)
     seen: set[str] = set()
     faults: dict[int, tuple[str, str]] = {}
     for number, passage in enumerate(plan.passages):
@@ -145,7 +147,7 @@ def passage_faults(plan: FloorPlan) -> dict[int, tuple[str, str]]:
             or _sides_fault(name, passage, rooms)
             or ((f"{name} stands on no wall", "both jambs on a wall") if is_door and not on_wall[number] else None)
             or _place_fault(name, passage, rooms, thickest, lines)
-            or _overlap_fault(name, passage, plan.passages, number, faults)
+            or _overlap_fault(name, passage, [plan.passages[k] for k in _near(ends, number) if k not in faults])
         )
         if fault is None and isinstance(passage, PlanDoor) and passage.opens_into not in passage.rooms:
             fault = (f"{name} opens into {passage.opens_into!r}", f"one of its rooms {passage.rooms}")
@@ -155,17 +157,20 @@ def passage_faults(plan: FloorPlan) -> dict[int, tuple[str, str]]:
     return faults
 
 
+def _near(ends: FloatArray, number: int) -> list[int]:
+    """List the earlier ones of some segments, shape (n, 2, 2), whose box is within ``ON_WALL`` of a segment's box."""
+    low, high = ends[: number + 1].min(axis=1), ends[: number + 1].max(axis=1)
+    close = ((low[:-1] <= high[-1] + ON_WALL) & (high[:-1] >= low[-1] - ON_WALL)).all(axis=1)
+    return np.flatnonzero(close).tolist()
+
+
 def _overlap_fault(
-    name: str,
-    passage: PlanDoor | Opening,
-    passages: Sequence[PlanDoor | Opening],
-    number: int,
-    faults: Collection[int],
+    name: str, passage: PlanDoor | Opening, earlier: Sequence[PlanDoor | Opening]
 ) -> tuple[str, str] | None:
     """Find a passage on the place of an earlier one that is kept."""
     line = shapely.LineString(passage.segment)
-    for before, other in enumerate(passages[:number]):
-        if before not in faults and line.distance(shapely.LineString(other.segment)) < ON_WALL:
+    for other in earlier:
+        if line.distance(shapely.LineString(other.segment)) < ON_WALL:
             strip = shapely.LineString(other.segment).buffer(ON_WALL, cap_style="flat")
             if line.intersection(strip).length > OVERLAPPING:
                 return (f"{name} lies on {other.id}", "one passage in a place")

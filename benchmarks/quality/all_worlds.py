@@ -1,7 +1,7 @@
 """Run the main job on many worlds and print one table, in Markdown: area mapped, trajectory error, doors, IoU, seconds.
 
     python benchmarks/quality/all_worlds.py [WORLD ...] [--noise medium] [--seed 0] [--close 5] [--method best]
-                                                [--drive]
+                                                [--body wheels] [--drive]
 
 Without worlds it takes the 20 bundled ones. Nothing is recorded; one process, one world after the other.
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from closedrooms.core.errors import ClosedroomsError
 from closedrooms.core.report import Report
-from closedrooms.pipeline.config import RunConfig
+from closedrooms.pipeline.config import RunConfig, named_sim
 from closedrooms.pipeline.reporting.report import figure
 from closedrooms.pipeline.run import run
 from closedrooms.worlds.library import bundled_names
@@ -58,6 +58,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--close", type=int, default=5)
     parser.add_argument("--method", default="best")
+    parser.add_argument("--body", default="wheels", choices=("wheels", "kinematic"))
     parser.add_argument("--drive", action="store_true")
     options = parser.parse_args()
     print(f"| {' | '.join(HEAD)} |\n|{' --- |' * len(HEAD)}", flush=True)
@@ -70,6 +71,7 @@ def main() -> None:
                 close=options.close,
                 method=options.method,
                 drive=options.drive,
+                sim=named_sim(options.noise, body=options.body),
                 record=False,
                 out=Path(folder) / "run",
             )

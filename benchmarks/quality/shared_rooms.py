@@ -1,6 +1,6 @@
-"""Rooms with several closed doors: how often the method ``best`` tells that they lead to one room, and what it gains.
+"""Rooms with several closed doors: how often a method tells that they lead to one room, and what that gains.
 
-    python benchmarks/quality/shared_rooms.py [WORLD ...] [--close 10] [--draws 2]
+    python benchmarks/quality/shared_rooms.py [WORLD ...] [--method best|learned] [--close 10] [--draws 2]
 
 Worlds are names or files; the default are the bundled ones that have a room whose several doors can all be closed.
 All such rooms are closed, as far as that cuts nothing else off, and rooms with one door beside them, ``--close``
@@ -10,7 +10,9 @@ switched off. A door between two closed rooms is seen by nobody and left out.
 """
 
 import argparse
+import itertools
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -35,29 +37,28 @@ from closedrooms.worlds.truth import reachable, true_rooms, truth_bounds
 
 HERE = Pose2()
 RESOLUTION = 0.05
-# Doors of one wall: parallel within this [rad], their middles no farther apart across the wall than this [m]. A door
-# is seen from free space nearer than this [m].
-PARALLEL, ACROSS, SEEN = 0.1, 0.5, 0.4
+# A door is seen from free space nearer than this [m]. Of pairs of doors that lead to two rooms those nearer than this
+# could be taken for doors of one [m]: all but a few of one room are nearer.
+SEEN, NEAR = 0.4, 15.0
 
 
 @dataclass
 class Tally:
-    """Counts over some maps; figures are IoU by door."""
+    """Counts of rooms and pairs of doors over some maps; figures are IoU by door."""
 
     rooms: int = 0
-    one_wall: int = 0
+    pairs: int = 0
     joined: int = 0
+    apart: int = 0
     wrong: int = 0
-    pairs_apart: int = 0
-    alone: list[float] = field(default_factory=list)
     several: dict[str, list[float]] = field(default_factory=lambda: {"joined": [], "apart": []})
-    walled: dict[str, list[float]] = field(default_factory=lambda: {"joined": [], "apart": []})
+    alone: dict[str, list[float]] = field(default_factory=lambda: {"joined": [], "apart": []})
 
     def row(self, name: str) -> str:
         """Build a row of the table."""
-        figures = [_mean(kind[how]) for kind in (self.walled, self.several) for how in ("joined", "apart")]
-        counts = (self.rooms, self.one_wall, self.joined, self.wrong, self.pairs_apart)
-        return f"| {name} | {' | '.join(map(str, counts))} | {' | '.join(figures)} | {_mean(self.alone)} |"
+        counts = (self.rooms, self.pairs, self.joined, self.apart, self.wrong)
+        figures = [_mean(kind[how]) for kind in (self.several, self.alone) for how in ("joined", "apart")]
+        return f"| {name} | {' | '.join(map(str, counts))} | {' | '.join(figures)} |"
 
 
 def _mean(values: Sequence[float]) -> str:
@@ -85,16 +86,6 @@ def seen_doors(plan: FloorPlan, closed: Sequence[str], grid: OccupancyGrid) -> l
     return [door for door in doors if np.hypot(*(places - door.midpoint).T).min() <= SEEN]
 
 
-def in_one_wall(a: ClosedDoor, b: ClosedDoor) -> bool:
-    """Check whether two doors are in one straight wall."""
-    assert a.segment is not None, "doors of a plan have jambs"
-    assert b.segment is not None, "doors of a plan have jambs"
-    along, other = (np.subtract(*door.segment) / door.width for door in (a, b))  # type: ignore[misc]
-    offset = np.subtract(b.midpoint, a.midpoint)
-    parallel = abs(along[0] * other[1] - along[1] * other[0]) <= math.sin(PARALLEL)
-    return bool(parallel and abs(along[0] * offset[1] - along[1] * offset[0]) <= ACROSS)
-
-
 @contextmanager
 def no_joining() -> Iterator[None]:
     """Give every door a room of its own."""
@@ -105,37 +96,36 @@ def no_joining() -> Iterator[None]:
 def tally_map(tally: Tally, doors: Sequence[ClosedDoor], truth: Sequence[Room], joined: Sequence[Room],
           apart: Sequence[Room]) -> None:  # fmt: skip
     """Add one map to the tally."""
-    by_id = {door.id: door for door in doors}
     owner = {door: number for number, room in enumerate(truth) for door in room.doors}
-    figures = {"joined": room_iou(joined, truth), "apart": room_iou(apart, truth)}
-    for room in truth:
-        own = [by_id[door] for door in room.doors if door in by_id]
-        if len(own) < 2:
-            tally.alone += [figures["joined"][door.id] for door in own]
-            continue
-        walled = any(in_one_wall(a, b) for i, a in enumerate(own) for b in own[:i])
-        tally.rooms += 1
-        tally.one_wall += walled
-        tally.joined += any(len({*found.doors} & {door.id for door in own}) > 1 for found in joined)
-        for how, by_door in figures.items():
-            tally.several[how] += [by_door[door.id] for door in own]
-            if walled:
-                tally.walled[how] += [by_door[door.id] for door in own]
-    tally.wrong += sum(len({owner[door] for door in found.doors}) > 1 for found in joined)
-    pairs = [(a, b) for i, a in enumerate(doors) for b in doors[:i] if owner[a.id] != owner[b.id]]
-    tally.pairs_apart += sum(in_one_wall(a, b) for a, b in pairs)
+    found = {door: number for number, room in enumerate(joined) for door in room.doors}
+    counts = Counter(owner[door.id] for door in doors)
+    tally.rooms += sum(count > 1 for count in counts.values())
+    for how, rooms in (("joined", joined), ("apart", apart)):
+        by_door = room_iou(rooms, truth)
+        for door in doors:
+            kind = tally.several if counts[owner[door.id]] > 1 else tally.alone
+            kind[how].append(by_door[door.id])
+    for a, b in itertools.combinations(doors, 2):
+        together = found.get(a.id, a.id) == found.get(b.id, b.id)
+        if owner[a.id] == owner[b.id]:
+            tally.pairs += 1
+            tally.joined += together
+        elif math.dist(a.midpoint, b.midpoint) < NEAR:
+            tally.apart += 1
+            tally.wrong += together
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("worlds", nargs="*")
+    parser.add_argument("--method", choices=("best", "learned"), default="best")
     parser.add_argument("--close", type=int, default=10)
     parser.add_argument("--draws", type=int, default=2)
     options = parser.parse_args()
     heads = [
-        "world", "rooms with several doors", "of these two in one wall", "joined rightly", "joined wrongly",
-        "pairs in one wall to two rooms", "IoU one wall", "without joining", "IoU all of several", "without joining",
-        "IoU rooms of one door",
+        "world", "rooms with several doors", "pairs of their doors", "joined", f"pairs to two rooms within {NEAR:g} m",
+        "joined wrongly", "IoU of rooms with several doors", "of these without joining", "IoU of rooms with one door",
+        "of those without joining",
     ]  # fmt: skip
     print(f"| {' | '.join(heads)} |\n| --- | {'---: | ' * (len(heads) - 1)}", flush=True)
     whole = Tally()
@@ -153,8 +143,8 @@ def main() -> None:
             grid = seen_map(plan, closed)
             doors, truth = seen_doors(plan, closed, grid), true_rooms(plan, closed, HERE)
             with no_joining():
-                apart = predict(grid, doors, "best").rooms
-            joined = predict(grid, doors, "best").rooms
+                apart = predict(grid, doors, options.method).rooms
+            joined = predict(grid, doors, options.method).rooms
             for tally in (own, whole):
                 tally_map(tally, doors, truth, joined, apart)
         print(own.row(plan.name), flush=True)

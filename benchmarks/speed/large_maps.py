@@ -3,9 +3,10 @@
     python benchmarks/speed/large_maps.py RUN... [--cells 4000 8000] [--methods paper best] [--rounds 3] [--quick]
 
 A run is a folder with ``map.yaml`` and ``doors.geojson``. Every method reads the map, predicts and, where it is one of
-``closedrooms predict``, writes its folder, in a process of its own, in turn; the medians of some rounds count. The last
-column is "ours / best known": processor time of the last of the methods that are ours (``best``, ``learned``) beside
-the quickest of the others.
+``closedrooms predict``, writes its folder, in a process of its own, in turn; the medians of some rounds count. Beside
+the methods, ``doors`` and ``cover`` are the commands of that name, with how many doors are proposed and how many
+vertices the tours of all buildings have. The last column is "ours / best known": processor time of the last of the
+methods that are ours (``best``, ``learned``) beside the quickest of the others.
 """
 
 import itertools
@@ -30,7 +31,7 @@ from closedrooms.core.grid import UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.predictor.structure.known_window import known_window
 
 RESOLUTION = 0.05
-OURS = ("best", "learned")
+OURS, NO_METHODS = ("best", "learned"), ("doors", "cover")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +45,7 @@ class Options:
     doors: int = 20
     """How many of the doors are closed, drawn with a fixed seed."""
     methods: tuple[str, ...] = ("paper", "rose", "best", "line-of-sight", "geometric")
-    """paper, rose, best, line-of-sight, geometric."""
+    """paper, rose, best, line-of-sight, geometric; doors and cover are commands."""
     rounds: int = 3
     """Each method is called once a round, in turn; medians count."""
     quick: bool = False
@@ -78,7 +79,7 @@ def tile(runs: tuple[Path, ...], cells: int, doors: int, folder: Path) -> None:
 
 
 def measure(method: str, folder: Path) -> tuple[float, float, int]:
-    """Measure processor seconds, megabytes at the peak and rooms of one method in a process of its own."""
+    """Measure processor seconds, megabytes at the peak and what was found by one method in a process of its own."""
     here = Path(__file__).resolve()
     words = [sys.executable, str(here), "--only", method, str(folder)]
     text = subprocess.run(words, check=True, capture_output=True, text=True).stdout
@@ -92,21 +93,37 @@ def middle(calls: tuple[tuple[float, float, int], ...]) -> tuple[float, float, i
 
 
 def only(method: str, folder: Path) -> None:
-    """Predict by one method and say what it took."""
+    """Predict by one method, or run a command, and say what it took."""
+    found = found_by(method, folder / "map.yaml", folder / "doors.geojson", folder / method)
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    print(json.dumps((used.ru_utime + used.ru_stime, used.ru_maxrss / 1024, found)))
+
+
+def found_by(method: str, grid: Path, doors: Path, out: Path) -> int:
+    """Count the rooms that a method predicts, the doors that are proposed, or the vertices of tours."""
+    if method == "doors":
+        from closedrooms.pipeline.propose_doors import doors_map
+        from closedrooms.pipeline.propose_doors_config import DoorsConfig
+
+        return len(doors_map(DoorsConfig(map=grid, out=out.with_suffix(".out.geojson"))).figures["doors"])
+    if method == "cover":
+        from closedrooms.coverage.config import CoverageConfig
+        from closedrooms.pipeline.config import CoverConfig
+        from closedrooms.pipeline.cover import cover_map
+
+        figures = cover_map(CoverConfig(map=grid, doors=doors, out=out, coverage=CoverageConfig(parts="all"))).figures
+        return int(figures["tour"]["vertices"])
     from closedrooms.pipeline.config import PredictConfig
     from closedrooms.pipeline.predict import predict_map
 
-    files = {"map": folder / "map.yaml", "doors": folder / "doors.geojson", "out": folder / method}
-    rooms = len(predict_map(PredictConfig(**files, method=method)).figures["rooms"])
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    print(json.dumps((used.ru_utime + used.ru_stime, used.ru_maxrss / 1024, rooms)))
+    return len(predict_map(PredictConfig(map=grid, doors=doors, out=out, method=method)).figures["rooms"])
 
 
 def main() -> None:
     options = tyro.cli(Options, description=__doc__)
     if options.quick:
         options = replace(options, cells=(1500,), doors=5, methods=("line-of-sight", "best"))
-    table = Table("cells", *(f"{method}: s, MB, rooms" for method in options.methods), "ours / best known")
+    table = Table("cells", *(f"{method}: s, MB, found" for method in options.methods), "ours / best known")
     for cells in options.cells:
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
@@ -114,7 +131,7 @@ def main() -> None:
             rounds = [[measure(method, folder) for method in options.methods] for _ in range(options.rounds)]
             measured = [middle(calls) for calls in zip(*rounds, strict=True)]
         ours = [row[0] for method, row in zip(options.methods, measured, strict=True) if method in OURS]
-        others = [row[0] for method, row in zip(options.methods, measured, strict=True) if method not in OURS]
+        others = [row[0] for m, row in zip(options.methods, measured, strict=True) if m not in OURS + NO_METHODS]
         share = f"{ours[-1] / min(others):.2f}" if ours and others else ""
         figures = (f"{seconds:.1f}, {memory:.0f}, {n}" for seconds, memory, n in measured)
         table.add_row(f"{cells} x {cells}", *figures, share)

@@ -1,19 +1,19 @@
 """How good and how fast the mapper is on recorded logs, beside its peers, in one run.
 
-    python benchmarks/speed/mapping.py LOG ... [--parts]
+    python benchmarks/speed/mapping.py LOG ... [--rounds 3] [--parts]
     python benchmarks/speed/mapping.py LOG ... --faults [--quick] [--seeds 5] [--methods closedrooms yag-slam ...]
                                                 [--out CSV]
 
 Every log is mapped with one set of parameters, the defaults, and compared with raw odometry; with ``small_gicp`` (scan
-to keyframe) and ``kiss-icp`` (without deskewing), both started from odometry, where they are installed; with the mapper
-without loops; and, where ``gtsam`` is installed, with the mapper whose pose graph gtsam solves. Errors are against
-the log's reference poses after SE(2) alignment. Speeds are scans a second of the process's own processor time, with
-wall-clock time in brackets, reading and importing left out; the last column is processor time beside the quicker of
-``small_gicp`` and ``kiss-icp``. Simulated worlds: ``benchmarks/quality/loop_closure.py``. ``--quick`` takes the first
-scans of each log.
+to keyframe), ``kiss-icp`` (without deskewing) and ``yag-slam``, started from odometry, where they are installed; with
+the mapper without loops; and, where ``gtsam`` is installed, with the mapper whose pose graph gtsam solves. Errors are
+against the log's reference poses after SE(2) alignment. Speeds are scans a second of the process's own processor time,
+medians of some rounds in which all take turns, reading and importing left out; the last column is processor time beside
+the quickest peer. Simulated worlds: ``benchmarks/quality/loop_closure.py``. ``--quick`` takes the first scans of each
+log, once.
 
-With ``--faults`` steps of the odometry fail (``odometry_faults.py``), ``yag-slam`` is measured too, and the result is a
-CSV; ``--quick`` takes less than a minute a log.
+With ``--faults`` steps of the odometry fail (``odometry_faults.py``), and the result is a CSV; ``--quick`` takes less
+than a minute a log.
 """
 
 import argparse
@@ -24,6 +24,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 import scipy.sparse.linalg  # noqa: F401  (loaded here, not inside the first timing)
@@ -47,9 +48,9 @@ WITHOUT_LOOPS = MapperConfig(loops=LoopConfig(enabled=False))
 
 
 HEAD = (
-    "log", "scans", "raw odometry", "small_gicp; scans/s", "kiss-icp; scans/s", "without loops; scans/s",
-    "mapper, at the time", "mapper", "mapper with gtsam; scans/s", "loops", "keyframes", "scans/s",
-    "CPU: ours / best known",
+    "log", "scans", "raw odometry", "small_gicp; scans/s", "kiss-icp; scans/s", "yag-slam; scans/s",
+    "without loops; scans/s", "mapper with gtsam; scans/s", "mapper; scans/s", "mapper, at the time", "loops",
+    "keyframes", "CPU: ours / best known",
 )  # fmt: skip
 KISS_RANGE = 25.0
 """As far as the mapper looks [m]."""
@@ -59,26 +60,24 @@ KISS_VOXEL = 0.5
 """Voxels of its map [m]: of 0.25, 0.5 and 1 m the best over both logs of this collection."""
 
 
-def clocks() -> tuple[float, float]:
-    """Read processor time of this process and wall-clock time [s]."""
-    return time.process_time(), time.perf_counter()
-
-
-def since(start: tuple[float, float]) -> tuple[float, float]:
-    """Measure the times passed since ``start``."""
-    now = clocks()
-    return now[0] - start[0], now[1] - start[1]
-
-
-def time_mapping(run: RecordedRun, config: MapperConfig) -> tuple[Mapper, FloatArray, tuple[float, float]]:
-    """Map a run: the mapper, the poses as estimated at the time, processor and wall-clock time [s]."""
+def map_run(run: RecordedRun, config: MapperConfig) -> tuple[Mapper, FloatArray]:
+    """Map a run: the mapper, and the poses as estimated at the time, shape (scans, 3)."""
     mapper = Mapper(config)
-    start = clocks()
     taken = zip(run.scans, run.odometry, prepare_scans(run.scans, config), strict=True)
     online = [mapper.process(scan, Pose2(*pose), prepared=ready).as_tuple() for scan, pose, ready in taken]
     mapper.finish()
     mapper.grid()
-    return mapper, np.array(online), since(start)
+    return mapper, np.array(online)
+
+
+def own(run: RecordedRun) -> FloatArray:
+    """Compute the final trajectory of the mapper."""
+    return map_run(run, MapperConfig())[0].trajectory()[1]
+
+
+def without_loops(run: RecordedRun) -> FloatArray:
+    """Compute the final trajectory of the mapper that closes no loops."""
+    return map_run(run, WITHOUT_LOOPS)[0].trajectory()[1]
 
 
 def gicp(run: RecordedRun) -> FloatArray:
@@ -165,12 +164,12 @@ def with_gtsam(run: RecordedRun) -> FloatArray:
     """Compute the final trajectory of the mapper whose pose graph gtsam solves."""
     import gtsam  # noqa: F401  (a missing one shows here, not in the middle of a run)
 
-    own = graph_module.optimise
+    optimiser = graph_module.optimise
     graph_module.optimise = gtsam_optimise
     try:
-        return time_mapping(run, MapperConfig())[0].trajectory()[1]
+        return own(run)
     finally:
-        graph_module.optimise = own
+        graph_module.optimise = optimiser
 
 
 def error(estimate: FloatArray, reference: FloatArray | None) -> str:
@@ -180,50 +179,48 @@ def error(estimate: FloatArray, reference: FloatArray | None) -> str:
     return f"{position:.3f} m, {math.degrees(heading):.2f} deg"
 
 
-def speed(scans: int, clocks: tuple[float, float]) -> str:
-    """Compute scans a second of processor time and of wall-clock time."""
-    return f"{scans / clocks[0]:.0f} ({scans / clocks[1]:.0f})"
-
-
 def first_scans(run: RecordedRun, most: int | None) -> RecordedRun:
     """Take the first scans of a run, all of them for ``None``."""
     reference = None if run.reference is None else run.reference[:most]
     return replace(run, scans=run.scans[:most], odometry=run.odometry[:most], reference=reference)
 
 
-def bench_log(path: Path, most: int | None) -> list[str]:
+def take_turns(run: RecordedRun, rounds: int) -> dict[str, tuple[FloatArray, float]]:
+    """Run every installed method ``rounds`` times, in turn: its trajectory, and its median processor time [s]."""
+    times: dict[str, list[float]] = {}
+    found: dict[str, FloatArray] = {}
+    for _ in range(rounds):
+        for name, method in (METHODS | VARIANTS).items():
+            start = time.process_time()
+            with contextlib.suppress(ImportError):
+                found[name] = method(run)
+                times.setdefault(name, []).append(time.process_time() - start)
+    return {name: (poses, median(times[name])) for name, poses in found.items()}
+
+
+def bench_log(path: Path, most: int | None, rounds: int) -> list[str]:
     """Measure one row of the table, on the first ``most`` scans."""
     run = first_scans(read_run(path), most)
-    n = len(run.scans)
+    mapper, online = map_run(run, MapperConfig())
+    found = take_turns(run, rounds)
 
-    taken: dict[object, float] = {}
-
-    def peer(work: Callable[[RecordedRun], FloatArray]) -> str:
-        start = clocks()
-        try:
-            poses = work(run)
-        except ImportError:
+    def told(name: str) -> str:
+        if name not in found:
             return "not installed"
-        passed = since(start)
-        taken[work] = passed[0]
-        return f"{error(poses, run.reference)}; {speed(n, passed)}"
+        poses, seconds = found[name]
+        return f"{error(poses, run.reference)}; {len(run.scans) / seconds:.0f}"
 
-    without, _, seconds_without = time_mapping(run, WITHOUT_LOOPS)
-    mapper, online, seconds = time_mapping(run, MapperConfig())
+    peers = [seconds for name, (_, seconds) in found.items() if name in METHODS and name != "closedrooms"]
     return [
         path.name.split(".")[0].removesuffix("-corrected"),
-        f"{n}",
+        f"{len(run.scans)}",
         error(run.odometry, run.reference),
-        peer(gicp),
-        peer(kiss),
-        f"{error(without.trajectory()[1], run.reference)}; {speed(n, seconds_without)}",
+        *(told(name) for name in ("small_gicp", "kiss-icp", "yag-slam", *VARIANTS)),
+        f"**{told('closedrooms')}**",
         error(online, run.reference),
-        f"**{error(mapper.trajectory()[1], run.reference)}**",
-        peer(with_gtsam),
         f"{len(mapper.loops)}",
         f"{len(mapper.keyframes)}",
-        speed(n, seconds),
-        f"{seconds[0] / min(taken[work] for work in known):.2f}" if (known := taken.keys() & {gicp, kiss}) else "",
+        f"{found['closedrooms'][1] / min(peers):.2f}" if peers else "",
     ]
 
 
@@ -248,11 +245,12 @@ def bench_parts(run: RecordedRun) -> None:
 
 
 METHODS: dict[str, Callable[[RecordedRun], FloatArray]] = {
-    "closedrooms": lambda run: time_mapping(run, MapperConfig())[0].trajectory()[1],
+    "closedrooms": own,
     "yag-slam": yag_slam,
     "small_gicp": gicp,
     "kiss-icp": kiss,
 }
+VARIANTS = {"without loops": without_loops, "with gtsam": with_gtsam}
 
 
 def main() -> None:
@@ -261,8 +259,9 @@ def main() -> None:
     parser.add_argument("--parts", action="store_true", help="also measure single steps, on the first log")
     parser.add_argument("--faults", action="store_true", help="with odometry that fails, as CSV")
     parser.add_argument(
-        "--quick", action="store_true", help=f"{QUICK} scans; with --faults: one seed, the worst faults"
+        "--quick", action="store_true", help=f"{QUICK} scans, once; with --faults: one seed, the worst faults"
     )
+    parser.add_argument("--rounds", type=int, default=3, help="turns of every method, of which the median counts")
     parser.add_argument("--seeds", type=int, default=5, help="with --faults: runs of each kind")
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS), help="with --faults: whose")
     parser.add_argument("--out", type=Path, help="with --faults: the file, else printed")
@@ -274,7 +273,9 @@ def main() -> None:
         return
     print(f"| {' | '.join(HEAD)} |\n| --- |{' ---: |' * (len(HEAD) - 1)}", flush=True)
     for path in options.logs:
-        print(f"| {' | '.join(bench_log(path, QUICK if options.quick else None))} |", flush=True)
+        print(
+            f"| {' | '.join(bench_log(path, *((QUICK, 1) if options.quick else (None, options.rounds))))} |", flush=True
+        )
     if options.parts:
         print(f"\nParts, on {options.logs[0].name}")
         bench_parts(read_run(options.logs[0]))

@@ -4,8 +4,9 @@
 
 Without a world it measures corridors with rooms on both sides, of growing length. Each world is crossed by a robot that
 turns away from what is near; the same poses are then cast by every way in turn, and the median of some repeats counts.
-The last column is "ours / best known": processor time of a noisy sweep against the quicker of PyBullet's bare
-``rayTestBatch`` and, where ``embreex`` is installed, Embree on the same walls, which is asked for distances alone.
+The last column is "ours / best known": processor time of a noisy sweep against the quickest of PyBullet's bare
+``rayTestBatch`` and the peers of ``ray_peers.py`` that are installed (Embree, IR-SIM, pyrobosim), which cast at the
+same walls and whose distances have to agree with ours.
 """
 
 import argparse
@@ -14,6 +15,8 @@ from collections.abc import Callable
 from statistics import median
 
 import numpy as np
+from numpy.typing import NDArray
+from ray_peers import PEERS
 from shapely.geometry import box
 
 from closedrooms.core.pose import Pose2
@@ -27,6 +30,8 @@ from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom, Wall
 
 LENGTHS = (20, 40, 80, 130)
+# Peers that take a quarter of a second a scan are asked for the first few.
+SLOW, FEW = {"pyrobosim"}, 5
 
 
 def comb(length: float) -> FloorPlan:
@@ -98,30 +103,18 @@ def bare_batches(physics: PhysicsWorld, poses: list[Pose2], lidar: LidarConfig) 
     return run
 
 
-def embree_batches(plan: FloorPlan, poses: list[Pose2], lidar: LidarConfig) -> Callable[[], object] | None:
-    """Prepare the same rays for Embree on the walls as extruded, ``None`` where it is not installed."""
-    try:
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-    except ImportError:
-        return None
-    vertices, faces = extrude(building_solids(plan))
-    scene = EmbreeScene()
-    TriangleMesh(scene, np.asarray(vertices, dtype=np.float32)[np.asarray(faces)])
-    angles = lidar.angle_min + lidar.angle_increment * np.arange(lidar.beams)
-    batches = []
-    for pose in poses:
-        starts = np.tile(np.array([pose.x, pose.y, lidar.height], dtype=np.float32), (lidar.beams, 1))
-        directions = np.zeros((lidar.beams, 3), dtype=np.float32)
-        directions[:, 0], directions[:, 1] = np.cos(angles + pose.theta), np.sin(angles + pose.theta)
-        batches.append((starts, directions))
-    return lambda: [scene.run(starts, directions, query="DISTANCE") for starts, directions in batches]
+def check_agreement(ranges: NDArray[np.float64], bare: NDArray[np.float64], name: str) -> None:
+    """Raise ``SystemExit`` where a peer casts other rays: more than one in a hundred differs by over 1 cm."""
+    share = float((np.abs(ranges - bare[: len(ranges)]) > 0.01).mean())
+    if share > 0.01:
+        raise SystemExit(f"{name} and PyBullet differ by more than 1 cm on {share:.0%} of the rays")
 
 
 def measure(plan: FloorPlan, scans: int, repeats: int) -> str:
     """Measure one line of the table."""
     config = SimConfig(noise=noise_level("medium"))
     closed = [door.id for door in plan.doors if None not in door.rooms][::6][:5]
+    solids = building_solids(plan)
     started = time.perf_counter()
     with Simulation(plan, closed, config, 0) as sim:
         built = time.perf_counter() - started
@@ -129,26 +122,33 @@ def measure(plan: FloorPlan, scans: int, repeats: int) -> str:
         physics, lidar = sim.physics, config.lidar
         scanner = Lidar(lidar, config.noise, physics, 0)
         with PhysicsWorld() as simple:
-            simple.add_static(*extrude(building_solids(plan)))
-            embree = embree_batches(plan, poses, lidar)
-            seconds = medians(
-                {
-                    **({"embree": embree} if embree else {}),
-                    "bare": bare_batches(simple, poses, lidar),
-                    "ours": bare_batches(physics, poses, lidar),
-                    "cast": lambda: [scanner.track(pose) for pose in poses],
-                    "sweep": lambda: [scanner.sweep(pose, 0.0) for pose in poses],
-                    "step": lambda: [sim.step(0.5, 0.5, 0.1) for _ in poses],
-                },
-                repeats,
-            )
-    rate = {name: scans * lidar.beams / 1000 / taken for name, taken in seconds.items()}
-    best = min(seconds["bare"], seconds.get("embree", np.inf))
-    x0, y0, x1, y1 = building_solids(plan).bounds
+            simple.add_static(*extrude(solids))
+            true = Lidar(lidar, config.noise, simple, 0)
+            ranges = np.minimum([true.track(pose)[0] for pose in poses], lidar.range_max)
+            ways: dict[str, Callable[[], object]] = {}
+            for name, peer in PEERS.items():
+                few = poses[: FEW if name in SLOW else None]
+                if cast := peer(solids, few, lidar):
+                    check_agreement(np.minimum(cast(), lidar.range_max), ranges, name)
+                    ways[name] = cast
+            ways |= {
+                "bare": bare_batches(simple, poses, lidar),
+                "ours": bare_batches(physics, poses, lidar),
+                "cast": lambda: [scanner.track(pose) for pose in poses],
+                "sweep": lambda: [scanner.sweep(pose, 0.0) for pose in poses],
+                "step": lambda: [sim.step(0.5, 0.5, 0.1) for _ in poses],
+            }
+            seconds = medians(ways, repeats)
+    for name in SLOW & seconds.keys():
+        seconds[name] *= scans / min(FEW, scans)
+    rate = {name: f"{scans * lidar.beams / 1000 / taken:.0f}" for name, taken in seconds.items()}
+    best = min(seconds[name] for name in (*PEERS, "bare") if name in seconds)
+    x0, y0, x1, y1 = solids.bounds
+    columns = (*PEERS, "bare", "ours", "cast", "sweep")
     return (
-        f"{plan.name[:20]:20} {max(x1 - x0, y1 - y0):6.1f} {len(plan.doors):5d} {built:6.2f}"
-        f" {rate.get('embree', np.nan):9.0f} {rate['bare']:9.0f}"
-        f" {rate['ours']:9.0f} {rate['cast']:9.0f} {rate['sweep']:9.0f} {seconds['step'] / scans * 1e6:8.0f}"
+        f"{plan.name[:20]:20} {max(x1 - x0, y1 - y0):6.1f} {len(plan.doors):5d} {built:6.2f} "
+        + " ".join(f"{rate.get(name, '-'):>9}" for name in columns)
+        + f" {seconds['step'] / scans * 1e6:8.0f}"
         f" {0.1 * scans / (seconds['sweep'] + seconds['step']):7.0f} {seconds['sweep'] / best:10.2f}"
     )
 
@@ -166,8 +166,10 @@ def main() -> None:
     print(f"{arguments.scans} scans; thousands of rays a second.\n")
     print("bare: rayTestBatch on the walls as extruded, without doors; bare+: on the simulation's own bodies, doors")
     print("included; true: Lidar.track; noisy: Lidar.sweep at medium noise; step: 0.1 s of driving; x real: both.\n")
-    print(f"{'world':20} {'size/m':>6} {'doors':>5} {'build':>6} {'embree':>9} {'bare':>9} {'bare+':>9}"
-          f" {'true':>9} {'noisy':>9} {'step/us':>8} {'x real':>7} {'ours/best':>10}")  # fmt: skip
+    heads = " ".join(f"{head:>9}" for head in (*PEERS, "bare", "bare+", "true", "noisy"))
+    print(
+        f"{'world':20} {'size/m':>6} {'doors':>5} {'build':>6} {heads} {'step/us':>8} {'x real':>7} {'ours/best':>10}"
+    )
     plans = [load_world(name) for name in arguments.worlds] or [
         comb(length) for length in LENGTHS[: 1 if arguments.quick else None]
     ]

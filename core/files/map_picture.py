@@ -94,6 +94,22 @@ def _lies_in(path: Path, folder: Path) -> bool:
         return False
 
 
+def is_lossy(path: Path) -> bool:
+    """Check whether a picture is a JPEG, whose greys are not quite those that were saved.
+
+    Raises:
+        InvalidInputError: Missing, no picture.
+    """
+    from PIL import Image
+
+    with opened(path, WHAT) as file:
+        try:
+            with Image.open(file, formats=("JPEG",)):
+                return True
+        except OSError:
+            return False
+
+
 def read_picture(path: Path) -> tuple[npt.NDArray[np.uint8], BoolArray | None]:
     """Read grey values and, where some may be transparent, which pixels are not; check the size before decoding.
 

@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from closedrooms.core.arrays import CellArray, handed_over
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.map_picture import picture_path, read_picture
+from closedrooms.core.files.map_picture import is_lossy, picture_path, read_picture
 from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.files.yaml_text import parse_yaml
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid, is_free, is_occupied
@@ -26,6 +26,8 @@ from closedrooms.core.room import Room
 # 205 is p = 0.196078: a free_thresh of 0.196 keeps it unknown, 0.25 would reload it as free.
 FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
 PIXEL_FREE, PIXEL_UNKNOWN, PIXEL_OCCUPIED = 254, 205, 0
+# Greys of a JPEG that are as far from the usual unknown still mean it: of plans saved at quality 50 and above.
+SPREAD = 24
 WHAT = "a ROS map (image, resolution, origin)"
 MAX_YAML = 1_000_000
 """Longest description of a map that is read [bytes]."""
@@ -180,7 +182,11 @@ def read_ros_map(path: Path, *, allow_outside: bool = False) -> RosMap:
     if other:
         why = f"{fields['image']} is not there or outside, the file of its name beside the YAML was read"
         remarks.append(Remark(action="guessed", what="picture", why=why, names=(image.name,)))
-    table = _raw() if mode == "raw" else _meanings(fields, mode, path)
+    lossy = mode == "trinary" and is_lossy(image)
+    if lossy:
+        why = f"a JPEG spreads greys: up to {SPREAD} from {PIXEL_UNKNOWN} counts as unknown"
+        remarks.append(Remark(action="guessed", what="cells", why=why, names=(image.name,)))
+    table = _raw() if mode == "raw" else _meanings(fields, mode, path, spread=SPREAD if lossy else 1)
     # A turned grid keeps its own axes, with its corner as their origin.
     corner, map_T_grid = ((x, y), IDENTITY) if yaw == 0.0 else ((0.0, 0.0), Pose2(x, y, yaw))
     return RosMap(_grid(image, table, resolution, *corner), map_T_grid, tuple(remarks))
@@ -265,8 +271,8 @@ def _raw() -> CellArray:
     return np.where(levels <= OCCUPIED, levels, UNKNOWN).astype(np.int8)
 
 
-def _meanings(fields: dict[str, Any], mode: str, path: Path) -> CellArray:
-    """Find the cell that each grey value stands for, shape (256,)."""
+def _meanings(fields: dict[str, Any], mode: str, path: Path, spread: int = 1) -> CellArray:
+    """Find the cell that each grey value stands for, shape (256,); so near to the usual unknown it stays unknown."""
     negate = _negate(fields.get("negate", "0"), path)
     free_below, occupied_above = _thresholds(fields, path)
     levels = np.arange(256)
@@ -280,7 +286,7 @@ def _meanings(fields: dict[str, Any], mode: str, path: Path) -> CellArray:
     if mode == "trinary":
         # Others write 204 or 206 for unknown, or a free_thresh (0.25) that turns 205 into free.
         unknown = 255 - PIXEL_UNKNOWN if negate else PIXEL_UNKNOWN
-        table[unknown - 1 : unknown + 2] = UNKNOWN
+        table[unknown - spread : unknown + spread + 1] = UNKNOWN
     return table
 
 

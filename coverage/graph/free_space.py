@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.coverage.config import GraphConfig
-from closedrooms.coverage.graph.reachable_space import find_outside, find_reachable, part_where_labels_meet
+from closedrooms.coverage.graph.reachable_space import Labels, find_outside, find_reachable, part_where_labels_meet
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,9 +35,9 @@ class FreeSpace:
     mask: BoolArray
     clean: BoolArray
     reachable: BoolArray
-    labels: IntArray
+    labels: Labels
     clearance: FloatArray
-    parts: IntArray
+    parts: Labels
     areas: FloatArray
     outside: float = 0.0
     unreachable: float = 0.0
@@ -76,13 +76,15 @@ def clean_free_space(grid: OccupancyGrid, config: GraphConfig) -> FreeSpace:
     if not mask.any():
         width = 2.0 * max(config.opening_radius, config.robot_radius)
         raise InvalidInputError("a map without free space to cover", expected=f"free space wider than {width:.2f} m")
+    clearance = _clearance(mask)
+    clearance *= resolution
     return FreeSpace(
         frame,
         mask,
         clean,
         reached.cells,
         reached.labels,
-        _clearance(mask) * resolution,
+        clearance,
         parts,
         areas,
         float(outside.sum()) * resolution**2,
@@ -198,7 +200,7 @@ def _without_corner_contacts(free: BoolArray) -> BoolArray:
         b[rising] = False
 
 
-def _parts(mask: BoolArray, reachable: BoolArray, resolution: float, *, least: float) -> tuple[IntArray, FloatArray]:
+def _parts(mask: BoolArray, reachable: BoolArray, resolution: float, *, least: float) -> tuple[Labels, FloatArray]:
     """Number connected parts (8 neighbours, as thinning keeps them) by falling area.
 
     Those below ``least`` [m2] and those without a reachable cell are left out.
@@ -210,7 +212,7 @@ def _parts(mask: BoolArray, reachable: BoolArray, resolution: float, *, least: f
     entered = np.bincount(labels[reachable & mask], minlength=count)[1:] > 0
     order = np.argsort(-areas, kind="stable")
     order = order[(areas[order] >= least) & entered[order]]
-    renumbered = np.zeros(len(stats), dtype=np.int64)
+    renumbered = np.zeros(len(stats), dtype=np.int32)
     renumbered[order + 1] = np.arange(1, len(order) + 1)
     return renumbered[labels], np.concatenate(([0.0], areas[order]))
 

@@ -122,7 +122,7 @@ def _chosen_parts(space: FreeSpace, config: CoverageConfig, start: Point | None)
         space,
         mask=mask,
         clearance=np.where(mask, space.clearance, 0.0),
-        parts=np.where(mask, 1, 0),
+        parts=mask.astype(np.int32),
         areas=np.array([0.0, space.areas[chosen]]),
     )
     return kept, notes

@@ -48,7 +48,7 @@ class TopologicalGraph(nx.Graph):  # type: ignore[type-arg]
         """Connected part of each vertex, shape (n,), from 0, read-only."""
         return frozen(self._vertex_values("part"), np.int64)
 
-    @property
+    @cached_property
     def kinds(self) -> tuple[VertexKind, ...]:
         """What each vertex is."""
         return tuple(self._vertex_values("kind"))

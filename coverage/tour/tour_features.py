@@ -25,8 +25,7 @@ def make_tour_features(tour: CoverageTour, map_name: str) -> list[GeoFeature]:
     features: list[GeoFeature] = []
     for number, point in enumerate(graph.vertices.tolist()):
         properties = {"map": map_name, "type": "vertex", "vertex": number, "visit": visit.get(number)}
-        if graph.kinds:
-            properties["kind"] = graph.kinds[number]
+        properties["kind"] = graph.kinds[number]
         if number in doors:
             properties["door"] = doors[number]
         features.append((Point(point), properties))

@@ -9,6 +9,7 @@ from typing import Any
 
 from closedrooms.core.files.outgoing import write_json
 from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer, real_path
+from closedrooms.core.remarks import Remark
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.claimed_folder import claim_folder
@@ -64,6 +65,7 @@ def _evaluate(samples: Sequence[SamplePath], config: EvaluateConfig, progress: P
     progress.stage("report")
     summary = write_report(config.out, scores, samples, config, failures)
     seconds = _seconds(scores)
+    remarks = _unchecked(samples)
     manifest = {
         "program": PROGRAM,
         "command": "evaluate",
@@ -73,6 +75,7 @@ def _evaluate(samples: Sequence[SamplePath], config: EvaluateConfig, progress: P
         "samples": len(samples),
         "summary": summary,
         "failures": failures,
+        "remarks": [remark.as_json() for remark in remarks],
         "durations": {"prediction_median_s": seconds},
         "files": sorted(path.name for path in config.out.iterdir() if path.name != MANIFEST),
     }
@@ -82,8 +85,16 @@ def _evaluate(samples: Sequence[SamplePath], config: EvaluateConfig, progress: P
         title=f"{len(samples)} samples",
         rows=_rows(summary, seconds),
         failures=failures,
+        remarks=remarks,
         figures={"summary": summary, "prediction_median_s": seconds},
     )
+
+
+def _unchecked(samples: Sequence[SamplePath]) -> list[Remark]:
+    """Tell of a dataset's samples that its checksums do not name, so that a change would not show."""
+    names = tuple(sample.name for sample in samples if sample.listed and not (sample.shard or sample.digest))
+    why = "not in SHA256SUMS, taken as they are"
+    return [Remark(action="guessed", what="samples", why=why, names=names, count=len(names))] if names else []
 
 
 def _rows(summary: Sequence[Mapping[str, Any]], seconds: Mapping[str, float]) -> list[tuple[str, ...]]:

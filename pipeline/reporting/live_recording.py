@@ -26,12 +26,15 @@ if TYPE_CHECKING:
 
 # What is known has grown much when it has by this factor.
 GROWN = 1.5
+# Cells of a map from which on a prediction takes seconds: then a door more is no reason for one.
+LARGE = 5_000_000
 
 
 class InterimPrediction:
     """Prediction made anew whenever a closed door is first seen, so that a recording shows how it changes.
 
-    With a door known, it also does when what is known has grown by half: else it would stand still for minutes.
+    With a door known, it also does when what is known has grown by half: else it would stand still for minutes. Of a
+    large map, that alone is a reason.
     """
 
     def __init__(self, recorder: "Recorder", predict: Predict, truth: Sequence[Room]) -> None:
@@ -56,7 +59,8 @@ class InterimPrediction:
         """
         new = [door.id for door in doors if door.id not in self._seen]
         known = int(grid.known.sum())
-        if not doors or not (new or known > GROWN * self._known):
+        large = grid.cells.size > LARGE
+        if not doors or not ((new and not large) or known > GROWN * self._known):
             return None
         self._seen.update(new)
         self._known = known

@@ -84,7 +84,7 @@ class SummedAreaTable:
             low: First end, shape (n,).
             high: Last end, shape (n,).
         """
-        at = np.clip(position, self.col, self.col + self.sums.shape[1] - 2)
+        at = np.minimum(np.maximum(position, self.col), self.col + self.sums.shape[1] - 2)
         return self.count(low, at, high, at + 1).astype(np.float64)
 
 

@@ -19,6 +19,9 @@ from closedrooms.predictor.prediction import WeighedRoom
 # (1, 0), 0.698 (1, 4), 0.694 (2, 4), 0.695 (4, 8).
 WORDS = ("sides", "cells")
 WEIGHTS = np.array([1.0, 4.0])
+# Weights of ``best.shared_rooms.SHARED_FEATURES`` for scores that hold what the network says, found as those of
+# ``best`` by ``benchmarks/fitting/fit_shared_rooms.py``.
+SHARING = np.array([-0.3, 0.138, 1.31, -0.215, -3.39, 4.25, -0.517])
 
 
 @dataclass(slots=True, eq=False)
@@ -45,7 +48,7 @@ class Rater:
             doors: [self._rate([names[i] for i in doors], part) for part in parts]
             for doors, parts in proposals.shared.items()
         }
-        return replace(proposals, alone=alone, shared=shared)
+        return replace(proposals, alone=alone, shared=shared, sharing=SHARING)
 
     def _rate(self, doors: Sequence[str], own: Hypotheses) -> Hypotheses:
         """Add what the network says to the scores of rectangles, and keep the best of them in order."""

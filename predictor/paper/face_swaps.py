@@ -86,10 +86,8 @@ def _joint(areas: FloatArray, to_a: BoolArray, pool: FaceSet, config: PaperConfi
 
 
 def _connected(inner: FloatArray, chosen: BoolArray) -> bool:
-    """Check whether the faces chosen hang together by edges."""
+    """Check whether the faces chosen, at least one, hang together by edges."""
     members = np.flatnonzero(chosen)
-    if members.size == 0:
-        return False
     seen, queue = {int(members[0])}, [int(members[0])]
     while queue:
         for other in np.flatnonzero((inner[queue.pop()] > 0) & chosen):

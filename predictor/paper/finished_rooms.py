@@ -6,7 +6,7 @@ from shapely.geometry import Polygon
 from closedrooms.core.room import Room, RoomKind
 from closedrooms.core.shapes import take_away
 from closedrooms.predictor.config import PaperConfig
-from closedrooms.predictor.disjoint_rooms import NO_ROOM, part_rooms
+from closedrooms.predictor.disjoint_rooms import NO_ROOM, SMALLEST, part_rooms
 from closedrooms.predictor.paper.arrangement import unite_faces
 from closedrooms.predictor.paper.border import BorderRoom, border_rooms
 from closedrooms.predictor.paper.expansion import Growth
@@ -49,11 +49,15 @@ def finish_rooms(start: InitialFaces, growth: Growth, config: PaperConfig) -> tu
 
 
 def _gather_shapes(start: InitialFaces, growth: Growth, border: dict[int, BorderRoom]) -> dict[int, Polygon]:
-    """Unite the faces of each layout; border rooms take what is left beside them, the shallowest first (3.6)."""
+    """Unite the faces of each layout; border rooms take what is left beside them, the shallowest first (3.6).
+
+    Where hardly anything is left, or a sliver of rounding, the shape is empty.
+    """
     shapes = {room: unite(growth, room) for room in range(len(start.entrances)) if room not in border}
     for room in sorted(border, key=lambda r: (border[r].depth, start.entrances[r].door.midpoint)):
         free = take_away(border[room].polygon(), shapes.values())
-        shapes[room] = max(shapely.get_parts(free).tolist(), key=lambda part: part.area, default=Polygon())
+        left = max(shapely.get_parts(free).tolist(), key=lambda part: part.area, default=Polygon())
+        shapes[room] = left if left.area >= SMALLEST else Polygon()
     return shapes
 
 

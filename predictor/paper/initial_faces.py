@@ -50,7 +50,7 @@ def enter_face(arrangement: Arrangement, door: ClosedDoor, edge: int, face: int)
 def distances_to_edges(arrangement: Arrangement, point: FloatArray) -> FloatArray:
     """Measure the distance of a point to every edge [m], shape (m,)."""
     start, span = arrangement.edges[:, 0], arrangement.edges[:, 1] - arrangement.edges[:, 0]
-    along = ((point - start) * span).sum(axis=1) / np.maximum((span**2).sum(axis=1), 1e-18)
+    along = ((point - start) * span).sum(axis=1) / (span**2).sum(axis=1)
     foot = start + np.clip(along, 0.0, 1.0)[:, None] * span
     return np.asarray(np.hypot(*(point - foot).T))
 

@@ -118,7 +118,7 @@ class FaceSet:
         shared = ((some @ self.inner_length) * some).sum(axis=1)
         low = np.where(chosen[:, :, None], self.boxes[None, :, 0::2], np.inf).min(axis=1)
         high = np.where(chosen[:, :, None], self.boxes[None, :, 1::2], -np.inf).max(axis=1)
-        sides = np.maximum(high - low, 1e-9)
+        sides = high - low
         counts = np.rint(free)
         return Terms(
             area=area,
@@ -126,7 +126,7 @@ class FaceSet:
             faces=some.sum(axis=1),
             free_edges=free.sum(axis=1),
             free_length=length.sum(axis=1),
-            contour=np.maximum(some @ self.perimeters - shared, 1e-9),
+            contour=some @ self.perimeters - shared,
             two_free=(counts == 2).sum(axis=1).astype(np.float64),
             more_free=(counts > 2).sum(axis=1).astype(np.float64),
             proportion=sides.max(axis=1) / sides.min(axis=1),

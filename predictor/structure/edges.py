@@ -102,7 +102,7 @@ def find_edges(
         slope = cv2.magnitude(gx, gy)
         if among_free:
             slope *= free
-        steepest = max(steepest, float(slope.max(initial=0.0)))
+        steepest = max(steepest, float(slope.max()))
         at = np.flatnonzero((slope > STEEP * steepest) & free)
         found.append((at + first * cols, slope.ravel()[at], gx.ravel()[at], gy.ravel()[at]))
     cells, slopes, across, up = (np.concatenate(parts) for parts in zip(*found, strict=True))

@@ -46,8 +46,8 @@ def at_resolution(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:
     if abs(frame.resolution - resolution) < 1e-6 * resolution:
         return grid
     x_min, y_min, x_max, y_max = frame.bounds
-    rows = max(int(np.ceil((y_max - y_min) / resolution - 1e-9)), 1)
-    cols = max(int(np.ceil((x_max - x_min) / resolution - 1e-9)), 1)
+    rows = int(np.ceil((y_max - y_min) / resolution - 1e-9))
+    cols = int(np.ceil((x_max - x_min) / resolution - 1e-9))
     if rows * cols > MAX_CELLS:
         raise InvalidInputError(
             f"a known area of {x_max - x_min:g} x {y_max - y_min:g} m in cells of {frame.resolution:g} m",

@@ -19,7 +19,7 @@ def find_circular_peaks(profile: FloatArray, prominence: float) -> IntArray:
     turns = np.concatenate((profile, profile, profile))
     # Plateaus: first and last of each run of equal values.
     firsts = np.flatnonzero(np.concatenate(([True], np.diff(turns) != 0.0)))
-    lasts = np.append(firsts[1:] - 1, len(turns) - 1)
+    lasts = firsts[1:] - 1
     heights = turns[firsts]
     inner = np.arange(1, len(firsts) - 1)
     tops = inner[(heights[inner] > heights[inner - 1]) & (heights[inner] > heights[inner + 1])]

@@ -153,3 +153,38 @@ def test_a_door_without_a_vertex_of_its_own_is_walked_to_and_back(plain, monkeyp
     tour = solve_tour(built.graph, plain.tour, start=built.start).length
     assert length == pytest.approx(tour + 2.0 * away)
     assert tour <= usual + 1e-9
+
+
+def test_unless_told_otherwise_sixteen_thousandths_of_the_tour_are_in_doubt(plain):
+    # What was measured: a standard deviation of 1.6 % of its length.
+    spread = spread_cost(1000.0, FRAME, DOORS, [], None, plain, count=400, seed=3)
+    assert (spread.high - spread.low) / 2.0 == pytest.approx(1.645 * 16.0, rel=0.05)
+    assert spread.mean == pytest.approx(1000.0)
+
+
+def test_figures_are_told_to_a_tenth_of_a_millimetre():
+    spread = replace(summarise(np.array([1.23456, 1.23456])), held=0.123456)
+    assert spread.figures() == {
+        "count": 2, "mean_m": 1.2346, "interval": 0.1235, "low_m": 1.2346, "high_m": 1.2346,
+        "lengths_m": [1.2346, 1.2346],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("leaf", [True, False])
+def test_a_room_is_drawn_by_itself_with_its_door_open(leaf):
+    # In cells of 0.5 m: the room from (2, 2) to (5, 4) m, its outline through the middles of cells; a door below.
+    frame = GridFrame(0.5, 0.0, 0.0, 20, 20)
+    door = ClosedDoor("d", (3.5, 2.25), ((3.0, 2.25), (4.0, 2.25)) if leaf else None)
+    grid = cost_spread._rasterise_room(box(2.25, 2.25, 5.25, 4.25), door, frame)
+    # Half a metre and what a cell holds around room and opening.
+    assert grid.frame == frame.cropped(2, 3, 8, 9)
+    expected = np.full((8, 9), -1)
+    expected[2:7, 1:8] = 100
+    expected[3:6, 2:7] = 0
+    # Centres of cells within 0.3 m of the leaf, or within 0.4 m of the middle of a door without one.
+    centres = grid.frame.to_points(np.stack(np.indices((8, 9)), axis=-1)) - (3.5, 2.25)
+    if leaf:
+        expected[(np.abs(centres[..., 0]) < 0.5) & (np.abs(centres[..., 1]) < 0.3)] = 0
+    else:
+        expected[np.hypot(centres[..., 0], centres[..., 1]) < 0.4] = 0
+    assert np.array_equal(grid.cells, expected)

@@ -15,6 +15,8 @@ from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.experiments.dataset.checksums import checksums, digest
+from closedrooms.experiments.evaluation.config import EvaluateConfig
+from closedrooms.experiments.evaluation.evaluate import evaluate
 from closedrooms.experiments.evaluation.samples.listing import find_samples
 from closedrooms.experiments.evaluation.samples.sample_reader import read_sample
 
@@ -138,6 +140,19 @@ def test_a_truncated_sample_is_named_and_the_others_are_evaluated(
     assert list(failures) == [IDS[0]]
     assert f"closedrooms: {IDS[0]}: changed since it was written" in said
     assert (tmp_path / "out" / "paper" / IDS[1] / "rooms.geojson").exists()
+
+
+@pytest.mark.parametrize("kept", [0, 1, 2])
+def test_samples_that_no_checksum_guards_are_named(kept: int, tmp_path: Path) -> None:
+    sums = write_dataset(tmp_path / "data") / "SHA256SUMS"
+    sums.write_text("".join(sums.read_text().splitlines(keepends=True)[:kept]))
+    options = {"methods": ("paper",), "tours": False, "workers": 1}
+    report = evaluate(EvaluateConfig(datasets=(tmp_path / "data",), out=tmp_path / "out", **options))
+    unguarded = sorted(IDS[kept:])
+    assert [remark.names for remark in report.remarks] == ([tuple(unguarded)] if unguarded else [])
+    told = json.loads((tmp_path / "out" / "run.json").read_text())["remarks"]
+    assert [remark["names"] for remark in told] == ([unguarded] if unguarded else [])
+    assert not report.partial
 
 
 @pytest.mark.parametrize(

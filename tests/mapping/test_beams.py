@@ -163,9 +163,7 @@ def thinned(points: np.ndarray, spacing: float, most: int) -> np.ndarray:
     along = np.concatenate(([0.0], np.cumsum(steps)))
     width = max(spacing, along[-1] / most)
     kept = [0]
-    for number in range(1, len(points)):
-        if math.floor(along[number] / width) > math.floor(along[number - 1] / width):
-            kept.append(number)
+    kept += [n for n in range(1, len(points)) if math.floor(along[n] / width) > math.floor(along[n - 1] / width)]
     return points[kept]
 
 
@@ -183,7 +181,8 @@ def test_points_are_thinned_along_the_scan(count: int, spacing: float, most: int
 
 
 @pytest.mark.parametrize(
-    ("longest", "most", "matched"), [(30.0, 25.0, 25.0), (25.0, 25.0, 24.0), (12.0, 25.0, 11.0), (5.0, 25.0, 4.5), (3.5, 2.0, 2.0)]
+    ("longest", "most", "matched"),
+    [(30.0, 25.0, 25.0), (25.0, 25.0, 24.0), (12.0, 25.0, 11.0), (5.0, 25.0, 4.5), (3.5, 2.0, 2.0)],
 )
 def test_points_at_the_end_of_sight_are_not_matched(longest: float, most: float, matched: float) -> None:
     found = matched_range(LaserScan(np.ones(3), 0.0, 0.1, longest), max_range=most, margin=1.0)

@@ -36,13 +36,15 @@ class GlassWorld(SegmentWorld):
         return np.where(incidence < SEEN, np.minimum(solid, pane), solid)
 
 
-def mapped(world: SegmentWorld, route: list[tuple[float, float]], *, glass: bool = True) -> tuple[OccupancyGrid, Pose2]:
-    """Map a drive, drawing now and then; returns the map and where the world lies in it."""
+def mapped(
+    world: SegmentWorld, route: list[tuple[float, float]], *, glass: bool = True, drawn: int = 5
+) -> tuple[OccupancyGrid, Pose2]:
+    """Map a drive, drawing every so many scans; returns the map and where the world lies in it."""
     drive = world.drive(route, noise=0.01, beams=720)
     mapper = Mapper(MapperConfig(glass=glass))
     for number, (scan, odometry) in enumerate(zip(drive.scans, drive.odometry, strict=True)):
         mapper.process(scan, Pose2(*odometry))
-        if number % 5 == 0:
+        if number % drawn == 0:
             mapper.grid()
     mapper.finish()
     (x0, y0), (x1, y1) = route[:2]
@@ -80,6 +82,12 @@ def test_without_it_the_room_behind_is_mapped_through_the_pane() -> None:
     assert occupied_share(grid, map_T_world, PANE) < 0.7
 
 
+def test_the_last_map_does_not_depend_on_how_often_it_was_drawn_before() -> None:
+    pane = (0.8, 6.0, 2.0, 6.0)
+    often, seldom = (mapped(GlassWorld(walls_beside(pane), pane), ROUTE, drawn=drawn)[0] for drawn in (5, 10**6))
+    assert (often.on(seldom.frame).cells == seldom.cells).all()
+
+
 def test_a_slanted_pane_is_one_too() -> None:
     turn = Pose2(0.0, 0.0, 0.5)
     segments = [tuple(turn.transform(np.array(s).reshape(2, 2)).ravel().tolist()) for s in [*HALL, PANE]]
@@ -105,6 +113,44 @@ def test_a_doorway_that_was_seen_from_the_front_stays_open_beside_a_pane() -> No
     assert occupied_share(grid, map_T_world, (4.25, 6.0, 4.75, 6.0)) == 0.0
 
 
+def walls_beside(pane: tuple[float, ...]) -> list[tuple[float, float, float, float]]:
+    """The hall with a wall from its corners up to a pane in the wall to the room."""
+    without = [wall for wall in HALL if wall[1::2] != (6.0, 6.0)]
+    return [*without, (0.0, 6.0, pane[0], 6.0), (pane[2], 6.0, 8.0, 6.0)]
+
+
+def test_a_pane_between_walls_may_be_short() -> None:
+    pane = (3.7, 6.0, 4.3, 6.0)
+    grid, map_T_world = mapped(GlassWorld(walls_beside(pane), pane), ROUTE)
+    assert known_share(grid, map_T_world, ROOM_BEHIND) < 0.01
+    assert occupied_share(grid, map_T_world, pane) > 0.95
+
+
+def test_a_pane_that_was_seen_from_the_front_in_part_goes_on_to_the_wall() -> None:
+    # The robot comes up to its left end alone; the whole of it was seen through from the side.
+    route = [(7.0, 3.0), (3.4, 3.0), (3.4, 5.2), (3.4, 3.0)]
+    grid, map_T_world = mapped(GlassWorld(HALL), route)
+    assert known_share(grid, map_T_world, ROOM_BEHIND) < 0.01
+    assert occupied_share(grid, map_T_world, PANE) > 0.95
+
+
+def test_a_doorway_beside_a_pane_that_the_robot_drove_through_stays_open() -> None:
+    # At an angle, so that nothing else tells that there is no glass.
+    pane = (3.0, 6.0, 4.0, 6.0)
+    grid, map_T_world = mapped(GlassWorld(HALL, pane), [(1.0, 5.0), (3.5, 5.0), (4.5, 6.0), (5.5, 7.0)])
+    assert occupied_share(grid, map_T_world, pane) > 0.95
+    assert occupied_share(grid, map_T_world, (4.3, 6.0, 4.7, 6.0)) == 0.0
+    assert known_share(grid, map_T_world, ROOM_BEHIND) > 0.9
+
+
+def test_a_pane_before_which_a_robot_turned_for_long_is_one() -> None:
+    # All these scans from one place hit it, those that come from elsewhere and went through are few.
+    turns = [(4.0, 5.4), (4.0, 5.3)] * 3
+    grid, map_T_world = mapped(GlassWorld(HALL), [(1.0, 3.0), (4.0, 3.0), *turns])
+    assert known_share(grid, map_T_world, ROOM_BEHIND) < 0.01
+    assert occupied_share(grid, map_T_world, PANE) > 0.95
+
+
 def test_a_pane_is_found_from_close_by() -> None:
     # Half a metre away, beams to either side of what is met askew meet the pane near its normal.
     pane, beside = (3.5, 6.0, 4.5, 6.0), [(0.0, 6.0, 3.5, 6.0), (4.5, 6.0, 8.0, 6.0)]
@@ -127,11 +173,39 @@ def test_somebody_who_stood_there_and_left_is_no_pane() -> None:
     assert occupied_share(mapper.grid(), start, (3.9, 3.2, 4.1, 3.2)) == 0.0
 
 
+def test_somebody_who_stood_in_a_doorway_is_no_pane() -> None:
+    # Who stands in it is seen from the front; when they have left it is only seen at an angle.
+    doorway, person = (3.5, 6.0, 4.5, 6.0), [(3.8, 5.9, 4.2, 5.9), (4.2, 5.9, 4.2, 6.2), (3.8, 5.9, 3.8, 6.2)]
+    world = walls_beside(doorway)
+    route = [(1.0, 3.5), (4.0, 3.5), (4.0, 4.2), (6.0, 4.2), (7.0, 5.0), (6.0, 4.0), (7.5, 5.2)]
+    there, gone = SegmentWorld([*world, *person]).drive(route, beams=720), SegmentWorld(world).drive(route, beams=720)
+    mapper, left = Mapper(), next(i for i, pose in enumerate(there.truth) if pose[0] > 4.0)
+    for number, odometry in enumerate(there.odometry):
+        mapper.process((there if number < left else gone).scans[number], Pose2(*odometry))
+    mapper.finish()
+    mapper.grid()
+    assert len(mapper.panes) == 0
+
+
 @pytest.mark.parametrize("lateral", [0.0, 0.12])
 def test_a_view_tells_how_far_beams_went_beyond_a_place(office: SegmentWorld, lateral: float) -> None:
     view = View(clean(office.scan(Pose2(6.0, 1.0, 0.0), beams=720), max_range=25.0))
     places = np.array([[3.0, 0.0], [5.95, 0.0], [6.6, 0.0]])
     assert view.beyond(places, lateral) == pytest.approx([3.0, 0.05, -0.6], abs=0.03)
+
+
+def test_a_view_looks_at_all_beams_beside_a_place_and_no_others(office: SegmentWorld) -> None:
+    beams = clean(office.scan(Pose2(6.0, 1.0, 0.3), beams=720), max_range=25.0)
+    ranges, bearings = np.hypot(*beams.outline.T), np.arctan2(beams.outline[:, 1], beams.outline[:, 0])
+    draws = np.random.default_rng(3).uniform(size=(3, 200))
+    bearing, distance, lateral = np.pi * (1.8 * draws[0] - 0.9), 1.0 + 3.0 * draws[1], 0.02 + 0.2 * draws[2]
+    places = distance[:, None] * np.column_stack((np.cos(bearing), np.sin(bearing)))
+    beyond = View(beams).beyond(places, lateral)
+    off, step = np.abs(bearings - bearing[:, None]), 2.0 * np.pi / len(bearings)
+    nearest_in = [np.where(off <= (lateral / distance)[:, None] + slack, ranges, np.inf).min(axis=1) - distance
+                  for slack in (-step, 2.0 * step)]  # fmt: skip
+    assert (nearest_in[1] - 1e-9 <= beyond).all()
+    assert (beyond <= nearest_in[0] + 1e-9).all()
 
 
 def test_faces_of_a_wall_point_across_it(office: SegmentWorld) -> None:

@@ -186,6 +186,22 @@ def test_processor_time_ends_a_run_too() -> None:
     assert "processor time" in result.reason
 
 
+def test_processor_time_of_the_run_before_counts() -> None:
+    config = NavigationConfig(time_limit=1.0).for_robot(RobotConfig())
+
+    def run(spent: float) -> LoopLog:
+        world = CellWorld(building(), START)
+        return run_loop(world, CellMapper(world.walls.shape), Explorer(config), config, spent=spent)
+
+    first = run(0.0)
+    assert 0.0 < first.cpu_seconds < config.cpu_limit
+    assert "simulated" in first.reason
+    second = run(config.cpu_limit)
+    assert (second.status, second.scans) == ("limit", 1)
+    assert f"{config.cpu_limit:g} s of processor time" in second.reason
+    assert second.cpu_seconds > config.cpu_limit
+
+
 def test_whoever_knows_more_may_stop_the_run() -> None:
     world = CellWorld(building(), START)
     config = NavigationConfig().for_robot(RobotConfig())

@@ -127,10 +127,10 @@ def test_a_map_of_so_many_cells_is_small_enough_and_of_one_more_is_not() -> None
 
 
 def test_processor_time_is_that_of_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = iter([100.0, 104.9, 105.0])
+    clock = iter([100.0, 104.9, 105.0, 105.5])
     monkeypatch.setattr("closedrooms.navigation.control_loop.process_time", lambda: next(clock))
     log, _ = run(20, NavigationConfig(cpu_limit=5.0).for_robot(RobotConfig()))
-    assert (log.status, log.scans) == ("limit", 2)
+    assert (log.status, log.scans, log.cpu_seconds) == ("limit", 2, 5.5)
     assert "5 s of processor time" in log.reason
 
 

@@ -131,3 +131,52 @@ def test_a_door_whose_floor_another_room_has_taken_leads_into_that_room(depth: f
     for door in doors:
         row, col = found.grid.frame.to_cells(np.array(door.midpoint)).tolist()
         assert found.grid.free[row, col]
+
+
+@pytest.mark.parametrize(("width", "stays"), [(0.34, False), (0.36, True)])
+def test_what_is_narrower_than_a_shelf_is_no_room(width: float, stays: bool) -> None:
+    better, worse = Room(box(0, 0, 4, 4), ("a",), None, 2.0), Room(box(0, 0, 4 + width, 4), ("b",), None, 1.0)
+    parted, failures = part_rooms([worse, better], {"a": (0.0, 2.0), "b": (4.0 + width, 2.0)})
+    assert bool(failures) != stays
+    assert sum(room.polygon.area for room in parted) == pytest.approx(16.0 + (4 * width if stays else 0.0))
+
+
+@pytest.mark.parametrize(("height", "stays"), [(0.49, False), (0.51, True)])
+def test_what_is_left_is_a_room_from_half_a_square_metre_on(height: float, stays: bool) -> None:
+    better, worse = Room(box(0, 0, 4, 4), ("a",), None, 2.0), Room(box(0, 0, 5, height), ("b",), None, 1.0)
+    _, failures = part_rooms([worse, better], {"a": (0.0, 2.0), "b": (5.0, 0.2)})
+    assert bool(failures) != stays
+
+
+@pytest.mark.parametrize(("away", "stays"), [(0.29, True), (0.31, False)])
+def test_what_is_left_begins_at_its_door_or_three_tenths_of_a_metre_further(away: float, stays: bool) -> None:
+    # The door of b is 0.1 m outside of it; of what is left it lies further by so much.
+    better, worse = Room(box(0, 0, 4, 4), ("a",), None, 2.0), Room(box(0, 0, 8, 4), ("b", "c"), None, 1.0)
+    doors = {"a": (0.0, 2.0), "b": (4.0 - away, -0.1), "c": (8.0, 2.0)}
+    near = Point(doors["b"]).distance(box(4, 0, 8, 4))
+    assert near == pytest.approx(np.hypot(away, 0.1))
+    parted, failures = part_rooms([worse, better], doors | {"b": (4.0 - away, -1e-9)})
+    assert parted[0].doors == (("b", "c") if stays else ("c",))
+    assert failures == ({} if stays else {"b": NO_ROOM})
+
+
+def test_of_rooms_as_good_as_each_other_the_smaller_keeps_the_floor_then_that_whose_door_comes_first() -> None:
+    small, large = Room(box(0, 0, 4, 3), ("a",), None, 2.0), Room(box(0, 0, 4, 6), ("b",), None, 2.0)
+    parted, _ = part_rooms([large, small], {"a": (2.0, 0.0), "b": (2.0, 6.0)})
+    assert [room.polygon.area for room in parted] == pytest.approx([12.0, 12.0])
+    same = [Room(box(x, 0, x + 4, 4), (name,), None, None) for x, name in ((0, "a"), (2, "b"))]
+    for first, second in (((0.0, 2.0), (6.0, 2.0)), ((0.0, 2.0), (6.0, 1.0))):
+        parted, _ = part_rooms(same, {"a": first, "b": second})
+        assert [room.polygon.area for room in parted] == pytest.approx([16.0, 8.0])
+    parted, _ = part_rooms(same, {"a": (2.2, 0.0), "b": (2.1, 0.0)})
+    assert [room.polygon.area for room in parted] == pytest.approx([8.0, 16.0])
+
+
+def test_the_largest_part_that_is_left_behind_a_door_is_the_room() -> None:
+    better, worse = Room(box(2, 0, 4, 4), ("a",), None, 2.0), Room(box(0, 0, 9, 4), ("b",), None, 1.0)
+    for door in ((1.0, 0.0), (7.0, 0.0)):
+        parted, _ = part_rooms([better, worse], {"a": (3.0, 0.0), "b": door})
+        assert parted[1].polygon.area == pytest.approx(8.0 if door[0] < 2.0 else 20.0)
+    # Of a door that is not known it is the largest.
+    parted, _ = part_rooms([better, worse], {"a": (3.0, 0.0)})
+    assert parted[1].polygon.area == pytest.approx(20.0)

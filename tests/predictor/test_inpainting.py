@@ -10,6 +10,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
+from closedrooms.predictor import inpainting
 from closedrooms.predictor.inpainting import find_passage, inpaint, withdraw_unsure
 from closedrooms.predictor.prediction import Prediction
 from closedrooms.predictor.structure.doorways import FacingDoor
@@ -77,6 +78,18 @@ def test_without_rooms_the_map_is_the_one_that_was_given() -> None:
 def test_rooms_that_are_far_too_large_for_the_cells_are_refused() -> None:
     with pytest.raises(InvalidInputError, match="is the map's resolution in metres"):
         inpaint(grid_of(unknown()), [shapely.box(0, 0, 1e5, 1e5)], [])
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0), (-300.0, 200.0), (500.0, -700.0)])
+def test_rooms_over_as_many_cells_as_there_may_be_are_drawn_wherever_they_are(place, monkeypatch) -> None:
+    grid = grid_of(unknown(4, 4), *place)
+    # 12 x 8 cells of 0.5 m, from the outer sides of two rooms.
+    rooms = [shapely.affinity.translate(shapely.box(*box), *place) for box in ((0, 0, 2, 1), (5, 3, 6, 4))]
+    monkeypatch.setattr(inpainting, "MAX_CELLS", 96)
+    assert inpaint(grid, rooms, []).occupied.any()
+    monkeypatch.setattr(inpainting, "MAX_CELLS", 95)
+    with pytest.raises(InvalidInputError, match=r"^rooms over 6 x 4 m in cells of 0.5 m; expected at most 95 cells"):
+        inpaint(grid, rooms, [])
 
 
 def before_a_wall() -> np.ndarray:

@@ -39,3 +39,11 @@ def test_cells_are_rated_by_the_overlap_of_what_is_unknown_with_the_mask():
     shared, area = (room.mask * room.unknown * weight).sum(), (room.unknown * weight).sum()
     wider = box + np.array([[-0.125, -0.125, 0.125, 0.125]])
     assert room.rate_cells(wider)[0] == pytest.approx(shared / (area + whole - shared))
+
+
+def test_where_all_is_known_cells_say_nothing():
+    room = SeenRoom(np.zeros(64), np.zeros(64), np.zeros(96), np.ones((SIZE, SIZE)), np.zeros((SIZE, SIZE)))
+    assert room.rate_cells(np.array([[10.0, 8.0, 14.0, 12.0]])).tolist() == [0.0]
+    # Beyond the patch as well.
+    open_ = SeenRoom(np.zeros(64), np.zeros(64), np.zeros(96), np.ones((SIZE, SIZE)), np.ones((SIZE, SIZE)))
+    assert open_.rate_cells(np.array([[-9.0, -9.0, -1.0, -1.0], [-9.0, -9.0, 99.0, 99.0]])).tolist() == [0.0, 1.0]

@@ -13,6 +13,7 @@ from shapely.geometry import Point, Polygon, box
 
 from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
+from closedrooms.sim import contacts
 from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.contacts import (
     CELL,
@@ -184,7 +185,7 @@ def test_the_entrance_of_the_building_is_shut(plan: FloorPlan) -> None:
         assert sim.true_ranges(Pose2(10.0, 1.75, 0.0)).max() < 13.0
 
 
-coordinates = st.floats(-6.0, 6.0)
+coordinates = st.integers(-6000, 6000).map(lambda number: number / 1000)
 edges = st.tuples(coordinates, coordinates, coordinates, coordinates)
 
 
@@ -289,3 +290,26 @@ def test_round_the_end_of_a_wall_the_disc_rolls() -> None:
     assert moved.touched
     assert moved.y < 0.0
     assert exact_distance(moved.x, moved.y, end[0]) >= RADIUS
+
+
+@given(
+    edges=st.lists(st.tuples(*[coordinates] * 4), max_size=12),
+    reach=st.floats(0.1, 1.0),
+    most=st.sampled_from([1, 200, 1_000_000]),
+)
+@settings(max_examples=50, deadline=None)
+def test_every_edge_within_reach_of_a_place_is_found_in_order(
+    edges: list[tuple[float, float, float, float]], reach: float, most: int
+) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(contacts, "MOST_CELLS", most)
+        obstacles = Obstacles(np.array(edges).reshape(-1, 4), reach)
+    for x, y in np.random.default_rng(0).uniform(-10.0, 10.0, (40, 2)).tolist():
+        found = list(obstacles.near(x, y))
+        assert found == [edge for edge in edges if edge in found]
+        lines = [shapely.LineString([edge[:2], edge[2:]]) for edge in edges]
+        within = [edge for edge, line in zip(edges, lines, strict=True) if line.distance(Point(x, y)) <= reach]
+        assert {*within} <= {*found}
+        # The middle of the cell that a place lies in is at most 0.36 m from it.
+        far = [edge for edge, line in zip(edges, lines, strict=True) if line.distance(Point(x, y)) > reach + 0.71]
+        assert not {*far} & {*found}

@@ -308,6 +308,17 @@ def test_a_full_disk_is_one_clear_error(tmp_path: Path) -> None:
         record_run(tmp_path / "run.rrd", seconds=2.0)
 
 
+@pytest.mark.parametrize(("rows", "wait"), [(1_000, 2.0), (5_000, 2.0), (20_000, 32.0)])
+def test_large_maps_are_recorded_less_often(tmp_path: Path, rows: int, wait: float) -> None:
+    cells = np.full((rows, 1_000), UNKNOWN, dtype=np.int8)
+    cells[rows // 2, 500] = FREE
+    with Recorder(tmp_path / "run.rrd", name="large") as recorder:
+        assert recorder.wants_map(0.0)
+        recorder.map(OccupancyGrid(GridFrame(0.1, 0.0, 0.0, rows, 1_000), cells), 0.0)
+        assert not recorder.wants_map(wait - 0.01)
+        assert recorder.wants_map(wait)
+
+
 def test_no_recording_takes_every_call_of_a_recorder_and_wants_nothing() -> None:
     recorder = no_recording()
     recorder.scan(a_scan(0.0), Pose2(), Pose2(), truth=Pose2())

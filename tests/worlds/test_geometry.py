@@ -8,6 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import MultiPolygon, Point, Polygon, box
 
+from closedrooms.core.remarks import Remark
+from closedrooms.worlds import geometry
 from closedrooms.worlds.geometry import (
     WallAxes,
     areal,
@@ -211,3 +213,23 @@ def test_walls_a_whole_thickness_away_leave_a_room_alone_and_near_ones_do_not(sm
     with pytest.raises(KeyError):
         room_interior(small, "r7")
     assert list(room_interiors(small, ["r2", "r0"])) == ["r2", "r0"]
+
+
+def test_walls_are_united_once_for_a_plan_whatever_is_remarked_of_it(
+    small: FloorPlan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = []
+
+    def count(walls: tuple[Wall, ...]) -> Polygon | MultiPolygon:
+        calls.append(walls)
+        return solid_walls(walls)
+
+    monkeypatch.setattr(geometry, "solid_walls", count)
+    plan = replace(small, name="never seen before")
+    remark = Remark(action="guessed", what="scale", why="no scale")
+    first = wall_area(plan)
+    assert wall_area(replace(plan, remarks=(remark,))) is first
+    assert len(calls) == 1
+    thicker = replace(plan, walls=tuple(replace(wall, thickness=2.0 * wall.thickness) for wall in plan.walls))
+    assert wall_area(thicker).area > first.area
+    assert len(calls) == 2

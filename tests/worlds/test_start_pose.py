@@ -9,7 +9,9 @@ from shapely.geometry import box
 
 from closedrooms.core.door import Segment
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.worlds.geometry import wall_area
+from closedrooms.worlds import start_pose as start_pose_module
+from closedrooms.worlds.closing import closable_rooms, hidden_rooms
+from closedrooms.worlds.geometry import room_interior, wall_area
 from closedrooms.worlds.library import bundled_names, load_world
 from closedrooms.worlds.plan import FloorPlan, Furniture, Opening, PlanRoom, Wall
 from closedrooms.worlds.start_pose import start_pose, start_room
@@ -175,3 +177,18 @@ def test_a_room_is_started_in_where_a_circle_of_thirty_centimetres_fits(
 def test_a_start_on_the_border_of_a_room_lies_in_it(small: FloorPlan) -> None:
     assert start_room(replace(small, start=(2.0, 2.0, 0.0))) == "r0"
     assert start_room(replace(small, start=(4.0, 4.0, 0.0))) == "r1"
+
+
+def test_the_room_to_start_in_is_sought_once_for_a_plan(small: FloorPlan, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def count(plan: FloorPlan, room: str) -> shapely.Polygon:
+        asked.append(room)
+        return room_interior(plan, room)
+
+    monkeypatch.setattr(start_pose_module, "room_interior", count)
+    plan = replace(small, name="never started in before", start=None)
+    doors = [door for doors in closable_rooms(plan).values() for door in doors]
+    hidden_rooms(plan, doors)
+    start_pose(plan)
+    assert asked == ["r0"]

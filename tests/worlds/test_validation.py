@@ -1,12 +1,15 @@
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
-from shapely.geometry import Polygon, box
+from hypothesis import given
+from hypothesis import strategies as st
+from shapely.geometry import LineString, Polygon, box
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.worlds.plan import FloorPlan, Furniture, Opening, PlanDoor, PlanRoom, Wall
-from closedrooms.worlds.validation import passage_faults, validate
+from closedrooms.worlds.validation import ON_WALL, _near, passage_faults, validate
 
 
 def test_a_good_plan_passes(small: FloorPlan) -> None:
@@ -199,3 +202,19 @@ def test_a_start_in_the_door_of_a_room_or_on_its_border_is_in_it(small: FloorPla
     for start in ((3.0, float("inf"), 0.0), (3.0, 1.0, float("nan"))):
         with pytest.raises(InvalidInputError, match="not finite"):
             validate(replace(small, start=start))
+
+
+@given(st.lists(st.tuples(*[st.integers(0, 12)] * 4), min_size=1, max_size=12))
+def test_every_earlier_passage_that_could_be_in_the_same_place_is_looked_at(
+    drawn: list[tuple[int, int, int, int]],
+) -> None:
+    ends = np.array(drawn, dtype=np.float64).reshape(-1, 2, 2) * (ON_WALL / 4)
+    lines = [LineString(pair) for pair in ends]
+    for number, line in enumerate(lines):
+        close = {k for k in range(number) if line.distance(lines[k]) < ON_WALL}
+        assert close <= {*_near(ends, number)} <= {*range(number)}
+
+
+def test_passages_far_from_each_other_are_not_compared() -> None:
+    ends = np.array([[[x, 0.0], [x + 0.9, 0.0]] for x in np.arange(0.0, 50.0, 1.0)])
+    assert [_near(ends, number) for number in range(len(ends))] == [[]] * len(ends)

@@ -41,6 +41,9 @@ if TYPE_CHECKING:
 
 # A map every so often: what the eye can follow [s].
 MAP_PERIOD = 2.0
+# Larger maps come less often, by the square of their size in cells: a larger one takes longer to drive through and to
+# draw (one of 40 million cells 25 s, when a loop has moved all of it).
+LARGE_MAP = 5_000_000
 NOTHING = np.zeros((0, 2))
 MAPS = {"closed": "map with its closed doors", "predicted": "predicted map", "truth": "true map"}
 
@@ -82,7 +85,7 @@ class Recorder:
         self._seen: set[str] = set()
         self._grids: dict[str, OccupancyGrid] = {}
         self._truth: dict[str, Shape] = {}
-        self._last_map = -np.inf
+        self._last_map, self._map_period = -np.inf, MAP_PERIOD
 
     def __enter__(self) -> Self:
         self._stream.__enter__()
@@ -175,13 +178,14 @@ class Recorder:
 
     def wants_map(self, stamp: float) -> bool:
         """Check whether enough time has passed since the last map."""
-        return stamp >= self._last_map + MAP_PERIOD - 1e-6
+        return stamp >= self._last_map + self._map_period - 1e-6
 
     def map(self, grid: OccupancyGrid, stamp: float, *, final: bool = False) -> None:
         """Record the map and the paths so far, every few seconds."""
         if not final and not self.wants_map(stamp):
             return
         first, self._last_map = not self._holds.mapping, stamp
+        self._map_period = MAP_PERIOD * max(1.0, grid.cells.size / LARGE_MAP) ** 2
         self._stream.at(stamp, self._stage)
         self._stream.log("map/grid", drawables.grid_map(grid))
         if first:

@@ -16,7 +16,7 @@ from closedrooms.worlds.door_hinges import hung
 from closedrooms.worlds.formats.raster_rooms import find_rooms_and_doors, mark_gaps
 from closedrooms.worlds.formats.raster_walls import check_pieces, trace_walls
 from closedrooms.worlds.formats.settlement import Source, settle
-from closedrooms.worlds.geometry import WallAxes
+from closedrooms.worlds.geometry import wall_axes
 from closedrooms.worlds.plan import FloorPlan, Wall
 from closedrooms.worlds.truth import rasterise
 
@@ -121,7 +121,7 @@ def _differences(plan: FloorPlan, grid: OccupancyGrid) -> list[Remark]:
     """Count cells of the map that the plan's true map shows otherwise, but in doorways."""
     true = rasterise(plan, grid.frame, Pose2())
     found = []
-    lines = WallAxes(plan)
+    lines = wall_axes(plan)
     passed = mark_gaps([(door.segment, lines.thickness(door.segment) or 0.0) for door in plan.doors], grid.frame)
     for what, mask in (
         ("occupied cells", grid.occupied & ~true.occupied & ~passed),

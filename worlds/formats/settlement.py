@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.connectivity import connected_parts
-from closedrooms.worlds.geometry import WallAxes, wall_area
+from closedrooms.worlds.geometry import wall_area, wall_axes
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor
 from closedrooms.worlds.validation import passage_faults, validate
 
@@ -122,7 +122,7 @@ def _lost_walls(plan: FloorPlan, source: Source) -> list[Remark]:
     if source.walls is not None:
         near = shapely.union_all([*lines, *passages]).buffer(source.within, quad_segs=4)
         lost.append(("in the file but not in the plan", source.walls.difference(near).length))
-    gaps = WallAxes(plan)
+    gaps = wall_axes(plan)
     solid = shapely.union_all([wall_area(plan), *(gaps.gap(passage.segment) for passage in plan.passages)])
     bare = shapely.union_all(lines).difference(solid).length
     lost.append(("in the plan but not among the solids that block robot and rays", bare))

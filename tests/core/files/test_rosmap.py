@@ -333,3 +333,22 @@ def test_cells_measure_a_millimetre_to_ten_metres(tmp_path: Path, resolution: st
     else:
         with pytest.raises(InvalidInputError, match=r"^map resolution .* from 0.001 to 10 m"):
             read_map(path)
+
+
+@pytest.mark.parametrize("quality", [50, 75, 95])
+def test_a_jpeg_keeps_its_unknown_space_and_says_so(tmp_path: Path, quality: int) -> None:
+    saved = np.full((80, 120), 205, dtype=np.uint8)
+    saved[10:70, 10:100] = 0
+    saved[13:67, 13:97] = 254
+    saved[30:32, 13:60] = 0
+    Image.fromarray(saved).save(tmp_path / "map.jpg", quality=quality)
+    (tmp_path / "map.yaml").write_text("image: map.jpg\nresolution: 0.05\norigin: [0, 0, 0]\nfree_thresh: 0.196\n")
+    read = read_ros_map(tmp_path / "map.yaml")
+    cells = read.grid.cells[::-1]
+    assert (cells[saved == 205] == UNKNOWN).mean() > 0.98
+    assert (cells[saved == 254] == FREE).mean() > 0.97
+    assert (cells[saved == 0] == OCCUPIED).all()
+    assert [(remark.action, remark.names) for remark in read.remarks] == [("guessed", ("map.jpg",))]
+    Image.fromarray(saved).save(tmp_path / "map.png")
+    (tmp_path / "map.yaml").write_text("image: map.png\nresolution: 0.05\norigin: [0, 0, 0]\nfree_thresh: 0.196\n")
+    assert not read_ros_map(tmp_path / "map.yaml").remarks

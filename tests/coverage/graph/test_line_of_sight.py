@@ -82,3 +82,19 @@ def test_a_chain_that_leads_far_around_a_small_obstacle_leads_somewhere():
     passable[6, 15:20] = False  # five cells are left of the wall
     assert split_where_blocked(chain, passable, around=6.0) == [0, len(chain) - 1]
     assert any(8 <= chain[stop][0] < 28 for stop in split_where_blocked(chain, passable, around=5.0))
+
+
+def test_a_chain_is_split_at_the_corners_of_a_passage_one_cell_wide():
+    passable = np.zeros((20, 30), dtype=bool)
+    chain = np.array([*((5, col) for col in range(5, 16)), *((row, 15) for row in range(6, 16))])
+    passable[chain[:, 0], chain[:, 1]] = True
+    assert split_where_blocked(chain, passable) == [0, 10, 20]
+    assert split_where_blocked(chain[::-1].copy(), passable) == [0, 10, 20]
+    # Of a ring the cell farthest from its end, then the corners.
+    ring = np.array([
+        *((5, col) for col in range(5, 15)), *((row, 15) for row in range(5, 15)),
+        *((15, col) for col in range(15, 5, -1)), *((row, 5) for row in range(15, 4, -1)),
+    ])  # fmt: skip
+    passable[:] = False
+    passable[ring[:, 0], ring[:, 1]] = True
+    assert split_where_blocked(ring, passable) == [0, 10, 20, 30, 40]

@@ -183,8 +183,7 @@ def test_a_disc_fits_exactly_where_reachable_says_so(seed, radius):
         if abs(distance - radius - 0.5) > 1e-3:
             assert space.cells[row, col] == (distance > radius + 0.5)
     if space.cells.any():
-        assert (space.distance[space.cells] == 0.0).all()
-        assert (space.distance[~space.cells] > 0.0).all()
+        assert space.labels.min() > 0
 
 
 def test_labels_part_a_mask_between_two_places_and_nowhere_else():
@@ -318,6 +317,32 @@ def test_the_path_around_a_table_is_the_shortest():
     assert find_shortest_path(start, goal, cells) is None
 
 
+@given(seed=st.integers(0, 10_000), walls=st.integers(0, 8), most=st.sampled_from([0, 30, 300]))
+@settings(max_examples=40, deadline=None)
+def test_a_path_that_is_far_to_seek_is_found_wherever_there_is_one(seed, walls, most):
+    rng = np.random.default_rng(seed)
+    cells = np.zeros((60, 90), dtype=bool)
+    cells[1:-1, 1:-1] = True
+    for wall in range(walls):
+        cells[:, 10 * wall + 5 : 10 * wall + 10] = False
+        gap = int(rng.integers(1, 55))
+        cells[gap : gap + 4, 10 * wall + 5 : 10 * wall + 10] = rng.random() < 0.9
+    cells[[0, -1]] = False
+    inside = np.argwhere(cells)
+    start, goal = inside[rng.integers(0, len(inside), 2)]
+    near, far = find_shortest_path(start, goal, cells), find_shortest_path(start, goal, cells, most=most)
+    assert (near is None) == (far is None)
+    if near is None:
+        return
+    assert far[0].tolist() == start.tolist()
+    assert far[-1].tolist() == goal.tolist()
+    steps = np.diff(far, axis=0)
+    assert np.abs(steps).max(initial=0) <= 1
+    assert cells[far[:, 0], far[:, 1]].all()
+    length = [np.hypot(*np.diff(path, axis=0).T).sum() for path in (near, far)]
+    assert length[0] - 1e-6 <= length[1] <= 1.1 * length[0] + 1e-6
+
+
 def test_a_path_keeps_near_the_chain_that_it_follows_where_it_can():
     """Two ways around a block: the one beside the chain is longer, and taken."""
     cells = np.zeros((80, 120), dtype=bool)
@@ -330,3 +355,28 @@ def test_a_path_keeps_near_the_chain_that_it_follows_where_it_can():
     assert along[:, 0].max() >= 60
     shortest = find_shortest_path(start, goal, cells)
     assert shortest[:, 0].max() < 20
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=40)
+def test_a_path_is_as_short_as_that_of_dijkstra(seed):
+    rng = np.random.default_rng(seed)
+    cells = rng.random((14, 22)) < 0.7
+    cells[[0, -1]] = cells[:, [0, -1]] = False
+    start, goal = rng.choice(np.argwhere(cells), 2, replace=False)
+    graph = nx.Graph()
+    graph.add_nodes_from(map(tuple, np.argwhere(cells).tolist()))
+    for row, col in list(graph):
+        for step in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            if (row + step[0], col + step[1]) in graph:
+                graph.add_edge((row, col), (row + step[0], col + step[1]), weight=float(np.hypot(*step)))
+    path = find_shortest_path(start, goal, cells)
+    if not nx.has_path(graph, tuple(start.tolist()), tuple(goal.tolist())):
+        assert path is None
+        return
+    assert (path[0].tolist(), path[-1].tolist()) == (start.tolist(), goal.tolist())
+    steps = np.diff(path, axis=0)
+    assert np.abs(steps).max() == 1
+    assert cells[path[:, 0], path[:, 1]].all()
+    shortest = nx.dijkstra_path_length(graph, tuple(start.tolist()), tuple(goal.tolist()))
+    assert np.hypot(*steps.T).sum() == pytest.approx(shortest)

@@ -3,10 +3,12 @@ import sys
 
 import cv2
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from closedrooms.coverage.graph.skeleton import load_skeletonize, thin, trace_skeleton
+import closedrooms.coverage.graph.skeleton as skeleton_module
+from closedrooms.coverage.graph.skeleton import AROUND, load_skeletonize, peel, removable, thin, trace_skeleton
 
 
 def _blobs(seed, discs):
@@ -130,3 +132,50 @@ print(*sorted(sys.modules))
     slow = {"scipy.signal", "scipy.sparse", "scipy.stats", "scipy.ndimage", "skimage.morphology", "ortools", "pandas"}
     assert "networkx" in loaded
     assert not slow & loaded
+
+
+def _peeled_everywhere(mask):
+    """Every cell looked at in every step."""
+    cells, before = mask.astype(np.int64), None
+    while before is None or (cells != before).any():
+        before = cells.copy()
+        for rules in removable():
+            around = sum(np.roll(cells, (-row, -col), (0, 1)) << bit for bit, (row, col) in enumerate(AROUND.tolist()))
+            cells[(cells > 0) & rules[around]] = 0
+    return cells > 0
+
+
+@given(seed=st.integers(0, 10_000), discs=st.integers(1, 12))
+@settings(max_examples=30, deadline=None)
+def test_peeling_looks_at_few_cells_and_takes_what_looking_at_all_takes(seed, discs):
+    mask = _blobs(seed, discs)
+    assert (peel(mask) == _peeled_everywhere(mask)).all()
+
+
+@given(seed=st.integers(0, 10_000), discs=st.integers(1, 12))
+@settings(max_examples=30, deadline=None)
+def test_what_is_peeled_first_is_thinned_to_as_many_parts_and_holes(seed, discs):
+    mask = _blobs(seed, discs)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(skeleton_module, "MOST_VISITS", 0.0)
+        skeleton = thin(mask)
+    assert not (skeleton & ~mask).any()
+    for value, neighbours in ((1, 8), (0, 4)):
+        counts = [
+            cv2.connectedComponents((shape == value).astype(np.uint8), connectivity=neighbours)[0]
+            for shape in (mask, skeleton)
+        ]
+        assert counts[0] == counts[1]
+
+
+@given(seed=st.integers(0, 10_000), discs=st.integers(1, 12))
+@settings(max_examples=30, deadline=None)
+def test_parts_that_thinning_takes_away_keep_their_deepest_cell(seed, discs):
+    mask = _blobs(seed, discs)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(skeleton_module, "load_skeletonize", lambda: np.zeros_like)
+        skeleton = thin(mask)
+    count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
+    depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    deepest = [int(np.argmax(np.where(labels == part, depth, -1.0))) for part in range(1, count)]
+    assert np.flatnonzero(skeleton).tolist() == sorted(deepest)

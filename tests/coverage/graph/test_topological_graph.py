@@ -1,5 +1,6 @@
 from dataclasses import replace
 
+import networkx as nx
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,6 +15,7 @@ from closedrooms.coverage.graph import graph_builder
 from closedrooms.coverage.graph.free_space import clean_free_space
 from closedrooms.coverage.graph.graph_builder import build_graph
 from closedrooms.coverage.graph.line_of_sight import is_clear
+from closedrooms.coverage.graph.topological_graph import make_graph
 
 
 def _blocked_edges(grid, graph):
@@ -237,3 +239,25 @@ def test_a_slanted_wall_one_cell_wide_parts_two_rooms(draw, plain):
     built = build_graph(OccupancyGrid(grid.frame, cells), (), plain, start=(1.5, 5.0))
     assert len(built.graph.vertices) < 12
     assert any("3 unconnected parts" in note for note in built.notes)
+
+
+def test_a_graph_from_arrays_has_kinds_by_degree_parts_by_their_first_vertex_and_lengths() -> None:
+    places = np.array([(0, 0), (3, 4), (3, 10), (9, 4), (20, 0), (21, 0), (30, 5), (3, 12)], dtype=np.float64)
+    pairs = np.array([[4, 5], [0, 1], [1, 2], [1, 3], [2, 7]])
+    lines = [np.full((2, 2), float(number)) for number in range(5)]
+    graph = make_graph(places, pairs, door_vertices={"d1": 6}, polylines=lines)
+    assert graph.kinds == ("end", "junction", "bend", "end", "end", "end", "end", "end")
+    assert graph.parts.tolist() == [0, 0, 0, 0, 1, 1, 2, 0]
+    assert graph.vertices.tolist() == places.tolist()
+    lengths = {tuple(sorted(pair)): length for pair, length in zip(graph.pairs.tolist(), graph.lengths, strict=True)}
+    assert lengths == pytest.approx({(4, 5): 1.0, (0, 1): 5.0, (1, 2): 6.0, (1, 3): 6.0, (2, 7): 2.0})
+    drawn = {tuple(sorted(pair)): line[0, 0] for pair, line in zip(graph.pairs.tolist(), graph.polylines, strict=True)}
+    assert drawn == {(4, 5): 0.0, (0, 1): 1.0, (1, 2): 2.0, (1, 3): 3.0, (2, 7): 4.0}
+    assert graph.door_vertices == {"d1": 6}
+    assert "map" not in graph.graph
+    assert make_graph(places, pairs, map_name="truth").graph["map"] == "truth"
+    given = make_graph(places[:2], pairs[:0], kinds=("detour", "door"))
+    assert given.kinds == ("detour", "door")
+    assert given.polylines == ()
+    with pytest.raises(nx.NetworkXError):
+        graph.add_edge(0, 7)

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.coverage.config import TourConfig
 from closedrooms.coverage.graph.topological_graph import make_graph
+from closedrooms.coverage.tour import biconnected, tour_planner
+from closedrooms.coverage.tour.biconnected import cut_block, find_blocks, measure_paths
 from closedrooms.coverage.tour.exact_tour import MOST_PLACES, find_shortest_tour
 from closedrooms.coverage.tour.local_search import LocalSearch, search_tour
 from closedrooms.coverage.tour.lower_bound import find_lower_bound
@@ -305,3 +307,63 @@ def test_the_search_ends_so_many_perturbations_after_the_last_one_that_helped(mo
     assert len(helped) > 0
     assert len(lengths) - 1 == helped[-1] + patience
     assert np.diff([0, *helped]).max() <= patience
+
+
+@given(seed=st.integers(0, 10_000), n=st.integers(2, 40), extra=st.integers(0, 20))
+@settings(max_examples=25, deadline=None)
+def test_many_paths_are_measured_as_few_are(seed, n, extra):
+    graph = _random_graph(seed, n, extra)
+    members = np.random.default_rng(seed).permutation(n)[: max(n - 3, 1)].tolist()
+    few = measure_paths(graph, members)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(biconnected, "MANY", 1)
+        many = measure_paths(graph, members)
+    assert (few.vertices == many.vertices).all()
+    assert (few.distances == many.distances).all()
+    for i, j in np.argwhere(np.isfinite(few.distances)).tolist():
+        for metric in (few, many):
+            stops = metric.trace([i, j])
+            length = sum(graph.edges[edge]["length"] for edge in pairwise(stops))
+            assert length == pytest.approx(few.distances[i, j])
+
+
+@given(seed=st.integers(0, 10_000), n=st.integers(5, 60), extra=st.integers(5, 60), most=st.integers(2, 20))
+@settings(max_examples=40, deadline=None)
+def test_pieces_of_a_block_hang_together_and_make_the_whole(seed, n, extra, most):
+    graph = _random_graph(seed, n, extra)
+    for block in find_blocks(graph, list(range(n))):
+        pieces = cut_block(graph, block, most)
+        assert (len(pieces) == 1) == (len(block) <= most)
+        met = set(pieces[0])
+        for number, piece in enumerate(pieces):
+            assert len(piece) <= most or pieces == [block]
+            assert nx.is_connected(graph.subgraph(piece))
+            if number:
+                assert len(met & {*piece}) == 1
+            met |= {*piece}
+        assert met == {*block}
+
+
+@given(seed=st.integers(0, 10_000), extra=st.integers(10, 40))
+@settings(max_examples=10, deadline=None)
+def test_a_tour_in_pieces_visits_all_along_edges_and_says_so(seed, extra):
+    graph = _random_graph(seed, 40, extra)
+    whole = solve_tour(graph)
+    largest = max(map(len, find_blocks(graph, list(range(40)))))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tour_planner, "MOST_TOGETHER", 8)
+        tour = solve_tour(graph)
+    assert set(tour.order.tolist()) == set(range(40))
+    assert tour.lower_bound <= whole.length + 1e-6
+    assert tour.length >= whole.lower_bound - 1e-6
+    if largest > 8:
+        assert tour.search == "bounded"
+        assert f"{largest} places" in tour.notes[0]
+    else:
+        assert tour.length == whole.length
+
+
+def test_tabu_search_refuses_more_places_than_it_has_memory_for(monkeypatch):
+    monkeypatch.setattr(tour_planner, "MOST_TOGETHER", 20)
+    with pytest.raises(InvalidInputError, match="30 vertices for the method ortools; expected at most 20"):
+        solve_tour(_random_graph(8, 30, 15), TourConfig(method="ortools"))

@@ -156,3 +156,24 @@ def test_on_an_authors_map_all_doors_are_reached_and_the_prediction_helps():
     errors = compare_tours(closed, predicted, truth, 6, len(doors))
     assert errors.error_pred < errors.error_closed
     assert max(tour.gap for tour in (closed, predicted, truth)) < 0.01
+
+
+@pytest.mark.parametrize(("neck", "rooms"), [(0.8, 2), (1.6, 2), (2.2, 2), (2.8, 1), (5.0, 1)])
+def test_a_neck_parts_two_rooms_up_to_the_width_of_double_doors(draw, plain, neck, rooms):
+    # Two rooms of 5 x 5 m with a neck between them: two thirds of 5 m are 3.3 m, a doorway has 2.5 m at most.
+    grid = draw(13.0, 7.0, [(1.0, 1.0, 6.0, 6.0), (6.2, 1.0, 11.2, 6.0), (5.9, 3.5 - neck / 2, 6.3, 3.5 + neck / 2)])
+    assert count_rooms(grid, plain.graph) == rooms
+
+
+@pytest.mark.parametrize(("wide", "rooms"), [(0.9, 1), (1.3, 2)])
+def test_what_is_narrower_than_a_room_is_part_of_the_one_beside_it(draw, plain, wide, rooms):
+    # A neck of 0.5 m: the room behind it is wider by the half, but no room.
+    grid = draw(13.0, 7.0, [(1.0, 1.0, 6.0, 6.0), (6.2, 1.0, 6.2 + wide, 6.0), (5.9, 3.25, 6.3, 3.75)])
+    assert count_rooms(grid, plain.graph) == rooms
+
+
+@pytest.mark.parametrize(("neck", "rooms"), [(1.2, 2), (1.7, 1)])
+def test_a_neck_of_two_thirds_of_the_width_of_a_room_parts_nothing(draw, plain, neck, rooms):
+    # A corridor of 2.2 m, narrowed by pillars.
+    grid = draw(16.0, 5.0, [(1.0, 1.0, 7.0, 3.2), (7.2, 1.0, 14.0, 3.2), (6.9, 2.1 - neck / 2, 7.3, 2.1 + neck / 2)])
+    assert count_rooms(grid, plain.graph) == rooms

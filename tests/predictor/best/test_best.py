@@ -1,6 +1,7 @@
 """The method best on buildings drawn by hand: gaps, corridors at an angle, bad doors, invariance."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyG
 from closedrooms.core.pose import Pose2
 from closedrooms.predictor.best import shared_rooms
 from closedrooms.predictor.best.method import predict_best
+from closedrooms.predictor.best.scene import prepare
 from closedrooms.predictor.config import BestConfig
 from closedrooms.predictor.prediction import Prediction, WeighedTrace
 
@@ -257,3 +259,64 @@ def test_a_trace_of_a_room_with_two_doors_weighs_one_room(monkeypatch: pytest.Mo
     assert set(room.doors) == {"left", "right"}
     own = sum(terms[0] for terms in room.terms.values())
     assert own == pytest.approx(room.scores[room.chosen], abs=1e-6)
+
+
+def test_stages_are_kept_where_they_are_asked_for_and_there_are_any() -> None:
+    grid, doors = _building({"d1a"})
+    assert predict_best(grid, doors, CONFIG).trace is None
+    assert predict_best(grid, doors, BestConfig(keep_trace=True)).trace is not None
+    assert predict_best(grid, [], BestConfig(keep_trace=True)).trace is None
+
+
+def test_reasons_stand_in_the_order_of_the_doors_and_rooms_too() -> None:
+    grid, doors = _building({"d1a", "d3b"})
+    bad = [ClosedDoor(name, (x, 900.0)) for name, x in (("z", 1.0), ("a", 2.0), ("m", 3.0))]
+    prediction = predict_best(grid, [bad[0], doors[1], bad[1], doors[0], bad[2]], CONFIG)
+    assert list(prediction.failures) == ["z", "a", "m"]
+    assert [room.doors for room in prediction.rooms] == [(doors[1].id,), (doors[0].id,)]
+    assert len(prediction.beliefs) == 2
+
+
+def test_rectangles_are_rated_anew_by_who_is_asked() -> None:
+    grid, doors = _building({"d1a"})
+    asked = []
+
+    def turn_around(scene, proposals):
+        asked.append([pose.facing.door.id for pose in scene.poses])
+        (own,) = proposals.alone
+        worst = np.argsort(own.scores, kind="stable")
+        turned = {name: getattr(own, name)[worst] for name in ("boxes", "corners", "measured")}
+        return replace(proposals, alone=[replace(own, scores=-own.scores[worst], **turned)])
+
+    usual, other = predict_best(grid, doors, CONFIG), predict_best(grid, doors, CONFIG, rate=turn_around)
+    assert asked == [["d1a"]]
+    assert other.rooms[0].polygon.symmetric_difference(usual.rooms[0].polygon).area > 1.0
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+def test_a_metre_of_unknown_cells_lies_around_what_is_known(angle: float) -> None:
+    # What lies further out than the map reads as its edge.
+    grid, doors = _building({"d1a"}, angle)
+    scene = prepare(grid, doors, CONFIG)
+    (turned,) = scene.turned.values()
+    known = np.argwhere(turned.known)
+    assert known.min() >= 20
+    assert (np.array(turned.known.shape) - 1 - known.max(axis=0)).min() >= 20
+
+
+def test_a_map_without_walls_has_its_reason_and_walls_that_nobody_measured_their_usual_thickness() -> None:
+    doors = [ClosedDoor("a", (1.0, 1.0)), ClosedDoor("b", (1.1, 1.0)), ClosedDoor("c", (9.0, 1.0))]
+    for fill, reason in ((UNKNOWN, "the map is all unknown"), (FREE, "the map holds no wall line")):
+        grid = OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 80, 80), np.full((80, 80), fill, dtype=np.int8))
+        scene = prepare(grid, doors, CONFIG)
+        assert scene.failures == dict.fromkeys("abc", reason)
+        assert scene.poses == ()
+        assert (scene.walls.usual, scene.walls.least) == (0.2, 0.2)
+    grid, (door,) = _building({"d1a"})
+    near = ClosedDoor("twin", (door.midpoint[0] + 0.1, door.midpoint[1]))
+    scene = prepare(grid, [door, near, ClosedDoor("far", (900.0, 0.0))], CONFIG)
+    assert [pose.facing.door.id for pose in scene.poses] == ["d1a"]
+    assert scene.failures == {"twin": "at the same place as door d1a", "far": "it lies outside the known map"}
+    # Walls of 0.2 m, of which the outermost row of cells on either side is wall.
+    assert scene.walls.usual == pytest.approx(0.2, abs=0.06)
+    assert scene.grid.frame.resolution == 0.05

@@ -253,3 +253,60 @@ def test_rooms_with_a_wall_and_a_little_between_them_depend_on_each_other(gap, k
     assert _name_kind(one, [other], GRID, THICKNESS) == kind
     assert _name_kind(one, [rectangle(80, 80, 90, 90), other], GRID, THICKNESS) == kind
     assert _name_kind(one, [], GRID, THICKNESS) == "independent"
+
+
+# Free up to row 104 in a recess of the wall between columns 95 and 105, and its opening up to the leaf.
+RECESS = turned([(40, 60, 160, 100), (95, 100, 105, 104)], [(40, 100, 160, 102)])
+OPENING = Doorway(FACING, -0.25, 0.25, 0.1, -0.1)
+
+
+@pytest.mark.parametrize(
+    ("corners", "thickness"),
+    [
+        (rectangle(100, 102, 140, 150), 2),  # over its right half
+        (rectangle(60, 102, 100, 150), 2),  # over its left half
+        (rectangle(80, 108, 120, 150), 5),  # from beyond its leaf on
+    ],
+)
+def test_an_opening_that_reaches_beyond_a_rectangle_takes_nothing_of_it(corners, thickness):
+    assert left(corners, RECESS, thickness=thickness).area < shapely.Polygon(corners).area - 0.05
+    assert left(corners, RECESS, thickness=thickness, doorways=[OPENING]).equals(shapely.Polygon(corners))
+
+
+@pytest.mark.parametrize("place", [(0.0, 6.0), (8.0, 0.0), (-8.0, 0.0), (0.0, -6.0), (8.0, 6.0), (-8.0, -6.0)])
+def test_an_opening_elsewhere_changes_nothing(place):
+    corners = rectangle(80, 90, 120, 150)
+    away = FacingDoor(door(100.0 + 20 * place[0], 102.0 + 20 * place[1]), np.array([0.0, 1.0]))
+    other = Doorway(away, -0.25, 0.25, 0.1, -0.1)
+    assert left(corners, RECESS, doorways=[other]).equals(left(corners, RECESS))
+    assert left(corners, RECESS, doorways=[other, OPENING]).equals(left(corners, RECESS, doorways=[OPENING]))
+    assert not left(corners, RECESS, doorways=[OPENING]).equals(left(corners, RECESS))
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5])
+def test_what_is_left_of_a_rectangle_lies_where_it_was_in_the_map(angle):
+    map_ = TurnedMap(angle, np.array([3.0, -2.0]), CELL, HALF.free, HALF.known)
+    cells = np.array([[80, 90], [120, 90], [120, 150], [80, 150]], dtype=np.float64)
+    facing = FacingDoor(ClosedDoor("d", tuple(map_.to_map(np.array([100.0, 102.0])))), np.array([0.0, 1.0]))
+    shape = subtract_known(map_, map_.to_map(cells), 2, facing, [], narrow=7)
+    expected = shapely.Polygon(map_.to_map(np.array([[80, 102], [120, 102], [120, 150], [80, 150]], dtype=np.float64)))
+    assert shape.hausdorff_distance(expected) < 0.4 * CELL
+
+
+def test_a_hundredth_that_known_space_takes_leaves_the_rectangle_whole():
+    corners = rectangle(100, 110, 150, 160)  # 2500 cells
+    for cells, whole in ((24, True), (25, False)):
+        # A row of free cells right before it takes a row of cells, with walls of one.
+        map_ = turned([(100 + 1, 109, 100 + cells - 1, 110)])
+        shape = left(corners, map_, thickness=1)
+        assert shape.equals(shapely.Polygon(corners)) == whole
+
+
+def test_of_two_pieces_the_nearer_one_stays_unless_the_other_is_much_larger():
+    # Free space of two metres width between a piece on the door's side and one beyond.
+    for far, kept in ((100, "near"), (250, "far")):
+        map_ = turned([(60, 120, 140, 160)])
+        corners = rectangle(80, 102, 120, 162 + far)
+        shape = left(corners, map_)
+        near = shape.bounds[1] < 110 * CELL
+        assert near == (kept == "near")

@@ -248,69 +248,70 @@ def test_known_space_and_a_wall_around_it_are_taken(window):
     assert (spread.share == ~found).all()
 
 
-def together(quarters, *, us=None, own=((5.0,),), both=7.0, sides=(100, 60), measured=None):
-    """What is measured of doors that look so, each with rectangles of ``own`` scores."""
-    us = us or [0.0] * len(quarters)
+def together(quarters, *, us=None, own=(5.0,), both=7.0, sides=(100, 60), measured=None, of_all=None):
+    """What is measured of doors that look so, each with a rectangle of such a score, far from the others'."""
+    us, own = us or [0.0] * len(quarters), own * (len(quarters) if len(own) == 1 else 1)
     width, height = sides
-    scores = list(own) * (len(quarters) if len(own) == 1 else 1)
     alone = [
-        options([[0, 0, 50, 50]] * len(score), score, u=u, quarter=quarter, v=float(400 * number))
-        for number, (quarter, u, score) in enumerate(zip(quarters, us, scores, strict=True))
-    ]
-    values = np.zeros((1, len(FEATURES)))
-    for name, value in (measured or {}).items():
-        values[0, COLUMNS[name]] = value
+        options([[500 * number, 0, 500 * number + 50, 50]], [score], u=u, quarter=quarter, v=float(400 * number),
+                measured=features(some))
+        for number, (quarter, u, score, some) in enumerate(
+            zip(quarters, us, own, measured or [{}] * len(quarters), strict=True))
+    ]  # fmt: skip
     doors = tuple(range(len(quarters)))
-    shared = options([[10, 20, 10 + width, 20 + height]], [both], measured=values)
+    shared = options([[10, 20, 10 + width, 20 + height]], [both], measured=features(of_all or {}))
     found = measure_shared(Proposals(alone, {doors: [shared]}), THICKNESS)[doors]
     return {feature.name: value for feature, value in zip(SHARED_FEATURES, found.tolist(), strict=True)}
 
 
-def test_walls_of_doors_are_one_facing_or_meeting():
-    for quarters, one, facing, meeting in (
-        ([0, 0], 1, 0, 0), ([0, 2], 0, 1, 0), ([1, 3], 0, 1, 0), ([0, 1], 0, 0, 1), ([2, 3, 2], 0, 0, 1),
-        ([0, 2, 2], 0, 1, 0), ([0, 1, 2], 0, 0, 1), ([3, 3, 3], 1, 0, 0),
-    ):  # fmt: skip
-        found = together(quarters, both=6.0)
-        assert (found["one wall"], found["facing walls"]) == (one, facing)
-        # The room of all scores 1 better than each of its own.
-        assert found["corner gain"] == meeting
+def features(named):
+    """One row of what was measured of a rectangle, 0 where nothing is said."""
+    values = np.zeros((1, len(FEATURES)))
+    for name, value in named.items():
+        values[0, COLUMNS[name]] = value
+    return values
 
 
-def test_what_doors_gain_by_sharing_is_against_the_worst_of_their_own():
-    found = together(
-        [0, 1], own=((5.0, 1.0), (3.0,)), both=7.5, measured={"sides closed": 0.5, "back closed": 0.25, "open": 0.75}
-    )
-    expected = {
-        "always": 1.0, "gain": 4.5, "corner gain": 4.5, "corner closed": 0.75, "open": 0.75, "doors": 2.0,
-        "log short side": math.log(3.0), "wall filled": 0.0,
-    }  # fmt: skip
-    assert {name: found[name] for name in expected} == pytest.approx(expected)
-    facing = together([0, 2], both=7.5, measured={"sides closed": 0.5})
-    assert (facing["corner gain"], facing["corner closed"]) == (0.0, 0.0)
+def test_doors_are_in_one_wall_where_all_look_the_same_way():
+    for quarters, one in (([0, 0], 1), ([0, 2], 0), ([0, 1], 0), ([2, 3, 2], 0), ([3, 3, 3], 1)):
+        found = together(quarters)
+        assert (found["always"], found["one wall"], found["doors"]) == (1.0, one, len(quarters))
+
+
+def test_what_doors_gain_by_sharing_is_against_the_best_rooms_beside_each_other():
+    # Far apart two rooms say nothing of each other: 7.5 against the mean of 5 and 3.
+    assert together([0, 2], own=(5.0, 3.0), both=7.5)["gain"] == pytest.approx(3.5)
+    # Three doors: the mean over pairs is the mean over doors.
+    assert together([0, 1, 2], own=(5.0, 3.0, 1.0), both=7.5)["gain"] == pytest.approx(4.5)
+    # In one pocket the better places of both are the same: the best two together count.
+    alone = [options([[0, 0, 50, 50], [900 * q, 900, 900 * q + 50, 950]], [3.0, 1.0], quarter=q) for q in (0, 1)]
+    shared = options([[0, 0, 50, 50]], [6.0])
+    found = measure_shared(Proposals(alone, {(0, 1): [shared]}), THICKNESS)[0, 1]
+    table = score_pairs(*alone, THICKNESS)[0] + alone[0].scores[:, None] + alone[1].scores
+    assert table[0, 0] < table.max() < 6.0
+    assert found[[feature.name for feature in SHARED_FEATURES].index("gain")] == pytest.approx(6.0 - table.max() / 2)
+
+
+def test_a_room_of_all_is_compared_with_the_doors_own():
+    own = [{"width seen": 0.25, "depth seen": 1.0, "sides aligned": 0.5}, {"width seen": 0.75}]
+    of_all = {"width seen": 0.875, "depth seen": 0.25, "sides aligned": 1.0}
+    found = {tuple(looks): together(looks, measured=own, of_all=of_all) for looks in ([1, 1], [1, 3], [0, 3])}
+    # Doors of one wall share a width, doors that face each other a depth; where walls meet, nothing is said.
+    assert [one["size gain"] for one in found.values()] == pytest.approx([0.375, -0.25, 0.0])
+    assert [one["aligned gain"] for one in found.values()] == pytest.approx([0.75, 0.75, 0.75])
 
 
 def test_the_width_between_the_outer_doors_of_one_wall_is_a_share_of_the_rooms_own():
     # 5 m x 3 m: along x for doors that look up or down, along y for the others.
     assert together([0, 0, 0], us=[10.0, 70.0, 40.0])["wall filled"] == pytest.approx(3.0 / 5.0)
     assert together([1, 1], us=[10.0, 40.0])["wall filled"] == pytest.approx(1.5 / 3.0)
+    assert together([0, 2], us=[10.0, 40.0])["wall filled"] == 0.0
 
 
-def test_crowding_is_the_mean_expected_overlap_of_the_doors_own_rooms():
-    alone = [options([[0, 0, 50, 50], [200, 0, 250, 50]], [3.0, 0.0], quarter=q, v=900.0 * q) for q in range(3)]
-    shared = options([[0, 0, 50, 50]], [5.0])
-    found = measure_shared(Proposals(alone, {(0, 1, 2): [shared]}), THICKNESS)[0, 1, 2]
-    p = alone[0].weigh()
-    table = score_pairs(alone[0], alone[1], THICKNESS)[1]
-    values = dict(zip([feature.name for feature in SHARED_FEATURES], found.tolist(), strict=True))
-    assert values["crowd"] == pytest.approx(p @ table @ p)
-
-
-def test_how_likely_doors_share_a_room_is_the_logistic_function_of_the_weighed_sum():
+@pytest.mark.parametrize("weights", [None, np.arange(len(SHARED_FEATURES)) / 100.0])
+def test_how_likely_doors_share_a_room_is_the_logistic_function_of_the_weighed_sum(weights):
     alone = [options([[0, 0, 50, 50]], [5.0], quarter=q) for q in (0, 2)]
-    proposals = Proposals(alone, {(0, 1): [options([[0, 0, 50, 50]], [6.0])]})
-    total = sum(
-        feature.weight * value
-        for feature, value in zip(SHARED_FEATURES, measure_shared(proposals, THICKNESS)[0, 1], strict=True)
-    )
+    proposals = Proposals(alone, {(0, 1): [options([[0, 0, 50, 50]], [6.0])]}, weights)
+    used = [feature.weight for feature in SHARED_FEATURES] if weights is None else weights
+    total = float(measure_shared(proposals, THICKNESS)[0, 1] @ used)
     assert rate_shared(proposals, THICKNESS) == {(0, 1): pytest.approx(1.0 / (1.0 + math.exp(-total)))}

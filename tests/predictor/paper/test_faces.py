@@ -195,3 +195,45 @@ def test_a_line_with_a_span_ends_at_full_lines() -> None:
     everywhere = build_arrangement([*full, Line(math.pi / 4, 0.3)], BOX)
     assert len(cut.faces) < len(longer.faces) < len(everywhere.faces)
     assert all(face.area == pytest.approx(face.convex_hull.area, abs=1e-9) for face in longer.faces)
+
+
+def test_a_line_with_a_span_is_not_cut_by_lines_that_run_beside_it() -> None:
+    full = [Line(math.pi / 2, -x) for x in (-3.0, 3.0)]
+    beside = Line(0.0, 1.0, "split")
+    cut = build_arrangement([*full, beside, Line(0.0, 0.0, span=(-1.0, 1.0))], BOX)
+    whole = build_arrangement([*full, beside], BOX)
+    # The middle one of three columns falls in two: from x = -3 to 3.
+    assert len(cut.faces) == len(whole.faces) + 1
+    assert sorted(round(face.area, 2) for face in cut.faces if face.bounds[0] > -3.1 and face.bounds[2] < 3.1) == [
+        6.0, 24.0, 30.0
+    ]  # fmt: skip
+    # Without any line to end at it reaches the box.
+    alone = build_arrangement([beside, Line(0.0, 0.0, span=(-1.0, 1.0))], BOX)
+    assert len(alone.faces) == 3
+
+
+def test_a_line_with_a_span_ends_where_its_walls_do_when_a_full_line_runs_there() -> None:
+    full = [Line(math.pi / 2, -x) for x in (-1.0, 1.0)]
+    for span, columns in (((-1.0, 1.0), 1), ((-1.01, 1.0), 2), ((-1.0, 1.01), 2), ((-0.9, 0.9), 1), ((-2.0, 2.0), 3)):
+        cut = build_arrangement([*full, Line(0.0, 0.0, span=span)], BOX)
+        assert len(cut.faces) == 3 + columns
+
+
+def test_faces_are_ordered_by_place_and_run_left_around() -> None:
+    arrangement = _grid((-2.0, 1.0), (0.0,))
+    centres = [(round(face.centroid.x, 6), round(face.centroid.y, 6)) for face in arrangement.faces]
+    assert centres == sorted(centres)
+    assert all(face.exterior.is_ccw for face in arrangement.faces)
+    assert arrangement.areas == pytest.approx([face.area for face in arrangement.faces])
+
+
+def test_the_box_lies_between_its_lines_whatever_their_order() -> None:
+    slanted = (Line(0.3, -1.0), Line(0.3, 2.0), Line(1.7, -3.0), Line(1.7, 1.0))
+    shape = box_of(slanted)
+    assert shape.is_valid
+    # A parallelogram of heights 3 and 4, at an angle of 1.4.
+    assert shape.area == pytest.approx(3.0 * 4.0 / math.sin(1.4))
+    corners = shapely.get_coordinates(shape)[:-1]
+    for low, high in (slanted[:2], slanted[2:]):
+        offsets = np.sort(corners @ low.normal)
+        assert offsets == pytest.approx([low.offset] * 2 + [high.offset] * 2)

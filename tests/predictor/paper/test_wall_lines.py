@@ -7,11 +7,14 @@ from hypothesis import strategies as st
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
-from closedrooms.predictor.config import DirectionsConfig, LinesConfig, PaperConfig
+from closedrooms.predictor.config import DirectionsConfig, LinesConfig, PaperConfig, RoseConfig
+from closedrooms.predictor.paper import wall_lines
 from closedrooms.predictor.paper.directions import _find_modes, angle_between, find_directions
 from closedrooms.predictor.paper.lines import boundary_lines, find_lines
 from closedrooms.predictor.paper.segments import angles_of, find_segments, lengths_of
+from closedrooms.predictor.paper.wall_lines import find_structure
 from closedrooms.predictor.structure.known_window import at_resolution, known_window
+from closedrooms.predictor.structure.rose import RoseStructure
 
 CONFIG = LinesConfig()
 
@@ -213,3 +216,70 @@ def test_structure_settings_out_of_range_are_refused(wrong):
 def test_predictor_settings_out_of_range_are_refused(wrong):
     with pytest.raises(InvalidInputError):
         PaperConfig(**wrong)
+
+
+def _two_walls():
+    """Walls one cell thick at y = 2 and 4, from x = 1 to 9, and a short one across at x = 5 below; the rest is free."""
+    cells = np.full((140, 220), FREE, dtype=np.int8)
+    cells[40, 20:180] = cells[80, 20:180] = OCCUPIED
+    cells[5:40, 100] = OCCUPIED
+    return OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 140, 220), cells)
+
+
+def test_with_rose_lines_are_those_of_structural_cells_in_its_directions(monkeypatch):
+    grid = _two_walls()
+    structural = grid.occupied.copy()
+    structural[80] = False
+    rose = RoseStructure(np.array([0.0, math.pi / 2]), structural)
+    monkeypatch.setattr(wall_lines, "find_rose", lambda given: rose if given is grid else None)
+    found = find_structure(grid, RoseConfig())
+    assert found is not None
+    assert sorted(line.offset for line in found.lines if line.angle == 0.0) == pytest.approx([2.025], abs=0.06)
+    assert [line.offset for line in found.lines if line.angle > 1.0] == pytest.approx([-5.025], abs=0.06)
+    assert found.angles == pytest.approx([0.0, math.pi / 2])
+    # With the other wall structural too there are three.
+    monkeypatch.setattr(wall_lines, "find_rose", lambda _: RoseStructure(rose.angles, grid.occupied))
+    assert len(find_structure(grid, RoseConfig()).lines) == 3
+    monkeypatch.setattr(wall_lines, "find_rose", lambda _: None)
+    assert find_structure(grid, RoseConfig()) is None
+
+
+def test_the_box_is_drawn_around_what_carries_a_line():
+    grid = _two_walls()
+    cells = grid.cells.copy()
+    # A jamb far off, too short for a line.
+    cells[130, 200:208] = OCCUPIED
+    found = find_structure(OccupancyGrid(grid.frame, cells), PaperConfig())
+    assert found is not None
+    # That across has less than 0.15 of the wall of the others.
+    assert len(found.lines) == 2
+    assert (found.clusters == -1).any()
+    assert len(found.segments) == len(found.clusters)
+    sides = {round(math.degrees(line.angle)): [] for line in found.boundary}
+    for line in found.boundary:
+        sides[round(math.degrees(line.angle))].append(line.offset)
+    # A metre beyond walls from y = 2 to 4.05 and x = 1 to 9.
+    assert sorted(sides[0]) == pytest.approx([2.0 - 1.0, 4.05 + 1.0], abs=0.12)
+    assert sorted(sides[90]) == pytest.approx([-9.0 - 1.0, -1.0 + 1.0], abs=0.12)
+    assert find_structure(OccupancyGrid(grid.frame, np.full((140, 220), FREE, dtype=np.int8)), PaperConfig()) is None
+
+
+def test_segments_are_found_in_cells_of_any_size_and_no_shorter_than_asked():
+    cells = np.full((70, 110), FREE, dtype=np.int8)
+    cells[20, 10:90] = cells[40, 10:13] = OCCUPIED
+    grid = OccupancyGrid(GridFrame(0.1, -2.0, 3.0, 70, 110), cells)
+    segments = find_segments(grid, LinesConfig())
+    assert np.abs(segments[:, 1::2] - (3.0 + 2.05)).max() < 0.21
+    assert lengths_of(segments).max() == pytest.approx(8.0, abs=0.5)
+    assert segments[:, 0::2].min() == pytest.approx(-1.0, abs=0.2)
+    assert segments[:, 0::2].max() == pytest.approx(7.0, abs=0.2)
+    assert len(find_segments(grid, LinesConfig(hough_votes=9.0))) == 0
+    assert len(find_segments(grid, LinesConfig(min_segment=9.0))) == 0
+    assert lengths_of(find_segments(grid, LinesConfig(min_segment=3.0))).min() >= 3.0
+
+
+def test_directions_and_lengths_of_segments_are_those_of_lines_without_sense():
+    segments = np.array([(0, 0, 3, 4), (3, 4, 0, 0), (1, 1, 0, 1), (0, 0, -1, 1), (0, 2, 0, 0)], dtype=float)
+    assert lengths_of(segments) == pytest.approx([5.0, 5.0, 1.0, math.sqrt(2.0), 2.0])
+    steep = math.atan2(4.0, 3.0)
+    assert angles_of(segments) == pytest.approx([steep, steep, 0.0, 0.75 * math.pi, math.pi / 2], abs=1e-12)

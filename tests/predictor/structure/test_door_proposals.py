@@ -214,3 +214,26 @@ def test_every_setting_is_a_finite_number_of_at_least_nothing(name: str) -> None
     for value in (-1e-9, -1.0, math.nan, math.inf):
         with pytest.raises(InvalidInputError, match=f"{name} .*expected a finite number of at least 0"):
             ProposalConfig(**{name: value})
+
+
+def test_settings_are_taken_up_to_their_limits_and_refused_beyond() -> None:
+    tiny = math.ulp(0.0)
+    for good in (
+        {"min_width": tiny}, {"max_width": 10.0}, {"min_width": 1.3}, {"max_width": 0.6}, {"min_recess": 0.0},
+        {"max_recess": 10.0}, {"max_recess": 0.02}, {"min_recess": 0.2}, {"jamb": 10.0}, {"jamb": tiny},
+        {"depth": 10.0}, {"depth": tiny}, {"min_score": 1.0}, {"min_unknown": 1.0}, {"min_score": 0.0},
+        {"min_room": 0.0},
+    ):  # fmt: skip
+        ProposalConfig(**good)
+    for wrong, line in (
+        ({"min_width": 0.0}, "door widths from 0.0 to 1.3 m; expected 0 < min_width <= max_width <= 10.0"),
+        ({"max_width": 10.001}, "door widths"), ({"min_width": 1.301}, "door widths"),
+        ({"max_width": 0.599}, "door widths"),
+        ({"max_recess": 10.001}, "recesses from 0.02 to 10.001 m; expected min_recess <= max_recess <= 10.0"),
+        ({"max_recess": 0.019}, "recesses"), ({"jamb": 0.0}, "jamb 0.0 m, depth 0.6 m; expected above 0 to 10.0 m"),
+        ({"depth": 0.0}, "jamb 0.3 m, depth 0.0 m"), ({"jamb": 10.001}, "jamb"), ({"depth": 10.001}, "jamb"),
+        ({"min_score": 1.001}, "min_score 1.001, min_unknown 0.5; expected shares between 0 and 1"),
+        ({"min_unknown": 1.001}, "min_score 0.5, min_unknown 1.001"),
+    ):  # fmt: skip
+        with pytest.raises(InvalidInputError, match=line):
+            ProposalConfig(**wrong)

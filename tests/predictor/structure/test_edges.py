@@ -2,13 +2,22 @@
 
 import math
 
+import cv2
 import numpy as np
 import pytest
 
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.predictor.structure.edges import QUARTER, shows_walls, votes_by_degree, wrapped
-from closedrooms.predictor.structure.wall_directions import WallDirections, find_wall_directions
+from closedrooms.predictor.structure.edges import (
+    BLUR,
+    QUARTER,
+    STEEP,
+    find_edges,
+    shows_walls,
+    votes_by_degree,
+    wrapped,
+)
+from closedrooms.predictor.structure.wall_directions import WallDirections, _sharpest, find_wall_directions
 
 
 def test_angles_are_wrapped_modulo_a_right_angle():
@@ -121,3 +130,142 @@ def test_noise_shows_no_walls_and_a_square_does():
     noise = np.where(np.random.default_rng(0).random(frame.shape) < 0.3, OCCUPIED, FREE).astype(np.int8)
     assert not shows_walls(OccupancyGrid(frame, noise))
     assert not shows_walls(OccupancyGrid(frame, np.full(frame.shape, FREE, dtype=np.int8)))
+
+
+def _picture(grid):
+    """Free space, blurred whole, and its rows on demand."""
+    whole = cv2.GaussianBlur(grid.free.astype(np.float32), (0, 0), BLUR)
+    return whole, lambda rows: cv2.GaussianBlur(grid.free[rows].astype(np.float32), (0, 0), BLUR)
+
+
+@pytest.mark.parametrize("among_free", [True, False])
+def test_edges_are_free_cells_that_rise_a_third_as_steeply_as_the_steepest(among_free):
+    grid = _turned_square(12.0)
+    cells = grid.cells.copy()
+    # Steeper among what is not free: a checkerboard's blur rises little, so a lone free square far outside.
+    cells[5:9, 5:9] = FREE
+    grid = OccupancyGrid(grid.frame, cells)
+    whole, rows = _picture(grid)
+    rises = [cv2.Sobel(whole, cv2.CV_32F, dx, 1 - dx) for dx in (1, 0)]
+    slope = np.hypot(*rises)
+    steepest = float((slope * grid.free if among_free else slope).max())
+    expected = np.flatnonzero((slope > STEEP * steepest) & grid.free)
+    found = find_edges(grid, rows, among_free=among_free)
+    assert np.array_equal(found.cells, expected)
+    assert found.angles == pytest.approx(np.arctan2(rises[1].ravel()[expected], rises[0].ravel()[expected]), abs=1e-5)
+
+
+@pytest.mark.parametrize("strip", [1, 120, 1000, 120 * 37, 120 * 119])
+def test_a_map_drawn_a_few_rows_at_a_time_has_the_same_edges(strip):
+    grid = _turned_square(12.0)
+    _, rows = _picture(grid)
+    whole = find_edges(grid, rows, among_free=True)
+    found = find_edges(grid, rows, among_free=True, strip=strip)
+    assert np.array_equal(found.cells, whole.cells)
+    assert found.angles == pytest.approx(whole.angles, abs=1e-5)
+
+
+def test_no_more_rows_are_drawn_than_the_blur_asks_for():
+    grid, asked = _turned_square(12.0), []
+
+    def rows(part):
+        asked.append((part.start, part.stop))
+        return np.zeros((part.stop - part.start, 120), dtype=np.float32)
+
+    assert find_edges(grid, rows, among_free=True, strip=120 * 50).cells.size == 0
+    # One for the gradient and eleven for the blur.
+    assert asked == [(0, 62), (38, 112), (88, 120)]
+
+
+def _bars(degrees, length=60, gap=12, size=240):
+    """Bars one cell thick along a direction, free around."""
+    frame = GridFrame(0.05, -size * 0.025, -size * 0.025, size, size)
+    points = frame.to_points(np.stack(np.indices(frame.shape), axis=-1)) / 0.05
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    u, v = points @ np.array([c, s]), points @ np.array([-s, c])
+    bars = (np.abs(v % gap - gap / 2) < 0.75) & (np.abs(u) < length / 2) & (np.abs(v) < 80)
+    return frame, bars
+
+
+@pytest.mark.parametrize("degrees", [0.0, 25.0])
+def test_bars_of_one_direction_are_walls_and_specks_are_none(degrees):
+    frame, bars = _bars(degrees)
+    assert shows_walls(OccupancyGrid(frame, np.where(bars, OCCUPIED, FREE).astype(np.int8)))
+    # The same in pieces of nine cells: upright ones have straight sides, but are specks.
+    upright = np.zeros(frame.shape, dtype=np.bool_)
+    for count, walls in ((9, False), (10, True)):
+        upright[:] = False
+        for row in range(10, 230, 8):
+            for col in range(10, 220, 14):
+                upright[row, col : col + count] = True
+        assert shows_walls(OccupancyGrid(frame, np.where(upright, OCCUPIED, FREE).astype(np.int8))) == walls
+
+
+def test_the_outline_of_what_is_known_has_no_say():
+    # Random walls, known within a square that is not turned.
+    frame = GridFrame(0.05, 0.0, 0.0, 200, 200)
+    rng = np.random.default_rng(3)
+    blobs = cv2.GaussianBlur(rng.random(frame.shape).astype(np.float32), (0, 0), 3.0)
+    occupied = blobs > np.quantile(blobs, 0.7)
+    cells = np.full(frame.shape, UNKNOWN, dtype=np.int8)
+    inner = (slice(30, 170), slice(30, 170))
+    cells[inner] = np.where(occupied, OCCUPIED, FREE)[inner]
+    assert not shows_walls(OccupancyGrid(frame, cells))
+
+
+def test_few_edges_of_one_direction_say_as_little_as_many_of_all():
+    # (c - 1) sqrt(n) with c = 30: all edges in one degree reach 80 from eight edges on, were they counted alone.
+    frame, bars = _bars(0.0, length=24, gap=160)
+    assert bars.sum() == 2 * 24
+    grid = OccupancyGrid(frame, np.where(bars, OCCUPIED, FREE).astype(np.int8))
+    assert shows_walls(grid)
+
+
+def _share(degrees, wing, count):
+    """Walls along degrees and, so many of ten, along others."""
+    frame = GridFrame(0.05, -10.0, -10.0, 400, 400)
+    cells = np.full(frame.shape, FREE, dtype=np.int8)
+    picture = cells.astype(np.uint8)
+    for number in range(12):
+        angle = math.radians(degrees if number >= count else wing)
+        middle = np.array([200.0, 30.0 + 30.0 * number])
+        way = 90.0 * np.array([math.cos(angle), math.sin(angle)])
+        ends = [tuple(np.rint(middle + sign * way).astype(int).tolist()) for sign in (-1, 1)]
+        cv2.line(picture, *ends, 100, 2)
+    return OccupancyGrid(frame, picture.astype(np.int8))
+
+
+def test_directions_come_strongest_first_and_rare_ones_are_left_out():
+    found = find_wall_directions(_share(0.0, 25.0, 4))
+    assert np.degrees(found.angles) == pytest.approx([0.0, 25.0], abs=0.5)
+    found = find_wall_directions(_share(0.0, 25.0, 9))
+    assert np.degrees(found.angles) == pytest.approx([25.0, 0.0], abs=0.5)
+    assert np.degrees(find_wall_directions(_share(0.0, 25.0, 1)).angles) == pytest.approx([0.0], abs=0.5)
+    # What differs by less than the votes are smoothed over is one.
+    assert len(find_wall_directions(_share(20.0, 22.0, 4)).angles) == 1
+
+
+@pytest.mark.parametrize("degrees", [3.0, -20.0, 40.0])
+@pytest.mark.parametrize("off", [-1.4, 0.0, 1.3])
+def test_a_direction_is_refined_to_where_cells_pile_up_most(degrees, off):
+    frame, bars = _bars(degrees, length=120)
+    points = frame.to_points(np.argwhere(bars))
+    found = _sharpest(points, math.radians(degrees + off), 0.05)
+    assert math.degrees(found) == pytest.approx(degrees, abs=0.11)
+
+
+def test_what_is_turned_by_hardly_anything_is_upright():
+    frame, bars = _bars(0.0, length=120)
+    points = frame.to_points(np.argwhere(bars))
+    # Upright is tried from up to three degrees away, although that is further than the others reach.
+    for degrees in (0.0, 0.3, -1.4, 2.9, -2.9):
+        assert _sharpest(points, math.radians(degrees), 0.05) == 0.0
+    assert abs(_sharpest(points, math.radians(3.1), 0.05)) > math.radians(1.0)
+
+
+@pytest.mark.parametrize(("degrees", "told"), [(0.2, False), (0.3, False), (0.5, True), (1.2, True), (-0.6, True)])
+def test_what_is_turned_by_more_than_a_third_of_a_degree_is_turned(degrees, told):
+    # Bars of 12 m, whose ends lie 0.07 m apart at a third of a degree.
+    frame, bars = _bars(degrees, length=240, gap=20)
+    found = math.degrees(_sharpest(frame.to_points(np.argwhere(bars)), math.radians(degrees), 0.05))
+    assert found == pytest.approx(degrees, abs=0.11) if told else found == 0.0

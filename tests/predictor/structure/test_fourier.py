@@ -25,3 +25,13 @@ def test_where_the_compiled_file_is_not_found_the_package_does_the_same(monkeypa
     monkeypatch.setattr(fourier.importlib.util, "find_spec", lambda _name: None)
     assert fourier.quick_size(61) == 63
     fourier._pocketfft.cache_clear()
+
+
+def test_the_compiled_file_is_loaded_without_its_package(monkeypatch):
+    def refuse(name):
+        raise AssertionError(f"{name} is imported")
+
+    fourier._pocketfft.cache_clear()
+    monkeypatch.setattr(fourier.importlib, "import_module", refuse)
+    assert fourier.quick_size(61) == 63
+    fourier._pocketfft.cache_clear()

@@ -1,13 +1,16 @@
 """What is known of a map, in other cells, and without what stands in its rooms."""
 
+import math
+
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter, map_coordinates
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.predictor.structure import known_window as module
 from closedrooms.predictor.structure.clutter import free_islands
-from closedrooms.predictor.structure.known_window import at_resolution, known_window
+from closedrooms.predictor.structure.known_window import _interpolated, at_resolution, known_window
 
 
 def grid_of(cells, resolution=0.05, origin=(1.0, 2.0)):
@@ -122,3 +125,41 @@ def test_what_is_near_a_door_stays():
         cleared = free_islands(grid, 4.0, [(9.0, 9.0), door], reach)
         assert (cleared.cells[40:60, 40:60] == (OCCUPIED if stays else FREE)).all()
         assert (cleared.cells[40:60, 80:100] == FREE).all()
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        (slice(0, 20), slice(50, 70)),
+        (slice(-20, None), slice(50, 70)),
+        (slice(50, 70), slice(0, 20)),
+        (slice(50, 70), slice(-20, None)),
+    ],
+)
+def test_what_lies_at_the_edge_of_the_map_stays(place):
+    cells = np.full((120, 120), FREE)
+    cells[place] = OCCUPIED
+    cells[50:70, 50:70] = OCCUPIED
+    cleared = free_islands(grid_of(cells), 4.0, [], 1.0)
+    assert (cleared.cells[place] == OCCUPIED).all()
+    assert (cleared.cells[50:70, 50:70] == FREE).all()
+
+
+@pytest.mark.parametrize("scale", [0.5, 0.4, 0.8])
+def test_finer_cells_are_interpolated_and_evened_out_by_half_a_coarse_cell(scale):
+    mask = np.random.default_rng(0).random((16, 24)) < 0.4
+    target = GridFrame(scale, 0.0, 0.0, math.ceil(16 / scale), math.ceil(24 / scale))
+    found = _interpolated(mask, scale, target)
+    places = [(np.arange(count) + 0.5) * scale - 0.5 for count in target.shape]
+    fine = map_coordinates(mask.astype(float), np.meshgrid(*places, indexing="ij"), order=1, mode="constant")
+    expected = gaussian_filter(fine, 0.5 / scale, mode="mirror")
+    inner = (slice(6, -6), slice(6, -6))  # the border counts as nothing
+    assert found[inner] == pytest.approx(expected[inner], abs=0.02)
+
+
+def test_a_cell_stays_from_four_tenths_on(monkeypatch):
+    grid = grid_of(np.full((4, 4), FREE), 0.1)
+    for value, stays in ((0.4, True), (0.399, False)):
+        monkeypatch.setattr(module, "_interpolated", lambda *_, value=value: np.full((8, 8), value))
+        fine = at_resolution(grid, 0.05)
+        assert (fine.cells == (OCCUPIED if stays else UNKNOWN)).all()

@@ -1,0 +1,142 @@
+"""Lines of panes: places side by side that may be glass, joined, and let go on up to the wall that they stand in."""
+
+import math
+
+import cv2
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.grid import OccupancyGrid
+
+LENGTH, SHORT = 0.5, 0.15
+"""Shortest run of places that is a pane wherever it is, a person is 0.4 m wide, and between solid walls [m]."""
+FEWEST = 4
+"""Fewest places of a pane."""
+THICK = 0.12
+"""Standard deviation across a pane up to which its cells are in line [m]: walls are seen from both sides."""
+FRAME = 0.5
+"""How far beyond what was hit a pane goes on up to the solid wall in its line [m]: less than a door is wide."""
+WIDE = 1.5
+"""The same once all has been seen [m]: of what is open somebody has seen by then that it is."""
+MARGIN = 0.05
+"""How far a pane goes on in any case [m]: a cell, or beams slip through between its end and the wall."""
+BODY = 0.1
+"""Distance from where the robot was up to which nothing stands [m]: no robot is narrower."""
+FARTHEST = 2.0
+"""How far beyond what was hit a pane goes on at most, all in all [m]."""
+
+
+def extend_line(
+    line: FloatArray, grid: OccupancyGrid, may_be: FloatArray, no_pane: FloatArray, driven: FloatArray, widest: float
+) -> tuple[FloatArray, bool]:
+    """Let a pane go on up to the solid wall in its line, where nothing speaks against it.
+
+    Args:
+        line: Its ends as they were hit, shape (2, 2) [m].
+        grid: The map.
+        may_be: Places that may be on a pane, shape (n, 2) [m].
+        no_pane: Places that are not, shape (n, 2) [m].
+        driven: Where the robot was, shape (n, 2) [m].
+        widest: Gap in the line that is bridged [m].
+
+    Returns:
+        Its ends, shape (2, 2) [m], and whether there is a solid wall at both of them.
+    """
+    along = line[1] - line[0]
+    along = along / np.hypot(*along)
+    across = np.array([-along[1], along[0]])
+    frame, occupied = grid.frame, grid.occupied
+    step = frame.resolution
+    ends, walls = [], 0
+    for end, direction in ((line[0], -along), (line[1], along)):
+        solid, wall = 0.0, False
+        for t in np.arange(step, FARTHEST, step):
+            place = end + t * direction
+            if t - solid > widest or _within(step, place, no_pane) or _within(BODY, place, driven):
+                break
+            cells = frame.to_cells(place + np.array([-step, 0.0, step])[:, None] * across)
+            inside = ((cells >= 0) & (cells < np.array(frame.shape))).all(axis=1)
+            if _within(step, place, may_be):
+                solid = float(t)
+            elif occupied[cells[inside, 0], cells[inside, 1]].any():
+                solid, wall = float(t), True
+        ends.append(end + (solid + MARGIN) * direction)
+        walls += wall
+    return np.array(ends), walls == 2
+
+
+def _within(distance: float, place: FloatArray, places: FloatArray) -> bool:
+    """Check whether some of the places, shape (n, 2), lie within a distance of one [m]."""
+    return bool((np.hypot(*(places - place).T) < distance).any())
+
+
+def find_candidates(places: FloatArray, resolution: float) -> IntArray:
+    """List the places, of shape (n, 2) [m], that could be on a pane, or where one could go on.
+
+    Few are so many side by side.
+    """
+    reach = FARTHEST + FRAME
+    near = np.zeros(len(places), dtype=np.bool_)
+    groups = _groups(places, resolution)
+    order = np.argsort(groups, kind="stable")
+    firsts = np.flatnonzero(np.diff(groups[order], prepend=-1))
+    lows = np.minimum.reduceat(places[order], firsts, axis=0)
+    highs = np.maximum.reduceat(places[order], firsts, axis=0)
+    large = np.diff(firsts, append=len(groups)) >= FEWEST
+    large &= np.hypot(*(highs - lows).T) >= SHORT
+    for low, high in zip(lows[large], highs[large], strict=True):
+        near |= ((places > low - reach) & (places < high + reach)).all(axis=1)
+    return np.flatnonzero(near)
+
+
+def draw_lines(places: FloatArray, normals: FloatArray, resolution: float) -> list[FloatArray]:
+    """Join places side by side that face the same way to straight lines, shape (2, 2) each."""
+    lines: list[FloatArray] = []
+    if not len(places):
+        return lines
+    angles = np.arctan2(normals[:, 1], normals[:, 0]) % math.pi
+    left = np.ones(len(places), dtype=np.bool_)
+    while left.any():
+        bins = np.bincount((angles[left] / math.pi * 18).astype(np.int64) % 18, minlength=18)
+        around = bins + np.roll(bins, 1) + np.roll(bins, -1)
+        facing = (np.argmax(around) + 0.5) / 18 * math.pi
+        off = np.abs((angles - facing + math.pi / 2.0) % math.pi - math.pi / 2.0)
+        chosen = left & (off < math.pi / 9.0)
+        left &= ~chosen
+        groups = _groups(places[chosen], resolution)
+        for number in np.unique(groups):
+            line = _line(places[chosen][groups == number], angles[chosen][groups == number])
+            if line is not None:
+                lines.append(line)
+    return lines
+
+
+def _groups(places: FloatArray, resolution: float) -> IntArray:
+    """Number places, shape (n,), by groups that hang together over gaps of at most four cells."""
+    cells = np.floor(places / resolution).astype(np.int64)
+    cells -= cells.min(axis=0) - 3
+    mask = np.zeros(cells.max(axis=0) + 4, dtype=np.uint8)
+    mask[cells[:, 0], cells[:, 1]] = 1
+    _, labels = cv2.connectedComponents(cv2.dilate(mask, np.ones((5, 5), dtype=np.uint8)), connectivity=8)
+    return np.asarray(labels)[cells[:, 0], cells[:, 1]].astype(np.int64)
+
+
+def _line(places: FloatArray, angles: FloatArray) -> FloatArray | None:
+    """Draw the line through places, whose normals have these angles [rad], where they are in line and long enough."""
+    if len(places) < FEWEST:
+        return None
+    middle = places.mean(axis=0)
+    _, spread, axes = np.linalg.svd(places - middle, full_matrices=False)
+    if spread[1] / math.sqrt(len(places)) > THICK:
+        return None
+    along = axes[0]
+    if np.ptp((places - middle) @ along) < LENGTH:
+        # So few places do not tell in which direction they lie.
+        turn = np.arctan2(np.sin(2.0 * angles).mean(), np.cos(2.0 * angles).mean()) / 2.0
+        along = np.array([-math.sin(turn), math.cos(turn)])
+        across = np.array([math.cos(turn), math.sin(turn)])
+        middle = middle + np.median((places - middle) @ across) * across
+    t = (places - middle) @ along
+    if np.ptp(t) < SHORT:
+        return None
+    return np.asarray(middle + np.outer([t.min(), t.max()], along))

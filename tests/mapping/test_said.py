@@ -1,0 +1,49 @@
+"""What keyframes say about places, kept as the few entries that there are."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from closedrooms.core.pose import Pose2
+from closedrooms.mapping.beams import clean
+from closedrooms.mapping.glass import HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE, VIEWPOINT, Panes, Said
+from closedrooms.mapping.graph.keyframe import Keyframe
+from tests.conftest import SegmentWorld
+
+
+@given(seed=st.integers(0, 10_000), keyframes=st.integers(1, 12), places=st.integers(1, 9))
+def test_each_viewpoint_counts_once(seed: int, keyframes: int, places: int) -> None:
+    rng = np.random.default_rng(seed)
+    said = rng.integers(0, 5, (keyframes, places)).astype(np.int8)
+    sensors = rng.uniform(0.0, 3.0 * VIEWPOINT, (keyframes, 2))
+    who, what = np.nonzero(said)
+    shuffled = rng.permutation(len(who))
+    entries = Said(who[shuffled].astype(np.int32), what[shuffled].astype(np.int32), said[who, what][shuffled])
+    squares = [tuple(square) for square in np.floor(sensors / VIEWPOINT).tolist()]
+    counts = entries.count_viewpoints(sensors, places)
+    for code, counted in zip((HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE), counts, strict=True):
+        for place in range(places):
+            assert counted[place] == len({squares[k] for k in np.flatnonzero(said[:, place] == code)})
+
+
+def test_of_new_places_and_moved_keyframes_is_said_what_asking_all_of_all_says(office: SegmentWorld) -> None:
+    drive = office.drive([(0.7, 1.0), (10.0, 1.0)], noise=0.01, beams=360)
+    keyframes = []
+    for number, (scan, odometry) in enumerate(zip(drive.scans[::8], drive.odometry[::8], strict=True)):
+        beams = clean(scan, max_range=20.0)
+        keyframes.append(Keyframe(number, scan.stamp, Pose2(*odometry), beams, beams.points, beams.points, 0.0))
+    rng = np.random.default_rng(0)
+    panes = Panes(0.05)
+    for count, known in ((3, 40), (len(keyframes), 40), (len(keyframes), 300), (len(keyframes), 320)):
+        new = rng.uniform((-2.0, -6.0), (14.0, 6.0), (known - len(panes._places), 2))
+        angles = rng.uniform(0.0, np.pi, len(new))
+        panes._places = np.concatenate((panes._places, new))
+        panes._normals = np.concatenate((panes._normals, np.column_stack((np.cos(angles), np.sin(angles)))))
+        panes._asked = np.concatenate((panes._asked, rng.permutation(np.arange(known - len(new), known))))
+        keyframes[1].pose = keyframes[1].pose @ Pose2(0.02, -0.03, 0.01)
+        panes._ask(keyframes[:count])
+        places, normals = panes._places[panes._asked], panes._normals[panes._asked]
+        dense = np.array([panes._codes(keyframe, places, normals) for keyframe in keyframes[:count]])
+        said = panes._said
+        assert len(said.codes) == np.count_nonzero(dense) > 0
+        assert (dense[said.keyframes, said.places] == said.codes).all()
