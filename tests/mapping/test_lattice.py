@@ -62,7 +62,7 @@ def test_a_window_larger_than_any_building_is_refused() -> None:
         Lattice(0.05).cover(np.zeros(2), np.full(2, 2000.0), 0)
 
 
-@pytest.mark.parametrize("fill", [0, 7])
+@pytest.mark.parametrize("fill", [0, 1, 7])
 def test_arrays_grow_with_their_window(fill: int) -> None:
     values = np.arange(6, dtype=np.int16).reshape(2, 3)
     padding = ((1, 2), (3, 4))

@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from closedrooms.core.errors import InvalidInputError
@@ -14,8 +15,9 @@ from closedrooms.sim.config import SimConfig, noise_level
 from closedrooms.sim.robot.drive_calibration import SETTLE, calibrate_drive
 from closedrooms.sim.robot.driven_robot import Motion
 from closedrooms.sim.robot.robot_model import make_model
-from closedrooms.sim.robot.robot_urdf import read_robot
+from closedrooms.sim.robot.robot_urdf import _lidar_mount, read_robot
 from closedrooms.sim.robot.urdf_description import check_loads
+from closedrooms.sim.robot.urdf_joints import Joint
 from closedrooms.sim.robot.wheeled_robot import WheeledRobot
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.plan import FloorPlan
@@ -207,3 +209,32 @@ def test_a_robot_wider_than_every_door_is_refused(plan: FloorPlan) -> None:
     with pytest.raises(InvalidInputError, match="wide"):
         check_width(plan, RobotConfig(radius=0.81))
     check_width(dataclasses.replace(plan, doors=(), openings=()), RobotConfig(radius=0.81))
+
+
+def link(name: str, x: float, y: float, z: float, heading: float = 0.0) -> Joint:
+    place = np.array([x, y, z])
+    return Joint(
+        0, f"{name}_joint", name, -1, False, False, np.array([0.0, 0.0, 1.0]), place, heading, place, place, 0.0
+    )
+
+
+def test_the_lidar_sits_where_its_link_does_seen_along_the_heading() -> None:
+    joints = [link("wheel", 0.0, 0.0, 0.1), link("Laser_Frame", 1.3, 2.1, 0.25, 0.5), link("laser2", 9.0, 9.0, 0.3)]
+    middle = np.array([1.0, 2.0, 0.1])
+    assert _lidar_mount(joints, middle, 0.0, -0.05) == pytest.approx((0.3, 0.1, 0.5, 0.3))
+    # A robot whose front is where its left was.
+    assert _lidar_mount(joints, middle, math.pi / 2, -0.05) == pytest.approx((0.1, -0.3, 0.5 - math.pi / 2, 0.3))
+    assert _lidar_mount(joints[:1], middle, 0.0, 0.0) is None
+    # The word that is looked for first counts, wherever it stands.
+    named = [*joints, link("base_scan", 1.0, 2.0, 0.2)]
+    assert _lidar_mount(named, middle, 0.0, 0.0) == pytest.approx((0.0, 0.0, 0.0, 0.2))
+
+
+@pytest.mark.parametrize(("height", "fits"), [(0.0, False), (0.01, True), (0.69, True), (0.7, False), (-0.1, False)])
+def test_a_lidar_is_above_the_floor_and_below_where_furniture_ends(height: float, fits: bool) -> None:
+    joints = [link("lidar", 0.0, 0.0, height)]
+    if fits:
+        assert _lidar_mount(joints, np.zeros(3), 0.0, 0.0) == pytest.approx((0.0, 0.0, 0.0, height))
+    else:
+        with pytest.raises(InvalidInputError, match=r"a lidar \(lidar\) .* m above the floor; expected below 0\.7 m"):
+            _lidar_mount(joints, np.zeros(3), 0.0, 0.0)

@@ -52,6 +52,12 @@ def test_a_pair_has_a_door_when_both_rooms_say_so(first: bool, second: bool) -> 
     assert pair.has_door == (first and second)
 
 
+def test_portals_without_a_partner_stay_and_those_after_them_are_paired() -> None:
+    listed = [(0, door_at(0.0)), (0, door_at(5.0)), (0, door_at(9.0)), (1, door_at(5.5)), (1, door_at(20.0))]
+    assert [portal.point[0] for portal in pair_portals(listed)] == [0.0, 5.25, 9.0, 20.0]
+    assert [portal.point[0] for portal in pair_portals(listed[:3])] == [0.0, 5.0, 9.0]
+
+
 def test_each_portal_is_paired_once_with_the_nearest_and_rooms_are_in_order() -> None:
     listed = [
         (2, Portal((9.0, 9.0), (1, 2), True)),
@@ -95,6 +101,8 @@ def test_wide_doors_have_two_leaves(width: float, kind: str) -> None:
     assert plan.doors[0].kind == kind
     deep = DeepDoor(((5.0, 4.0), (5.0 + width, 4.0)), (0, 1), 0.5, 0.2)
     assert plan_of_portals(two_rooms(), [], [], deep_doors=[deep]).doors[0].kind == kind
+    widest = DeepDoor(((0.0, 4.0), (1.3, 4.0)), (0, 1), 0.5, 0.2)
+    assert plan_of_portals(two_rooms(), [], [], deep_doors=[widest]).doors[0].kind == "hinged"
 
 
 @pytest.mark.parametrize(

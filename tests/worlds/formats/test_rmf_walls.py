@@ -53,6 +53,8 @@ def test_ends_that_miss_a_wall_are_drawn_on_to_it() -> None:
     # The nearest of two; what lies behind the end is not in its way.
     nearer = LineString([(3.7, 0.3), (3.7, -1)])
     assert _loose_ends([wall, nearer, LineString([(4, 0.4), (4, 3)])])[-1] == ((4.0, 0.4), (3.7, 0.3))
+    nearer = LineString([(4.3, 0.3), (4.3, -1)])
+    assert _loose_ends([wall, nearer, LineString([(4, 0.4), (4, 3)])])[-1] == ((4.0, 0.4), (4.3, 0.3))
     behind = LineString([(3.9, 0.45), (3.9, 3)])
     assert ((4.0, 0.4), (4.0, 0.0)) in _loose_ends([wall, behind, LineString([(4, 0.4), (4, 3)])])
 
@@ -133,6 +135,25 @@ def test_doors_join_the_rooms_on_both_sides() -> None:
         ("outside",): ("dropped", "walled up: no room on either side", True),
         ("entrance", "back"): ("guessed", "read as entrances: a room on one side only", False),
     }
+
+
+def test_a_slanted_door_joins_the_rooms_beside_it() -> None:
+    rooms = (
+        PlanRoom("r00", "a", Polygon([(0, 0), (4, 0), (4, 4)])),
+        PlanRoom("r01", "b", Polygon([(0, 0), (4, 4), (0, 4)])),
+    )
+    for segment in (((1.0, 1.0), (2.0, 2.0)), ((2.0, 2.0), (1.0, 1.0))):
+        (door,) = _doors(level([], doors=(RmfDoor("d", segment, "hinged"),)), rooms, [])
+        # The room to the left of the segment first.
+        assert door.rooms == (("r01", "r00") if segment[0][0] == 1.0 else ("r00", "r01"))
+
+
+def test_a_wall_that_stands_free_is_no_loose_end() -> None:
+    outer = [*sides(0, 0, 10, 6)[:3], ((0.0, 6.0), (0.0, 4.0)), ((0.0, 2.0), (0.0, 0.0))]
+    free = ((5.0, 1.6), (5.0, 4.2))
+    made = _closers(level([*outer, free], floor=box(0, 0, 10, 6)), [])
+    assert made
+    assert not any(end in piece for piece in made for end in free)
 
 
 @pytest.mark.parametrize(("away", "reached"), [(0.28, True), (0.32, False)])

@@ -17,7 +17,7 @@ from closedrooms.worlds.generation.construction import (
     turned_sketch,
 )
 from closedrooms.worlds.generation.sketch import Sketch, SketchPassage
-from closedrooms.worlds.wall_assembly import shared_edges
+from closedrooms.worlds.wall_assembly import free_spans, shared_edges
 
 CORRIDOR = Polygon([(0, 0), (12, 0), (12, 2), (8, 2), (4, 2), (0, 2)])
 ROOMS = [CORRIDOR, box(0, 2, 4, 6), box(4, 2, 8, 6), box(8, 2, 12, 6)]
@@ -82,6 +82,16 @@ def test_the_longest_free_stretch_is_taken() -> None:
     taken = ((1.0, 2.0), (1.9, 2.0))
     low, high = ends(_place(door(0, 1, 0.5), edges, [taken]))
     assert (low, high) == pytest.approx(((2.2 + 3.7 - 0.9) / 2, (2.2 + 3.7 + 0.9) / 2))
+
+
+def test_of_stretches_of_one_length_the_first_is_taken() -> None:
+    edges = shared_edges(ROOMS)
+    (edge,) = [edge for edge in edges if edge.rooms == (0, 1)]
+    taken = ((1.8, 2.0), (2.2, 2.0))
+    first, second = free_spans(edge, edges, [taken], 0.3)
+    assert first[1] - first[0] == pytest.approx(second[1] - second[0])
+    placed = _place(door(0, 1, 0.5), edges, [taken])
+    assert ends(placed) == pytest.approx(ends(edge.part(sum(first) / 2, 0.9)))
 
 
 def test_rooms_that_nothing_joins_to_the_corridor_are_left_out() -> None:

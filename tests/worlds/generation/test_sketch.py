@@ -89,6 +89,7 @@ def test_a_bay_has_the_depth_of_its_run_or_its_own_where_it_is_wide() -> None:
     assert depths(plain, 6.0, previous=6.7) == {6.0}
     fixed = Run((0.0, 0.0), 0.0, 1, 30.0, 6.0, deepest=6.0)
     assert depths(deep, 6.0, section=0.85, run=fixed) == {6.0}
+    assert depths(deep, 6.0, section=0.85, run=Run((0.0, 0.0), 0.0, 1, 30.0, 6.0)) == {6.0}
 
 
 def drawn(layout: str, depth: float = 6.0, seed: int = 0, width: float = 8.0) -> tuple[Sketch, list[int]]:

@@ -9,6 +9,7 @@ import pytest
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.scan import LaserScan
+from closedrooms.mapping.logs.bags import clicked_points
 from closedrooms.mapping.logs.bags.bag_messages import stamp_of
 from closedrooms.mapping.logs.bags.bag_options import BagOptions
 from closedrooms.mapping.logs.bags.bag_writer import START, write_bag
@@ -135,6 +136,58 @@ def test_points_without_coordinates_are_dropped_and_said(tmp_path: Path) -> None
     doors = read_clicked_points(clicks(tmp_path / "clicks", [(np.nan, 0.0), (1.0, 1.0)]), remarks=remarks)
     assert [door.midpoint for door in doors] == [(1.0, 1.0)]
     assert [(remark.what, remark.count) for remark in remarks] == [("points", 1)]
+
+
+def test_points_that_are_all_there_leave_nothing_to_say(tmp_path: Path) -> None:
+    remarks: list = []
+    path = clicks(tmp_path / "clicks", [(1.0, 1.0)])
+    assert len(read_clicked_points(path, remarks=remarks)) == 1
+    assert remarks == []
+    assert read_clicked_points(clicks(tmp_path / "bad", [(np.nan, 0.0)])) == []
+
+
+def test_points_of_one_other_topic_are_taken(tmp_path: Path) -> None:
+    assert len(read_clicked_points(clicks(tmp_path / "other", [(1.0, 1.0)], topic="/points"))) == 1
+
+
+def test_there_are_so_many_points_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = clicks(tmp_path / "clicks", [(1.0, 1.0), (2.0, 1.0)])
+    monkeypatch.setattr(clicked_points, "MOST", 2)
+    assert len(read_clicked_points(path)) == 2
+    monkeypatch.setattr(clicked_points, "MOST", 1)
+    with pytest.raises(InvalidInputError, match="more than 1 points"):
+        read_clicked_points(path)
+
+
+def test_odometry_and_transforms_say_the_same_and_lie_in_the_plane(tmp_path: Path) -> None:
+    run = a_run(5)
+    write_bag(tmp_path / "sensed", run)
+    poses, moved, fixed = [], [], []
+    with AnyReader([tmp_path / "sensed"]) as reader:
+        for connection, stamp, data in reader.messages():
+            message = reader.deserialize(data, connection.msgtype)
+            if connection.topic == "/odom":
+                at, turned = message.pose.pose.position, message.pose.pose.orientation
+                poses.append((stamp, at.x, at.y, 2 * np.arctan2(turned.z, turned.w)))
+                assert (at.z, turned.x, turned.y) == (0.0, 0.0, 0.0)
+                speeds = (message.twist.twist.linear, message.twist.twist.angular)
+                assert [(v.x, v.y, v.z) for v in speeds] == [(0.0, 0.0, 0.0)] * 2
+                assert not message.pose.covariance.any()
+                assert not message.twist.covariance.any()
+                assert (message.header.frame_id, message.child_frame_id) == ("odom", "base_link")
+            elif connection.topic in {"/tf", "/tf_static"}:
+                (stamped,) = message.transforms
+                shift, turned = stamped.transform.translation, stamped.transform.rotation
+                assert (shift.z, turned.x, turned.y) == (0.0, 0.0, 0.0)
+                place = (stamp, shift.x, shift.y, 2 * np.arctan2(turned.z, turned.w))
+                frames = (stamped.header.frame_id, stamped.child_frame_id)
+                assert frames == (("odom", "base_link") if connection.topic == "/tf" else ("base_link", "laser"))
+                (moved if connection.topic == "/tf" else fixed).append(place)
+    assert poses == moved
+    assert np.array(poses)[:, 1:3] == pytest.approx(np.asarray(run.odometry)[:, :2])
+    assert [stamp for stamp, *_ in poses] == [10**9 + number * 10**8 for number in range(5)]
+    # The mounting is said once.
+    assert fixed == [(10**9, MOUNT[0], MOUNT[1], pytest.approx(MOUNT[2]))]
 
 
 def test_points_of_another_frame_are_refused(tmp_path: Path) -> None:
