@@ -16,7 +16,7 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.door import Point, Segment
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.grid import OccupancyGrid, is_free, is_known
 from closedrooms.predictor.structure.door_proposal_config import ProposalConfig
 from closedrooms.predictor.structure.wall_directions import find_wall_directions
 from closedrooms.predictor.structure.wall_faces import WallFaces, find_faces
@@ -275,9 +275,9 @@ def _around(
     # The leaf itself and what noise put behind it take three cells.
     steps = np.arange(1, max(2, round(config.depth / resolution)), dtype=np.float64) * resolution
     behind, inside = cells_at(leaf - 2.0 * resolution - steps)
-    unknown = grid.unknown[behind[:, 0], behind[:, 1]].sum() + (~inside).sum()
+    unknown = np.count_nonzero(~is_known(grid.cells[behind[:, 0], behind[:, 1]])) + (~inside).sum()
     front, there = cells_at(leaf + steps)
-    free = grid.free[front[:, 0], front[:, 1]].sum()
+    free = np.count_nonzero(is_free(grid.cells[front[:, 0], front[:, 1]]))
     return float(unknown / max(inside.size, 1)), float(free / max(there.size, 1))
 
 
@@ -298,7 +298,7 @@ def _has_room_behind(
     cells = frame.to_cells(s[:, None, None] * line.along + t[None, :, None] * line.outward)
     inside = frame.contains(cells)
     known = np.zeros(inside.shape, dtype=np.bool_)
-    known[inside] = grid.known[cells[inside][:, 0], cells[inside][:, 1]]
+    known[inside] = is_known(grid.cells[cells[inside][:, 0], cells[inside][:, 1]])
     # A few cells are what noise put behind the wall.
     width = max(round(side / resolution), 1)
     count = np.concatenate(([0], np.cumsum(known.sum(axis=1))))
