@@ -8,7 +8,7 @@ from shapely.geometry import Polygon
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.grid import OccupancyGrid, is_known
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import Shape
 from closedrooms.predictor.config import FacesConfig
@@ -128,7 +128,7 @@ def _behind_wall(start: InitialFaces, room: int) -> FloatArray:
     cells = grid.frame.to_cells(door + steps[:, None] * inward)
     inside = grid.frame.contains(cells)
     unknown = ~inside
-    unknown[inside] = grid.unknown[cells[inside, 0], cells[inside, 1]]
+    unknown[inside] = ~is_known(grid.cells[cells[inside, 0], cells[inside, 1]])
     step = steps[unknown.argmax()] if unknown.any() else steps[0]
     return np.asarray(door + step * inward)
 

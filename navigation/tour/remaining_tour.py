@@ -9,7 +9,7 @@ import shapely
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.door import Point
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.grid import OccupancyGrid, is_occupied
 from closedrooms.core.shapes import Shape
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.graph.graph_builder import build_graph
@@ -166,7 +166,7 @@ def _was_near(vertex: FloatArray, done: FloatArray, distance: float, grid: Occup
     cells = grid.frame.to_cells(lines)
     inside = grid.frame.contains(cells)
     blocked = np.zeros(inside.shape, dtype=np.bool_)
-    blocked[inside] = grid.occupied[cells[inside][:, 0], cells[inside][:, 1]]
+    blocked[inside] = is_occupied(grid.cells[cells[inside][:, 0], cells[inside][:, 1]])
     return bool((~blocked.any(axis=1)).any())
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.door import Point, Segment
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.grid import OccupancyGrid, is_free, is_known
 from closedrooms.predictor.structure.door_proposal_config import ProposalConfig
 from closedrooms.predictor.structure.wall_directions import find_wall_directions
 from closedrooms.predictor.structure.wall_faces import WallFaces, find_faces
@@ -202,15 +202,17 @@ def _recesses(line: _Line, resolution: float, config: ProposalConfig) -> _Recess
     narrowest = max(3, math.ceil(config.min_width / resolution - 1e-6))
     widest = math.floor(config.max_width / resolution + 1e-6)
     size = line.seen.size
-    first = np.arange(size)
     # Running sums of how many, depth and depth squared, with room for every window that reaches over an end.
     before, after = beside + 1, widest + beside + 1
     values = np.stack((line.seen.astype(np.float64), line.depth, line.depth**2))
     sums = np.cumsum(np.pad(values, ((0, 0), (before + 1, after))), axis=1)
 
+    # Where nothing is seen beside the left jamb there is none: of a line through a large map, nearly everywhere.
+    first = np.flatnonzero(sums[0, before - 1 :][:size] - sums[0, before - 1 - beside :][:size] >= 2)
+
     def window(low: int, high: int) -> FloatArray:
-        """Add up each of the three sums over the bins from ``first + low`` up to ``first + high``, shape (3, size)."""
-        return np.asarray(sums[:, before + high :][:, :size] - sums[:, before + low :][:, :size])
+        """Add up each of the three sums over the bins from ``first + low`` up to ``first + high``, shape (3, n)."""
+        return np.asarray(sums[:, first + before + high] - sums[:, first + before + low])
 
     columns, gains = [], []
     for bins in range(narrowest, widest + 1):
@@ -230,16 +232,16 @@ def _recesses(line: _Line, resolution: float, config: ProposalConfig) -> _Recess
                 & (recess >= config.min_recess) & (recess <= config.max_recess)
                 & (recess >= LEAST_CONTRAST * np.hypot(rough, SMOOTH)) & (np.abs(wall) <= resolution)
             )  # fmt: skip
-        columns.append((np.full(size, bins), recess, rough, leaf, n / (bins - 2)))
+        columns.append((np.full(first.size, bins), recess, rough, leaf, n / (bins - 2)))
         gains.append(np.where(good, gain, -np.inf))
-    if not gains:
+    if not (gains and first.size):
         return _Recesses(first[:0], first[:0], *[np.zeros(0)] * 4)
-    table = np.array(gains)  # (widths, size)
+    table = np.array(gains)  # (widths, n)
     width = table.argmax(axis=0)
     there = np.flatnonzero(np.isfinite(table.max(axis=0)))
     there = there[np.argsort(-table[width[there], there], kind="stable")]
     bins_, recess_, rough_, leaf_, seen_ = (np.array([c[k] for c in columns])[width[there], there] for k in range(5))
-    return _Recesses(there, bins_.astype(np.int64), recess_, rough_, leaf_, seen_)
+    return _Recesses(first[there], bins_.astype(np.int64), recess_, rough_, leaf_, seen_)
 
 
 def _best(found: _Recesses) -> list[int]:
@@ -273,9 +275,9 @@ def _around(
     # The leaf itself and what noise put behind it take three cells.
     steps = np.arange(1, max(2, round(config.depth / resolution)), dtype=np.float64) * resolution
     behind, inside = cells_at(leaf - 2.0 * resolution - steps)
-    unknown = grid.unknown[behind[:, 0], behind[:, 1]].sum() + (~inside).sum()
+    unknown = np.count_nonzero(~is_known(grid.cells[behind[:, 0], behind[:, 1]])) + (~inside).sum()
     front, there = cells_at(leaf + steps)
-    free = grid.free[front[:, 0], front[:, 1]].sum()
+    free = np.count_nonzero(is_free(grid.cells[front[:, 0], front[:, 1]]))
     return float(unknown / max(inside.size, 1)), float(free / max(there.size, 1))
 
 
@@ -296,7 +298,7 @@ def _has_room_behind(
     cells = frame.to_cells(s[:, None, None] * line.along + t[None, :, None] * line.outward)
     inside = frame.contains(cells)
     known = np.zeros(inside.shape, dtype=np.bool_)
-    known[inside] = grid.known[cells[inside][:, 0], cells[inside][:, 1]]
+    known[inside] = is_known(grid.cells[cells[inside][:, 0], cells[inside][:, 1]])
     # A few cells are what noise put behind the wall.
     width = max(round(side / resolution), 1)
     count = np.concatenate(([0], np.cumsum(known.sum(axis=1))))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.grid import OccupancyGrid, is_free
 
 # So many alike make a row; where they are uneven, five.
 LEAST_IN_ROW = 3
@@ -130,6 +130,6 @@ def _depth_in_front(grid: OccupancyGrid, niche: Niche) -> float:
     cells = grid.frame.to_cells(points)
     inside = grid.frame.contains(cells)
     free = np.zeros(inside.shape, dtype=np.bool_)
-    free[inside] = grid.free[cells[inside][:, 0], cells[inside][:, 1]]
+    free[inside] = is_free(grid.cells[cells[inside][:, 0], cells[inside][:, 1]])
     ends = np.where(free.all(axis=1), away[-1], away[np.argmin(free, axis=1)])
     return float(np.median(ends))

@@ -1,6 +1,7 @@
 """Closed doors proposed from a map alone."""
 
 import math
+from collections.abc import Callable
 from dataclasses import fields
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from closedrooms.core.arrays import BoolArray
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.predictor.structure.door_proposal_config import ProposalConfig
@@ -237,3 +239,23 @@ def test_settings_are_taken_up_to_their_limits_and_refused_beyond() -> None:
     ):  # fmt: skip
         with pytest.raises(InvalidInputError, match=line):
             ProposalConfig(**wrong)
+
+
+def test_candidates_look_at_the_cells_around_them_and_not_at_the_whole_map(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = []
+    for name in ("free", "occupied", "known", "unknown"):
+        mask = getattr(OccupancyGrid, name).fget
+
+        def look(grid: OccupancyGrid, mask: Callable[[OccupancyGrid], BoolArray] = mask) -> BoolArray:
+            whole.append(grid)
+            return mask(grid)
+
+        monkeypatch.setattr(OccupancyGrid, name, property(look))
+    one = corridor()
+    propose_doors(one)
+    looks = len(whole)
+    whole.clear()
+    beside = np.concatenate([one.cells] * 6, axis=1)
+    six = OccupancyGrid(GridFrame(RESOLUTION, -5.0, -5.0, SIZE, 6 * SIZE), beside)
+    assert len(propose_doors(six)) == 6
+    assert len(whole) == looks
