@@ -194,8 +194,8 @@ class Panes:
         segments = []
         for line, against in zip(lines, opened, strict=True):
             long = math.dist(*line) >= LENGTH
-            gap = WIDE if last and long else FRAME
-            segment, bounded = extend_line(line, grid, may_be, against, self._driven, gap)
+            gap, reach = (WIDE if last else FRAME, FARTHEST) if long else (FRAME, FRAME)
+            segment, bounded = extend_line(line, grid, may_be, against, self._driven, gap, reach)
             if long or (bounded and self._was_open(line, last=last)):
                 segments.append(segment)
         return np.array(segments).reshape(-1, 2, 2)
