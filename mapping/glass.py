@@ -256,21 +256,24 @@ class Panes:
         segments = []
         for line, against in zip(lines, opened, strict=True):
             long = math.dist(*line) >= LENGTH
-            gap = WIDE if last and long else FRAME
-            segment, bounded = extend_line(line, grid, may_be, against, self._driven, gap)
-            if long or (bounded and self._alternates(line)):
+            gap, reach = (WIDE if last else FRAME, FARTHEST) if long else (FRAME, FRAME)
+            segment, bounded = extend_line(line, grid, may_be, against, self._driven, gap, reach)
+            if long or (bounded and self._was_open(line, last=last)):
                 segments.append(segment)
         return np.array(segments).reshape(-1, 2, 2)
 
-    def _alternates(self, line: FloatArray) -> bool:
-        """Check that a pane was not only hit before it was gone through, or after: as who stood there and left."""
+    def _was_open(self, line: FloatArray, *, last: bool) -> bool:
+        """Check that a pane was gone through before it was hit, and until all has been seen also after.
+
+        Who stood there at first has left; who has come since may leave.
+        """
         places = self._places[self._asked]
         on_line = (np.hypot(*(places - line[0]).T) + np.hypot(*(places - line[1]).T)) < math.dist(*line) + DEPTH
         said = self._said.kept(on_line[self._said.places])
         hits, throughs = (said.keyframes[said.codes == code] for code in (HIT_NEAR, PAST_OBLIQUE))
         if not (len(hits) and len(throughs)):
             return False
-        return bool(hits.min() < throughs.max() and throughs.min() < hits.max())
+        return bool(throughs.min() < hits.max() and (last or hits.min() < throughs.max()))
 
     def _open_along(self, lines: Sequence[FloatArray], keyframes: Sequence[Keyframe]) -> list[FloatArray]:
         """List for each line the places in it that keyframes went through near its normal, which it tells best."""

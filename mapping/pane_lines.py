@@ -8,7 +8,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.grid import OccupancyGrid
 
-LENGTH, SHORT = 0.5, 0.15
+LENGTH, SHORT = 0.45, 0.15
 """Shortest run of places that is a pane wherever it is, a person is 0.4 m wide, and between solid walls [m]."""
 FEWEST = 4
 """Fewest places of a pane."""
@@ -23,11 +23,17 @@ MARGIN = 0.05
 BODY = 0.1
 """Distance from where the robot was up to which nothing stands [m]: no robot is narrower."""
 FARTHEST = 2.0
-"""How far beyond what was hit a pane goes on at most, all in all [m]."""
+"""How far beyond what was hit a pane goes on at most, all in all [m]; a short one only up to the next wall."""
 
 
 def extend_line(
-    line: FloatArray, grid: OccupancyGrid, may_be: FloatArray, no_pane: FloatArray, driven: FloatArray, widest: float
+    line: FloatArray,
+    grid: OccupancyGrid,
+    may_be: FloatArray,
+    no_pane: FloatArray,
+    driven: FloatArray,
+    widest: float,
+    farthest: float,
 ) -> tuple[FloatArray, bool]:
     """Let a pane go on up to the solid wall in its line, where nothing speaks against it.
 
@@ -38,6 +44,7 @@ def extend_line(
         no_pane: Places that are not, shape (n, 2) [m].
         driven: Where the robot was, shape (n, 2) [m].
         widest: Gap in the line that is bridged [m].
+        farthest: How far it goes on at most, all in all [m].
 
     Returns:
         Its ends, shape (2, 2) [m], and whether there is a solid wall at both of them.
@@ -50,7 +57,7 @@ def extend_line(
     ends, walls = [], 0
     for end, direction in ((line[0], -along), (line[1], along)):
         solid, wall = 0.0, False
-        for t in np.arange(step, FARTHEST, step):
+        for t in np.arange(step, farthest + step / 2.0, step):
             place = end + t * direction
             if t - solid > widest or _within(step, place, no_pane) or _within(BODY, place, driven):
                 break
