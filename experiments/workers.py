@@ -173,7 +173,11 @@ def _on_cluster(
         completed = as_completed(loop=client.loop)
 
         def fill() -> None:
-            most = max(AHEAD * sum(client.nthreads().values()), 1)
+            try:
+                threads = sum(client.nthreads().values())
+            except OSError as error:  # it was lost, and does not answer
+                raise CommClosedError(str(error)) from error
+            most = max(AHEAD * threads, 1)
             for job in islice(jobs, max(most - len(begun), 0)):
                 # No key of our own: equal jobs are done as often as they are asked for.
                 future = client.submit(work, job, pure=False, retries=TRIES - 1)

@@ -1,6 +1,7 @@
 """Work that is handed out, and workers that die of it."""
 
 import _thread
+import contextlib
 import json
 import math
 import os
@@ -15,8 +16,9 @@ from pathlib import Path
 
 import pytest
 
-from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.errors import ClosedroomsError, InvalidInputError
 from closedrooms.core.runtime.packages import MissingPackageError
+from closedrooms.experiments import workers as workers_module
 from closedrooms.experiments.local_workers import _command_line, _Pool
 from closedrooms.experiments.workers import AHEAD, TRIES, Crew, Lost
 
@@ -210,6 +212,20 @@ def test_a_scheduler_that_dies_is_one_line(tmp_path: Path) -> None:
     assert said.splitlines() == [
         "the Dask scheduler was lost; the same command goes on where it stopped once there is one again"
     ]
+
+
+def test_a_scheduler_that_no_longer_answers_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed", reason="needs closedrooms[cluster]")
+
+    class Unanswered:
+        loop = object()
+
+        def nthreads(self) -> dict[str, int]:
+            raise OSError("Timed out trying to connect") from ConnectionRefusedError(111, "Connection refused")
+
+    monkeypatch.setattr(workers_module, "_cluster", lambda _: contextlib.nullcontext(Unanswered()))
+    with pytest.raises(ClosedroomsError, match="^the Dask scheduler was lost; the same command goes on"):
+        list(Crew(1, "tcp://127.0.0.1:1").do(str, [1]))
 
 
 def test_a_signal_that_another_thread_takes_waits_until_a_worker_has_begun(monkeypatch: pytest.MonkeyPatch) -> None:
