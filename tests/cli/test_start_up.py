@@ -81,6 +81,7 @@ def test_a_command_loads_what_it_needs_and_no_more(corridor: Path, words: list[s
 
 
 @pytest.mark.simulation
+@pytest.mark.slow
 def test_a_run_without_a_recording_loads_neither_rerun_nor_scipys_solvers(tmp_path: Path) -> None:
     words = ["run", "office-01", "--close", "1", "--no-record", "--out", "r"]
     # scipy solves the pose graph, where a loop closes.

@@ -224,7 +224,7 @@ def test_a_scheduler_that_no_longer_answers_is_one_line(monkeypatch: pytest.Monk
             raise OSError("Timed out trying to connect") from ConnectionRefusedError(111, "Connection refused")
 
     monkeypatch.setattr(workers_module, "_cluster", lambda _: contextlib.nullcontext(Unanswered()))
-    with pytest.raises(ClosedroomsError, match="^the Dask scheduler was lost; the same command goes on"):
+    with pytest.raises(ClosedroomsError, match="the Dask scheduler was lost"):
         list(Crew(1, "tcp://127.0.0.1:1").do(str, [1]))
 
 
