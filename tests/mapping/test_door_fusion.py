@@ -43,6 +43,16 @@ def test_a_few_wrong_sightings_move_nothing() -> None:
     assert door.width == pytest.approx(0.9, abs=0.01)
 
 
+def test_nearer_sightings_count_more_down_to_a_metre() -> None:
+    # One from 1.2 m against two from 2 m; then one from 0.4 m, which counts as from 1 m, against two from 1.2 m.
+    for near, far, first in ((1.2, 2.0, True), (0.4, 1.2, False)):
+        frames = [keyframe(i, Pose2(3.0 - away, 1.45, 0.0)) for i, away in enumerate((near, far, far))]
+        for frame, shift in zip(frames, (0.0, 0.1, 0.1), strict=True):
+            sighted(frame, shift=shift)
+        (door,) = fuse_doors(frames)
+        assert door.midpoint[0] == pytest.approx(3.0 if first else 3.1)
+
+
 def test_a_corrected_keyframe_takes_its_doors_along() -> None:
     frame = keyframe(0, Pose2())
     sighted(frame)

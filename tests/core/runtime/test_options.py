@@ -38,6 +38,7 @@ class Matcher:
     sigma: float = 0.1
     points: int = 300
     enabled: bool = True
+    kind: str = "scan"
 
     def __post_init__(self) -> None:
         check_magnitudes(self, owner="matcher", positive=("points",), sigma=(0.01, 0.5))

@@ -105,8 +105,15 @@ def test_a_folder_that_is_there_is_one_clear_error(tmp_path: Path) -> None:
         write_bag(tmp_path, a_run())
 
 
-def clicks(path: Path, points: list[tuple[float, float]], *, frame: str = "map", topic: str = "/clicked_point") -> Path:
-    """A bag of what RViz's tool sends."""
+def clicks(
+    path: Path,
+    points: list[tuple[float, float]],
+    *,
+    frame: str = "map",
+    topic: str = "/clicked_point",
+    beside: str = "",
+) -> Path:
+    """A bag of what RViz's tool sends, and of another topic of points without a message."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -115,6 +122,8 @@ def clicks(path: Path, points: list[tuple[float, float]], *, frame: str = "map",
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         kind = "geometry_msgs/msg/PointStamped"
         connection = writer.add_connection(topic, kind, typestore=store)
+        if beside:
+            writer.add_connection(beside, kind, typestore=store)
         for number, (x, y) in enumerate(points):
             header = store.types["std_msgs/msg/Header"](make["Time"](number + 1, 0), frame)
             point = store.types["geometry_msgs/msg/Point"](x, y, 0.0)
@@ -148,6 +157,12 @@ def test_points_that_are_all_there_leave_nothing_to_say(tmp_path: Path) -> None:
 
 def test_points_of_one_other_topic_are_taken(tmp_path: Path) -> None:
     assert len(read_clicked_points(clicks(tmp_path / "other", [(1.0, 1.0)], topic="/points"))) == 1
+
+
+def test_of_several_topics_only_the_one_of_rviz_is_taken(tmp_path: Path) -> None:
+    assert len(read_clicked_points(clicks(tmp_path / "clicks", [(1.0, 1.0)], beside="/points"))) == 1
+    with pytest.raises(InvalidInputError, match="2 topics of PointStamped"):
+        read_clicked_points(clicks(tmp_path / "others", [(1.0, 1.0)], topic="/corners", beside="/points"))
 
 
 def test_there_are_so_many_points_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
