@@ -33,7 +33,7 @@ CASES: dict[str, tuple[str, str, dict[str, str | None], int, str]] = {
     "nobody may read or write what is written": ("umask 777;", SHOW, {}, 0, ""),
     "no room in any file": ("ulimit -f 0;", SHOW, {}, 1, "cannot write (File too large): out.png"),
     "six open files": ("ulimit -n 6;", SHOW, {}, 1, FILES),
-    "memory for no library": ("ulimit -v 200000;", PREDICT, {}, 1, MEMORY),
+    "memory for no library": ("ulimit -v 200000;", PREDICT, {"OPENBLAS_NUM_THREADS": "1"}, 1, MEMORY),
     "a terminal of one column": ("", "run --help", {"COLUMNS": "1"}, 0, ""),
     "a terminal of no column": ("", "--help", {"COLUMNS": "-1"}, 0, ""),
     "a library that warns of the picture": ("mv tags.tif map.png;", PREDICT, {}, 1, "cannot be read"),
