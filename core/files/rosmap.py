@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from closedrooms.core.arrays import CellArray, handed_over
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.map_picture import is_lossy, picture_path, read_picture
+from closedrooms.core.files.map_picture import is_jpeg, picture_path, read_picture
 from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.files.yaml_text import parse_yaml
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid, is_free, is_occupied
@@ -182,7 +182,7 @@ def read_ros_map(path: Path, *, allow_outside: bool = False) -> RosMap:
     if other:
         why = f"{fields['image']} is not there or outside, the file of its name beside the YAML was read"
         remarks.append(Remark(action="guessed", what="picture", why=why, names=(image.name,)))
-    lossy = mode == "trinary" and is_lossy(image)
+    lossy = mode == "trinary" and is_jpeg(image)
     if lossy:
         why = f"a JPEG spreads greys: up to {SPREAD} from {PIXEL_UNKNOWN} counts as unknown"
         remarks.append(Remark(action="guessed", what="cells", why=why, names=(image.name,)))

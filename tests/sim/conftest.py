@@ -1,6 +1,6 @@
 """A small building made by hand, whose geometry can be checked on paper."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -9,6 +9,7 @@ from shapely.geometry import Polygon, box
 
 from closedrooms.sim.building import building_solids
 from closedrooms.sim.config import LidarConfig, SimConfig, noise_level
+from closedrooms.sim.physics_world import PhysicsWorld
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.plan import FloorPlan, Furniture, Opening, PlanDoor, PlanRoom, Wall
 
@@ -42,6 +43,20 @@ def plan() -> FloorPlan:
     openings = (Opening("way-out", ((12.0, 1.0), (12.0, 2.5)), ("corridor", None)),)
     desk = Furniture("desk", box(0.3, 7.5, 1.7, 8.3))
     return FloorPlan("by-hand", rooms, walls, doors, openings, (2.0, 2.0, 0.3), (desk,))
+
+
+@pytest.fixture
+def still() -> Iterator[PhysicsWorld]:
+    """An empty world in which nothing is stepped."""
+    with PhysicsWorld() as physics:
+        yield physics
+
+
+@pytest.fixture
+def stepped() -> Iterator[PhysicsWorld]:
+    """An empty world with weight and contacts."""
+    with PhysicsWorld(stepped=True) as physics:
+        yield physics
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,6 @@
 """One door in a physics world: placed along its travel, or hung on motor, friction and latch."""
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -25,18 +24,6 @@ def leaves_of(kind: DoorKind = "hinged") -> tuple[PlanDoor, tuple[Leaf, ...]]:
     return door, door_leaves(PLAN, door, MultiPolygon(), SWING)
 
 
-@pytest.fixture
-def placed() -> Iterator[PhysicsWorld]:
-    with PhysicsWorld() as physics:
-        yield physics
-
-
-@pytest.fixture
-def stepped() -> Iterator[PhysicsWorld]:
-    with PhysicsWorld(stepped=True) as physics:
-        yield physics
-
-
 def place(physics: PhysicsWorld, kind: DoorKind = "hinged", seconds: float = 2.0) -> tuple[PlacedDoor, Obstacles]:
     obstacles = Obstacles(np.zeros((0, 4)), 0.5)
     door = PlacedDoor(*leaves_of(kind), physics, obstacles, SimConfig(door_seconds=seconds))
@@ -45,8 +32,8 @@ def place(physics: PhysicsWorld, kind: DoorKind = "hinged", seconds: float = 2.0
 
 
 @pytest.mark.parametrize("kind", ["hinged", "double", "sliding"])
-def test_a_placed_door_opens_evenly_and_its_edges_go_along(placed: PhysicsWorld, kind: DoorKind) -> None:
-    door, obstacles = place(placed, kind)
+def test_a_placed_door_opens_evenly_and_its_edges_go_along(still: PhysicsWorld, kind: DoorKind) -> None:
+    door, obstacles = place(still, kind)
     assert door.closed
     assert not door.opens
     door.set_out()
@@ -59,7 +46,7 @@ def test_a_placed_door_opens_evenly_and_its_edges_go_along(placed: PhysicsWorld,
         for link, (leaf, corners) in enumerate(zip(door.leaves, door.corners(), strict=True)):
             assert np.allclose(corners, leaf.at(door.opening * leaf.travel))
             assert set(leaf_edges(corners)) <= set(obstacles.near(*corners.mean(axis=0)))
-            assert placed.joint_position(door.body, link) == pytest.approx(door.opening * leaf.travel)
+            assert still.joint_position(door.body, link) == pytest.approx(door.opening * leaf.travel)
         assert len(obstacles.near(0.45, 0.2)) == 4 * len(door.leaves)
     assert not door.opens
     assert door.opening == 1.0
@@ -68,17 +55,17 @@ def test_a_placed_door_opens_evenly_and_its_edges_go_along(placed: PhysicsWorld,
     assert not door.opens
 
 
-def test_a_door_that_takes_no_time_opens_at_once_and_a_slow_one_slowly(placed: PhysicsWorld) -> None:
+def test_a_door_that_takes_no_time_opens_at_once_and_a_slow_one_slowly(still: PhysicsWorld) -> None:
     for seconds, opening in ((0.0, 1.0), (0.5, 0.2), (10.0, 0.01)):
-        door, _ = place(placed, seconds=seconds)
+        door, _ = place(still, seconds=seconds)
         door.set_out()
         door.advance(0.1, *AWAY)
         assert door.opening == pytest.approx(opening)
         assert door.opens == (opening < 1.0)
 
 
-def test_a_placed_door_waits_until_nothing_of_the_robot_is_in_its_way(placed: PhysicsWorld) -> None:
-    door, _ = place(placed)
+def test_a_placed_door_waits_until_nothing_of_the_robot_is_in_its_way(still: PhysicsWorld) -> None:
+    door, _ = place(still)
     door.set_out()
     # Beside the leaf's end on its way: a robot of 0.2 m whose edge the leaf meets.
     x, y = 0.3, 0.6

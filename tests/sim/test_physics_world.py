@@ -1,7 +1,6 @@
 """Bodies, joints and rays in PyBullet: what meets what, what weighs how much, and what is shown."""
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -12,18 +11,6 @@ from closedrooms.sim.config import STEPS
 from closedrooms.sim.physics_world import LEAF_DENSITY, MAX_LINKS, MAX_RAYS, MAX_TRIANGLES, PhysicsWorld
 from closedrooms.sim.solids import LEAF, PANE, PERSON, WALLS, MovingPart, upright
 from closedrooms.worlds.extrusion import extrude
-
-
-@pytest.fixture
-def still() -> Iterator[PhysicsWorld]:
-    with PhysicsWorld() as physics:
-        yield physics
-
-
-@pytest.fixture
-def stepped() -> Iterator[PhysicsWorld]:
-    with PhysicsWorld(stepped=True) as physics:
-        yield physics
 
 
 def part_of(

@@ -352,3 +352,10 @@ def test_a_jpeg_keeps_its_unknown_space_and_says_so(tmp_path: Path, quality: int
     Image.fromarray(saved).save(tmp_path / "map.png")
     (tmp_path / "map.yaml").write_text("image: map.png\nresolution: 0.05\norigin: [0, 0, 0]\nfree_thresh: 0.196\n")
     assert not read_ros_map(tmp_path / "map.yaml").remarks
+
+
+def test_a_jpeg_may_be_as_large_as_any_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Image.fromarray(np.full((80, 120), 254, dtype=np.uint8)).save(tmp_path / "map.jpg")
+    (tmp_path / "map.yaml").write_text("image: map.jpg\nresolution: 0.05\norigin: [0, 0, 0]\n")
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)  # Pillow's own bound is below ours
+    assert read_ros_map(tmp_path / "map.yaml").grid.free.all()
