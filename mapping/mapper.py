@@ -15,7 +15,8 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.beams import Beams, clean, hit_points, matched_range, thin_points
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.door_fusion import fuse_doors
-from closedrooms.mapping.glass import Panes, before_glass
+from closedrooms.mapping.glass.met_surfaces import Glimpse
+from closedrooms.mapping.glass.panes import Panes, before_glass
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.graph.keyframe_graph import KeyframeGraph
 from closedrooms.mapping.graph.pose_graph import Edge
@@ -25,7 +26,6 @@ from closedrooms.mapping.mapping_events import Event, EventLog
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.relocalisation import relocalise
 from closedrooms.mapping.matching.scan_matcher import ADVANTAGE, Match, match_scan
-from closedrooms.mapping.met_surfaces import Glimpse
 from closedrooms.mapping.motion import UncertainMotion
 from closedrooms.mapping.motion_prediction import MotionPrediction, PredictedStep
 from closedrooms.mapping.scan_preparation import PreparedScan

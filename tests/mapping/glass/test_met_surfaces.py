@@ -6,8 +6,8 @@ import pytest
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import clean
-from closedrooms.mapping.met_surfaces import Glimpse, MetSurfaces
-from closedrooms.mapping.scan_view import faces
+from closedrooms.mapping.glass.met_surfaces import Glimpse, MetSurfaces
+from closedrooms.mapping.glass.scan_view import faces
 from tests.conftest import SegmentWorld
 
 LIMIT = math.radians(22.0)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import clean
-from closedrooms.mapping.glass import HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE, VIEWPOINT, Panes, Said
+from closedrooms.mapping.glass.panes import HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE, VIEWPOINT, Panes, Said
 from closedrooms.mapping.graph.keyframe import Keyframe
 from tests.conftest import SegmentWorld
 

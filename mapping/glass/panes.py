@@ -16,11 +16,11 @@ from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
+from closedrooms.mapping.glass.met_surfaces import Glimpse, MetSurfaces
+from closedrooms.mapping.glass.pane_lines import FARTHEST, FRAME, LENGTH, WIDE, draw_lines, extend_line, find_candidates
+from closedrooms.mapping.glass.scan_view import LATERAL, View
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
-from closedrooms.mapping.met_surfaces import Glimpse, MetSurfaces
-from closedrooms.mapping.pane_lines import FARTHEST, FRAME, LENGTH, WIDE, draw_lines, extend_line, find_candidates
-from closedrooms.mapping.scan_view import LATERAL, View
 
 NEAR, OBLIQUE = math.radians(9.0), math.radians(22.0)
 """Incidence up to which a pane returns every beam, and from which on it returns none [rad]."""

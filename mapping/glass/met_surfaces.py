@@ -8,8 +8,8 @@ import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.pose import Pose2
+from closedrooms.mapping.glass.scan_view import faces
 from closedrooms.mapping.lattice import Lattice, grown
-from closedrooms.mapping.scan_view import faces
 
 NO_POINT: FloatArray = np.full((1, 2), np.nan)
 """What stands between the points of two scans."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from closedrooms.mapping.beams import Beams
-from closedrooms.mapping.scan_view import FACE_GAP, FACE_REACH, View, faces
+from closedrooms.mapping.glass.scan_view import FACE_GAP, FACE_REACH, View, faces
 
 
 def circle(

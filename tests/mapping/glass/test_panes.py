@@ -6,10 +6,11 @@ import pytest
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
-from closedrooms.mapping.beams import clean
+from closedrooms.mapping.beams import Beams, clean
 from closedrooms.mapping.config import MapperConfig
+from closedrooms.mapping.glass.panes import before_glass
+from closedrooms.mapping.glass.scan_view import View, faces
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.mapping.scan_view import View, faces
 from tests.conftest import SegmentWorld
 
 SEEN = math.radians(15.0)
@@ -216,3 +217,25 @@ def test_faces_of_a_wall_point_across_it(office: SegmentWorld) -> None:
     assert np.abs(normals[on_wall, 1]) == pytest.approx(1.0, abs=1e-3)
     expected = np.abs(np.arctan2(beams.points[on_wall, 0], beams.points[on_wall, 1]))
     assert incidence[on_wall] == pytest.approx(expected, abs=0.02)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_beams_end_at_the_nearest_pane_that_they_went_through(seed: int) -> None:
+    # Panes near and far, some beyond all beams, around a sensor beside the robot's middle.
+    rng = np.random.default_rng(seed)
+    pose, origin = Pose2(*rng.uniform(-2.0, 2.0, 3)), rng.uniform(-0.3, 0.3, 2)
+    angles, ranges = np.arange(0.0, 2 * math.pi, 0.05), rng.uniform(1.0, 6.0, 126)
+    ends = origin + ranges[:, None] * np.column_stack((np.cos(angles), np.sin(angles)))
+    panes = rng.uniform(-12.0, 12.0, (20, 1, 2)) + np.stack(
+        (np.zeros((20, 2)), rng.uniform(-2.0, 2.0, (20, 2))), axis=1
+    )
+    local = pose.inverse().transform(panes.reshape(-1, 2)).reshape(-1, 2, 2) - origin
+    expected = ranges.copy()
+    for k, angle in enumerate(angles):
+        beam = np.array([math.cos(angle), math.sin(angle)])
+        for a, b in local:
+            away, share = np.linalg.solve(np.column_stack((beam, a - b)), a)
+            if away > 0.0 and 0.0 < share < 1.0 and expected[k] - away > 0.15:
+                expected[k] = away
+    found = before_glass(Beams(ends, ends, origin), pose, panes)
+    assert np.hypot(*(found.outline - origin).T) == pytest.approx(expected, abs=1e-9)
