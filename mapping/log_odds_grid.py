@@ -25,7 +25,7 @@ NOISE = 0.10
 """Distance around a cell in which these are counted [m]."""
 SAME_WALL = 0.20
 """A scan that met something this near to a place [m] did not go through what stands there: of a wall that was seen from
-both sides, each with a pose of its own error, the two faces lie behind each other, and either scan ends at the other."""
+both sides, each with a pose of its own error, the faces lie behind each other, and either scan ends at the other."""
 LatticeWindow = tuple[int, int, int, int]
 """First row and column in the arrays, and number of rows and columns."""
 
