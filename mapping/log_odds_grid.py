@@ -23,6 +23,9 @@ GONE, GONE_SHARE = 2, 0.4
 gone: the place of somebody who was seen from ten keyframes, and from four not, is free."""
 NOISE = 0.10
 """Distance around a cell in which these are counted [m]."""
+SAME_WALL = 0.20
+"""A scan that met something this near to a place [m] did not go through what stands there: of a wall that was seen from
+both sides, each with a pose of its own error, the faces lie behind each other, and either scan ends at the other."""
 LatticeWindow = tuple[int, int, int, int]
 """First row and column in the arrays, and number of rows and columns."""
 
@@ -58,10 +61,14 @@ class EvidenceGrid:
         self._config = config
         self._lattice = Lattice(config.resolution)
         self._noise = math.ceil(NOISE / config.resolution)
+        span = 2 * math.ceil(SAME_WALL / config.resolution) + 1
+        self._same_wall = np.ones((span, span), dtype=np.uint8)
         shape = self._lattice.frame.shape
         self._hits = np.zeros(shape, dtype=np.int32)
         # Whole numbers, exact up to 2^24: OpenCV adds a mask to floats five times as quickly as to integers.
         self._misses = np.zeros(shape, dtype=np.float32)
+        # The misses of scans that met nothing nearby.
+        self._through = np.zeros(shape, dtype=np.float32)
         self._cells: CellArray = np.full(shape, UNKNOWN, dtype=np.int8)
         self._dirty: LatticeWindow | None = None
         self._redrawn: LatticeWindow = (0, 0, *shape)
@@ -122,14 +129,17 @@ class EvidenceGrid:
 
     def _count(self, window: LatticeWindow, mask: Mask, flat: IntArray, sign: int) -> None:
         """Add hits (``flat``: indices in the window) and misses (``mask``) of a keyframe, or take them off."""
-        rows, cols = slice(window[0], window[0] + window[2]), slice(window[1], window[1] + window[3])
-        hits, misses = self._hits[rows, cols], self._misses[rows, cols]
+        rows, cols = _slices(window)
         # A cell that several beams hit counts once: the same sum is written for each.
-        hits[flat // window[3], flat % window[3]] += sign
-        if sign > 0:
-            cv2.accumulate(mask, misses)
-        else:
-            cv2.subtract(misses, mask, misses, dtype=cv2.CV_32F)
+        self._hits[rows, cols][flat // window[3], flat % window[3]] += sign
+        met = np.zeros_like(mask)
+        met.ravel()[flat] = 1
+        through = cv2.subtract(mask, cv2.dilate(met, self._same_wall))
+        for counts, crossed in ((self._misses[rows, cols], mask), (self._through[rows, cols], through)):
+            if sign > 0:
+                cv2.accumulate(crossed, counts)
+            else:
+                cv2.subtract(counts, crossed, counts, dtype=cv2.CV_32F)
         self._dirty = window if self._dirty is None else _union(self._dirty, window)
 
     def _crossed(self, outline: FloatArray, window: LatticeWindow) -> Mask:
@@ -150,6 +160,7 @@ class EvidenceGrid:
             return
         self._hits = grown(self._hits, padding)
         self._misses = grown(self._misses, padding)
+        self._through = grown(self._through, padding)
         self._cells = grown(self._cells, padding, UNKNOWN)
         if self._dirty is not None:
             row, col, rows, cols = self._dirty
@@ -217,10 +228,10 @@ class EvidenceGrid:
         around a cell, and how many of them were gone through as often.
         """
         around = self._wider(window, self._noise)
-        hits, misses = self._hits[_slices(around)].astype(np.float32), self._misses[_slices(around)]
+        hits, through = self._hits[_slices(around)].astype(np.float32), self._through[_slices(around)]
         span = (2 * self._noise + 1, 2 * self._noise + 1)
-        most = cv2.dilate(np.where(hits > 0.0, misses, np.float32(0.0)), np.ones(span, dtype=np.uint8))
-        again = cv2.boxFilter(np.minimum(hits, misses), -1, span, normalize=False)
+        most = cv2.dilate(np.where(hits > 0.0, through, np.float32(0.0)), np.ones(span, dtype=np.uint8))
+        again = cv2.boxFilter(np.minimum(hits, through), -1, span, normalize=False)
         faded: BoolArray = (most >= GONE) & (again >= GONE_SHARE * cv2.boxFilter(hits, -1, span, normalize=False))
         return faded[window[0] - around[0] :, window[1] - around[1] :][: window[2], : window[3]]
 
