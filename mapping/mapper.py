@@ -16,7 +16,7 @@ from closedrooms.mapping.beams import Beams, clean, hit_points, matched_range, t
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.door_fusion import fuse_doors
 from closedrooms.mapping.glass.met_surfaces import Glimpse
-from closedrooms.mapping.glass.panes import Panes, before_glass
+from closedrooms.mapping.glass.panes import Panes
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.graph.keyframe_graph import KeyframeGraph
 from closedrooms.mapping.graph.pose_graph import Edge
@@ -365,17 +365,16 @@ class Mapper:
         self._corrected = False
         if not len(changed):
             return grid
-        for keyframe in self.keyframes:
-            if self._panes.seen_through(keyframe, changed):
-                keyframe.shown = None
+        for keyframe in self._panes.seen_through(self.keyframes, changed):
+            keyframe.shown = None
         self._drawn = 0
         return self._draw()
 
     def _draw(self) -> OccupancyGrid:
         moved = [keyframe for keyframe in self.keyframes[self._drawn :] if _outdated(keyframe)]
         self._evidence.add_all([k.drawn for k in moved if k.drawn is not None], sign=-1)
-        for keyframe in moved:
-            keyframe.shown = before_glass(keyframe.beams, keyframe.pose, self._panes.segments)
+        for keyframe, shown in zip(moved, self._panes.shown(self.keyframes, moved), strict=True):
+            keyframe.shown = shown
             keyframe.drawn = (keyframe.shown, keyframe.pose)
         self._evidence.add_all([k.drawn for k in moved if k.drawn is not None])
         self._drawn = len(self.keyframes)

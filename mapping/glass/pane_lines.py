@@ -5,8 +5,8 @@ import math
 import cv2
 import numpy as np
 
-from closedrooms.core.arrays import FloatArray, IntArray
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.grid import OccupancyGrid, is_occupied
 
 LENGTH, SHORT = 0.45, 0.15
 """Shortest run of places that is a pane wherever it is, a person is 0.4 m wide, and between solid walls [m]."""
@@ -52,29 +52,37 @@ def extend_line(
     along = line[1] - line[0]
     along = along / np.hypot(*along)
     across = np.array([-along[1], along[0]])
-    frame, occupied = grid.frame, grid.occupied
-    step = frame.resolution
+    step = grid.frame.resolution
+    steps = np.arange(step, farthest + step / 2.0, step)
     ends, walls = [], 0
     for end, direction in ((line[0], -along), (line[1], along)):
+        places = end + steps[:, None] * direction
+        against = _within(step, places, no_pane) | _within(BODY, places, driven)
+        on_pane = _within(step, places, may_be)
+        cells = grid.frame.to_cells(places[:, None] + np.array([-step, 0.0, step])[:, None] * across)
+        inside = grid.frame.contains(cells)
+        cells[~inside] = 0
+        at_wall = (inside & is_occupied(grid.cells[cells[..., 0], cells[..., 1]])).any(axis=1)
         solid, wall = 0.0, False
-        for t in np.arange(step, farthest + step / 2.0, step):
-            place = end + t * direction
-            if t - solid > widest or _within(step, place, no_pane) or _within(BODY, place, driven):
+        for t, stops, goes_on, walled in zip(
+            steps.tolist(), against.tolist(), on_pane.tolist(), at_wall.tolist(), strict=True
+        ):
+            if t - solid > widest or stops:
                 break
-            cells = frame.to_cells(place + np.array([-step, 0.0, step])[:, None] * across)
-            inside = ((cells >= 0) & (cells < np.array(frame.shape))).all(axis=1)
-            if _within(step, place, may_be):
-                solid = float(t)
-            elif occupied[cells[inside, 0], cells[inside, 1]].any():
-                solid, wall = float(t), True
+            if goes_on or walled:
+                solid, wall = t, wall or not goes_on
         ends.append(end + (solid + MARGIN) * direction)
         walls += wall
     return np.array(ends), walls == 2
 
 
-def _within(distance: float, place: FloatArray, places: FloatArray) -> bool:
-    """Check whether some of the places, shape (n, 2), lie within a distance of one [m]."""
-    return bool((np.hypot(*(places - place).T) < distance).any())
+def _within(distance: float, places: FloatArray, others: FloatArray) -> BoolArray:
+    """Mark the places, shape (n, 2), that have one of others, shape (m, 2), within a distance [m]."""
+    low, high = places.min(axis=0) - distance, places.max(axis=0) + distance
+    x, y = others[:, 0], others[:, 1]
+    near = others[(x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1])]
+    within: BoolArray = (np.hypot(*(near[:, None] - places).transpose(2, 0, 1)) < distance).any(axis=0)
+    return within
 
 
 def find_candidates(places: FloatArray, resolution: float) -> IntArray:

@@ -8,8 +8,8 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams, clean
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.glass.panes import before_glass
-from closedrooms.mapping.glass.scan_view import View, faces
+from closedrooms.mapping.glass.before_glass import before_glass
+from closedrooms.mapping.glass.scan_view import Views, faces
 from closedrooms.mapping.mapper import Mapper
 from tests.conftest import SegmentWorld
 
@@ -190,9 +190,10 @@ def test_somebody_who_stood_in_a_doorway_is_no_pane() -> None:
 
 @pytest.mark.parametrize("lateral", [0.0, 0.12])
 def test_a_view_tells_how_far_beams_went_beyond_a_place(office: SegmentWorld, lateral: float) -> None:
-    view = View(clean(office.scan(Pose2(6.0, 1.0, 0.0), beams=720), max_range=25.0))
+    views = Views()
+    views.add(clean(office.scan(Pose2(6.0, 1.0, 0.0), beams=720), max_range=25.0))
     places = np.array([[3.0, 0.0], [5.95, 0.0], [6.6, 0.0]])
-    assert view.beyond(places, lateral) == pytest.approx([3.0, 0.05, -0.6], abs=0.03)
+    assert views.beyond(np.zeros(3, dtype=np.int64), places, lateral) == pytest.approx([3.0, 0.05, -0.6], abs=0.03)
 
 
 def test_a_view_looks_at_all_beams_beside_a_place_and_no_others(office: SegmentWorld) -> None:
@@ -201,7 +202,9 @@ def test_a_view_looks_at_all_beams_beside_a_place_and_no_others(office: SegmentW
     draws = np.random.default_rng(3).uniform(size=(3, 200))
     bearing, distance, lateral = np.pi * (1.8 * draws[0] - 0.9), 1.0 + 3.0 * draws[1], 0.02 + 0.2 * draws[2]
     places = distance[:, None] * np.column_stack((np.cos(bearing), np.sin(bearing)))
-    beyond = View(beams).beyond(places, lateral)
+    views = Views()
+    views.add(beams)
+    beyond = views.beyond(np.zeros(200, dtype=np.int64), places, lateral)
     off, step = np.abs(bearings - bearing[:, None]), 2.0 * np.pi / len(bearings)
     nearest_in = [np.where(off <= (lateral / distance)[:, None] + slack, ranges, np.inf).min(axis=1) - distance
                   for slack in (-step, 2.0 * step)]  # fmt: skip

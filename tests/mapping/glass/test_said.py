@@ -6,7 +6,16 @@ from hypothesis import strategies as st
 
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import clean
-from closedrooms.mapping.glass.panes import HIT_NEAR, HIT_OBLIQUE, PAST_NEAR, PAST_OBLIQUE, VIEWPOINT, Panes, Said
+from closedrooms.mapping.glass.panes import Panes
+from closedrooms.mapping.glass.testimony import (
+    HIT_NEAR,
+    HIT_OBLIQUE,
+    PAST_NEAR,
+    PAST_OBLIQUE,
+    VIEWPOINT,
+    Said,
+    Witnesses,
+)
 from closedrooms.mapping.graph.keyframe import Keyframe
 from tests.conftest import SegmentWorld
 
@@ -43,7 +52,11 @@ def test_of_new_places_and_moved_keyframes_is_said_what_asking_all_of_all_says(o
         keyframes[1].pose = keyframes[1].pose @ Pose2(0.02, -0.03, 0.01)
         panes._ask(keyframes[:count])
         places, normals = panes._places[panes._asked], panes._normals[panes._asked]
-        dense = np.array([panes._codes(keyframe, places, normals) for keyframe in keyframes[:count]])
-        said = panes._said
-        assert len(said.codes) == np.count_nonzero(dense) > 0
-        assert (dense[said.keyframes, said.places] == said.codes).all()
+        witnesses = Witnesses()
+        assert witnesses.call(keyframes[:count]) == list(range(count))
+        whole, said = witnesses.say(range(count), places, normals), panes._said
+        assert len(whole.codes) > 0
+        assert sorted(zip(said.keyframes, said.places, said.codes, strict=True)) == sorted(
+            zip(whole.keyframes, whole.places, whole.codes, strict=True)
+        )
+        assert (panes._counts == whole.count_viewpoints(witnesses.sensors, len(places))).all()
