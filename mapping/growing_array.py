@@ -19,7 +19,7 @@ class GrowingArray:
         self._rows = np.zeros((FIRST_ROWS, *shape))
         self.values: FloatArray = self._rows[:0]
 
-    def append(self, row: float | tuple[float, ...]) -> None:
+    def append(self, row: float | tuple[float, ...] | FloatArray) -> None:
         """Add a row at the end."""
         self.extend(np.array(row)[None])
 

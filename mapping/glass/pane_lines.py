@@ -62,7 +62,7 @@ def extend_line(
         cells = grid.frame.to_cells(places[:, None] + np.array([-step, 0.0, step])[:, None] * across)
         inside = grid.frame.contains(cells)
         cells[~inside] = 0
-        at_wall = (inside & is_occupied(grid.cells[cells[..., 0], cells[..., 1]])).any(axis=1)
+        at_wall: BoolArray = (inside & is_occupied(grid.cells[cells[..., 0], cells[..., 1]])).any(axis=1)
         solid, wall = 0.0, False
         for t, stops, goes_on, walled in zip(
             steps.tolist(), against.tolist(), on_pane.tolist(), at_wall.tolist(), strict=True
