@@ -85,6 +85,29 @@ def _within(distance: float, places: FloatArray, others: FloatArray) -> BoolArra
     return within
 
 
+def without_covered(segments: FloatArray) -> FloatArray:
+    """Leave out the panes, shape (n, 2, 2) [m], that lie along a longer one."""
+    lengths = np.hypot(*(segments[:, 1] - segments[:, 0]).T)
+    kept: list[int] = []
+    for number in np.argsort(-lengths, kind="stable").tolist():
+        for a, b in segments[kept]:
+            along = b - a
+            share = np.clip((segments[number] - a) @ along / (along @ along), 0.0, 1.0)
+            if (np.hypot(*(segments[number] - a - share[:, None] * along).T) < THICK).all():
+                break
+        else:
+            kept.append(number)
+    return segments[sorted(kept)]
+
+
+def sample(segments: FloatArray, step: float) -> FloatArray:
+    """List places along panes, shape (n, 2, 2), at most ``step`` apart, shape (m, 2) [m]."""
+    counts = np.ceil(np.hypot(*(segments[:, 1] - segments[:, 0]).T) / step).astype(np.int64).tolist()
+    return np.concatenate(
+        [np.zeros((0, 2)), *(np.linspace(a, b, n + 1) for (a, b), n in zip(segments, counts, strict=True))]
+    )
+
+
 def find_candidates(places: FloatArray, resolution: float) -> IntArray:
     """List the places, of shape (n, 2) [m], that could be on a pane, or where one could go on.
 

@@ -15,7 +15,17 @@ from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.glass.before_glass import before_glass
 from closedrooms.mapping.glass.met_surfaces import Glimpse, MetSurfaces
-from closedrooms.mapping.glass.pane_lines import FARTHEST, FRAME, LENGTH, WIDE, draw_lines, extend_line, find_candidates
+from closedrooms.mapping.glass.pane_lines import (
+    FARTHEST,
+    FRAME,
+    LENGTH,
+    WIDE,
+    draw_lines,
+    extend_line,
+    find_candidates,
+    sample,
+    without_covered,
+)
 from closedrooms.mapping.glass.testimony import (
     DEPTH,
     HIT_NEAR,
@@ -89,8 +99,10 @@ class Panes:
         at = [pose @ glimpse.keyframe_T_robot for pose, glimpse in zip(poses, new, strict=True)]
         self._driven = np.concatenate((self._driven, np.array([(p.x, p.y) for p in at]).reshape(-1, 2)))
         # What was met near its normal, and scans went through it all the same.
-        within = _corners(evidence.grid().frame) if last else None
-        asked = evidence.crossed(SOLID, share=CROSSED_SHARE, within=within)
+        redrawn = evidence.take_redrawn()
+        if last:
+            redrawn = _corners(evidence.grid().frame)
+        asked = evidence.crossed(SOLID, share=CROSSED_SHARE, within=redrawn)
         places, normals = self._met.near_normal(*asked, OBLIQUE)
         if len(places):
             self._places = np.concatenate((self._places, places))
@@ -162,7 +174,9 @@ class Panes:
         hit = np.maximum(hit, 1)  # a glimpse between two keyframes at least
         glass = (past <= DOUBT * hit) & (through >= SEEN_THROUGH) & (askew <= DOUBT * through)
         no_pane = (past > 1) & (past > hit)
-        may_be = places[~no_pane & (through >= SEEN_THROUGH)]
+        # Where a pane was found before it goes on, until something speaks against it: what is drawn of it hides what it
+        # was drawn from.
+        may_be = np.concatenate((places[~no_pane & (through >= SEEN_THROUGH)], sample(self.segments, self._resolution)))
         lines = draw_lines(places[glass], normals[glass], self._resolution)
         opened = self._open_along(lines, keyframes) if last else [places[no_pane]] * len(lines)
         segments = []
@@ -172,7 +186,7 @@ class Panes:
             segment, bounded = extend_line(line, grid, may_be, against, self._driven, gap, reach)
             if long or (bounded and self._was_open(line, last=last)):
                 segments.append(segment)
-        return np.array(segments).reshape(-1, 2, 2)
+        return without_covered(np.array(segments).reshape(-1, 2, 2))
 
     def _was_open(self, line: FloatArray, *, last: bool) -> bool:
         """Check that a pane was gone through before it was hit, and until all has been seen also after.
