@@ -30,6 +30,7 @@ def extend_line(
     line: FloatArray,
     grid: OccupancyGrid,
     may_be: FloatArray,
+    before: FloatArray,
     no_pane: FloatArray,
     driven: FloatArray,
     widest: float,
@@ -41,7 +42,9 @@ def extend_line(
         line: Its ends as they were hit, shape (2, 2) [m].
         grid: The map.
         may_be: Places that may be on a pane, shape (n, 2) [m].
-        no_pane: Places that are not, shape (n, 2) [m].
+        before: Places on panes that were found before, shape (n, 2) [m]: what is drawn of a pane hides what it was
+            drawn from.
+        no_pane: Places that are not on a pane, shape (n, 2) [m].
         driven: Where the robot was, shape (n, 2) [m].
         widest: Gap in the line that is bridged [m].
         farthest: How far it goes on at most, all in all [m].
@@ -58,19 +61,21 @@ def extend_line(
     for end, direction in ((line[0], -along), (line[1], along)):
         places = end + steps[:, None] * direction
         against = _within(step, places, no_pane) | _within(BODY, places, driven)
-        on_pane = _within(step, places, may_be)
+        on_pane, as_before = _within(step, places, may_be), _within(step, places, before)
         cells = grid.frame.to_cells(places[:, None] + np.array([-step, 0.0, step])[:, None] * across)
         inside = grid.frame.contains(cells)
         cells[~inside] = 0
-        at_wall: BoolArray = (inside & is_occupied(grid.cells[cells[..., 0], cells[..., 1]])).any(axis=1)
+        at_wall = np.asarray((inside & is_occupied(grid.cells[cells[..., 0], cells[..., 1]])).any(axis=1))
         solid, wall = 0.0, False
-        for t, stops, goes_on, walled in zip(
-            steps.tolist(), against.tolist(), on_pane.tolist(), at_wall.tolist(), strict=True
-        ):
-            if t - solid > widest or stops:
+        for number, t in enumerate(steps.tolist()):
+            if t - solid > widest or against[number]:
                 break
-            if goes_on or walled:
-                solid, wall = t, wall or not goes_on
+            if on_pane[number]:
+                solid = t
+            elif at_wall[number]:
+                solid, wall = t, True
+            elif as_before[number]:
+                solid = t
         ends.append(end + (solid + MARGIN) * direction)
         walls += wall
     return np.array(ends), walls == 2

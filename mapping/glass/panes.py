@@ -57,6 +57,7 @@ class Panes:
         self._resolution = resolution
         self._glimpses: list[Glimpse] = []
         self._witnesses = Witnesses()
+        self._all_seen = False
         self.start_again()
 
     def start_again(self) -> None:
@@ -85,11 +86,12 @@ class Panes:
             keyframes: All of them.
             evidence: The map as it stands, drawn.
             moved: Whether poses were corrected since.
-            last: Whether nothing more will be seen.
+            last: Whether all has been seen by now.
 
         Returns:
             The panes that are new, gone or of another length, as they were and as they are, shape (n, 2, 2).
         """
+        self._all_seen |= last
         if moved:
             self._met.clear()
             self._driven = self._driven[:0]
@@ -174,22 +176,20 @@ class Panes:
         hit = np.maximum(hit, 1)  # a glimpse between two keyframes at least
         glass = (past <= DOUBT * hit) & (through >= SEEN_THROUGH) & (askew <= DOUBT * through)
         no_pane = (past > 1) & (past > hit)
-        # Where a pane was found before it goes on, until something speaks against it: what is drawn of it hides what it
-        # was drawn from.
-        may_be = np.concatenate((places[~no_pane & (through >= SEEN_THROUGH)], sample(self.segments, self._resolution)))
+        may_be, before = places[~no_pane & (through >= SEEN_THROUGH)], sample(self.segments, self._resolution)
         lines = draw_lines(places[glass], normals[glass], self._resolution)
         opened = self._open_along(lines, keyframes) if last else [places[no_pane]] * len(lines)
         segments = []
         for line, against in zip(lines, opened, strict=True):
             long = math.dist(*line) >= LENGTH
             gap, reach = (WIDE if last else FRAME, FARTHEST) if long else (FRAME, FRAME)
-            segment, bounded = extend_line(line, grid, may_be, against, self._driven, gap, reach)
-            if long or (bounded and self._was_open(line, last=last)):
+            segment, bounded = extend_line(line, grid, may_be, before, against, self._driven, gap, reach)
+            if long or (bounded and self._was_open(line)):
                 segments.append(segment)
         return without_covered(np.array(segments).reshape(-1, 2, 2))
 
-    def _was_open(self, line: FloatArray, *, last: bool) -> bool:
-        """Check that a pane was gone through before it was hit, and until all has been seen also after.
+    def _was_open(self, line: FloatArray) -> bool:
+        """Check that a pane was gone through before it was hit, and until all has been seen once also after.
 
         Who stood there at first has left; who has come since may leave.
         """
@@ -199,7 +199,7 @@ class Panes:
         hits, throughs = (said.keyframes[said.codes == code] for code in (HIT_NEAR, PAST_OBLIQUE))
         if not (len(hits) and len(throughs)):
             return False
-        return bool(throughs.min() < hits.max() and (last or hits.min() < throughs.max()))
+        return bool(throughs.min() < hits.max() and (self._all_seen or hits.min() < throughs.max()))
 
     def _open_along(self, lines: Sequence[FloatArray], keyframes: Sequence[Keyframe]) -> list[FloatArray]:
         """List for each line the places in it that keyframes went through near its normal, which it tells best."""

@@ -135,6 +135,28 @@ def test_a_pane_that_was_seen_from_the_front_in_part_goes_on_to_the_wall() -> No
     assert occupied_share(grid, map_T_world, PANE) > 0.95
 
 
+@pytest.mark.parametrize("short", [False, True])
+def test_a_pane_that_was_found_when_all_was_seen_stays_as_it_is_while_the_robot_goes_on(short: bool) -> None:
+    # Of the long one only the left end was met.
+    pane = (3.7, 6.0, 4.3, 6.0) if short else PANE
+    world = GlassWorld(walls_beside(pane) if short else HALL, pane)
+    route = ROUTE if short else [(7.0, 3.0), (3.4, 3.0), (3.4, 5.2), (3.4, 3.0)]
+    drive = world.drive([*route, (7.0, 3.0), (1.0, 1.0)], beams=720)
+    turn = len(world.drive(route, beams=720).scans)
+    mapper = Mapper()
+    for scan, odometry in zip(drive.scans[:turn], drive.odometry[:turn], strict=True):
+        mapper.process(scan, Pose2(*odometry))
+    mapper.finish()
+    mapper.grid()
+    found = mapper.panes
+    assert len(found) == 1
+    for scan, odometry in zip(drive.scans[turn:], drive.odometry[turn:], strict=True):
+        mapper.process(scan, Pose2(*odometry))
+        mapper.grid()
+        assert len(mapper.panes) == 1
+        assert np.abs(mapper.panes - found).max() < 0.1
+
+
 def test_a_doorway_beside_a_pane_that_the_robot_drove_through_stays_open() -> None:
     # At an angle, so that nothing else tells that there is no glass.
     pane = (3.0, 6.0, 4.0, 6.0)
