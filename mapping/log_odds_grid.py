@@ -71,7 +71,7 @@ class EvidenceGrid:
         self._through = np.zeros(shape, dtype=np.float32)
         self._cells: CellArray = np.full(shape, UNKNOWN, dtype=np.int8)
         self._dirty: LatticeWindow | None = None
-        self._redrawn: LatticeWindow = (0, 0, *shape)
+        self._redrawn: LatticeWindow | None = None
         self._grid: OccupancyGrid | None = None
         self._percent: CellArray = self._probabilities(1, 1)
 
@@ -162,9 +162,10 @@ class EvidenceGrid:
         self._misses = grown(self._misses, padding)
         self._through = grown(self._through, padding)
         self._cells = grown(self._cells, padding, UNKNOWN)
-        if self._dirty is not None:
-            row, col, rows, cols = self._dirty
-            self._dirty = (row + padding[0][0], col + padding[1][0], rows, cols)
+        self._dirty, self._redrawn = (
+            None if window is None else (window[0] + padding[0][0], window[1] + padding[1][0], *window[2:])
+            for window in (self._dirty, self._redrawn)
+        )
 
     def grid(self) -> OccupancyGrid:
         """Draw the map: probability in percent where anything was observed, else unknown."""
@@ -186,11 +187,21 @@ class EvidenceGrid:
             gone = self._faded(window) & (misses > 0.0)
             np.copyto(places, misses.astype(np.int32), where=gone)
             self._cells[rows, cols] = self._percent.ravel().take(places)
-            self._redrawn, self._dirty = self._dirty, None
+            self._redrawn = self._dirty if self._redrawn is None else _union(self._redrawn, self._dirty)
+            self._dirty = None
         cells = self._cells.copy()
         cells.flags.writeable = False  # so that it is not copied again
         self._grid = OccupancyGrid(self._lattice.frame, cells)
         return self._grid
+
+    def take_redrawn(self) -> tuple[FloatArray, FloatArray] | None:
+        """Compute the middles of the lower left and the upper right cell of what was drawn since the last call [m]."""
+        if self._redrawn is None:
+            return None
+        (row, col, rows, cols), self._redrawn = self._redrawn, None
+        low = np.array([self._lattice.col0 + col, self._lattice.row0 + row]) + 0.5
+        high = low + np.array([cols - 1, rows - 1])
+        return low * self._lattice.resolution, high * self._lattice.resolution
 
     def crossed(
         self, apart: float, *, share: float = CROSSED_SHARE, within: tuple[FloatArray, FloatArray] | None = None
@@ -203,14 +214,13 @@ class EvidenceGrid:
         Args:
             apart: Reach of the noise of a surface [m].
             share: Scans that went through a cell, beside ``CROSSED``, for each that saw a surface there.
-            within: Lower left and upper right corner of what is looked at, map frame, ``(x, y)`` [m]; without it only
-                what the last :meth:`grid` drew.
+            within: Lower left and upper right corner of what is looked at, map frame, ``(x, y)`` [m]; all without it.
 
         Returns:
             First row and column of the window that was looked at, on the lattice, and its cells.
         """
         lattice = self._lattice
-        row, col, n_rows, n_cols = self._redrawn
+        row, col, n_rows, n_cols = (0, 0, *self._hits.shape)
         if within is not None:
             (row, last_row), (col, last_col) = (cells.tolist() for cells in lattice.cells(np.stack(within)))
             n_rows, n_cols = last_row + 1 - row, last_col + 1 - col

@@ -313,3 +313,18 @@ def test_beside_a_surface_that_stands_nothing_counts_as_crossed() -> None:
         assert not crossed[near].any()
         ring = cv2.dilate(near.astype(np.uint8), np.ones((3, 3))) > 0
         assert crossed[ring & ~near].all()
+
+
+def test_what_was_redrawn_is_told_once_also_when_the_map_grows_meanwhile() -> None:
+    evidence = EvidenceGrid(MapperConfig())
+    square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    assert evidence.take_redrawn() is None
+    evidence.add(Beams(square, square, np.zeros(2)), Pose2())
+    evidence.grid()
+    evidence.add(Beams(square, square, np.zeros(2)), Pose2(-7.0, -9.0, 0.0))
+    evidence.grid()
+    found = evidence.take_redrawn()
+    assert found is not None
+    assert np.abs(found[0] - (-8.0, -10.0)).max() <= 0.03
+    assert np.abs(found[1] - (1.0, 1.0)).max() <= 0.03
+    assert evidence.take_redrawn() is None
