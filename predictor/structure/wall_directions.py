@@ -10,9 +10,11 @@ from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame, OccupancyGrid, is_free
 from closedrooms.predictor.structure.edges import BLUR, QUARTER, Picture, find_edges, votes_by_degree, wrapped
+from closedrooms.predictor.structure.peaks import find_circular_peaks
 
-# A second direction needs this share of the strongest one's walls: less is furniture or noise.
-MIN_SHARE = 0.12
+# A second direction needs this share of the strongest one's walls: less is furniture or noise. And it rises by this
+# share above what lies between: the edges of a rough wall trail off to either side.
+MIN_SHARE, MIN_RISE = 0.12, 0.06
 # Directions closer than this are one [rad].
 APART = math.radians(8.0)
 # Below this the map is not turned at all [rad]: 0.35 degrees are 0.12 m over a room row of 20 m.
@@ -88,7 +90,11 @@ def find_wall_directions(grid: OccupancyGrid) -> WallDirections | None:
     angles = wrapped(edges.angles)
     smooth = votes_by_degree(angles)
     peaks: list[float] = []
-    for index in sorted(range(90), key=lambda i: (-smooth[i], i)):
+    tops = {
+        int(smooth.argmax()),
+        *find_circular_peaks(smooth.astype(np.float64), MIN_RISE * float(smooth.max())).tolist(),
+    }
+    for index in sorted(tops, key=lambda i: (-smooth[i], i)):
         angle = math.radians(index + 0.5) - QUARTER / 2
         if smooth[index] < MIN_SHARE * smooth.max():
             break

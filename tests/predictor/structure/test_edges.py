@@ -245,6 +245,19 @@ def test_directions_come_strongest_first_and_rare_ones_are_left_out():
     assert len(find_wall_directions(_share(20.0, 22.0, 4)).angles) == 1
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_the_edges_of_a_rough_wall_that_trail_off_to_either_side_are_no_direction(seed):
+    # A corridor of 30 m whose walls wander, as those of a real robot's map with cupboards, notices and door frames.
+    rng = np.random.default_rng(seed)
+    frame = GridFrame(0.05, 0.0, 0.0, 80, 600)
+    cells = np.full(frame.shape, UNKNOWN, dtype=np.int8)
+    lower, upper = (np.repeat(rng.integers(0, 6, 60), 10) + offset for offset in (20, 54))
+    for column, (low, high) in enumerate(zip(lower, upper, strict=True)):
+        cells[low - 2 : high + 2, column] = OCCUPIED
+        cells[low:high, column] = FREE
+    assert np.degrees(find_wall_directions(OccupancyGrid(frame, cells)).angles) == pytest.approx([0.0], abs=0.5)
+
+
 @pytest.mark.parametrize("degrees", [3.0, -20.0, 40.0])
 @pytest.mark.parametrize("off", [-1.4, 0.0, 1.3])
 def test_a_direction_is_refined_to_where_cells_pile_up_most(degrees, off):
