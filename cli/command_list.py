@@ -41,13 +41,13 @@ COMMANDS = (
     Command(
         "predict",
         "Predict the rooms behind the closed doors of a ROS map.",
-        "pipeline.config:PredictConfig",
+        "pipeline.map_config:PredictConfig",
         "pipeline.predict:predict_map",
     ),
     Command(
         "cover",
         "Plan a coverage tour on a ROS map.",
-        "pipeline.config:CoverConfig",
+        "pipeline.map_config:CoverConfig",
         "pipeline.cover:cover_map",
         needs=TOURS,
     ),

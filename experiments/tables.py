@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from closedrooms.core.files.outgoing import write_bytes
+from closedrooms.experiments.columns import make_table
 
 # Values of one line by column.
 Row = dict[str, Any]
@@ -33,22 +34,8 @@ def write_table(stem: Path, rows: Sequence[Row], columns: Sequence[str] | None =
 
 
 def _parquet(names: Sequence[str], rows: Sequence[Row]) -> bytes:
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
-    columns = [_typed([row.get(name) for row in rows]) for name in names]
     data = io.BytesIO()
-    pq.write_table(pa.table(columns, names=list(names)), data)
+    pq.write_table(make_table({name: [row.get(name) for row in rows] for name in names}), data)
     return data.getvalue()
-
-
-def _typed(values: list[Any]) -> Any:
-    """Convert a column to whole numbers, numbers, or text: what holds all its values."""
-    import pyarrow as pa
-
-    present = [value for value in values if value is not None]
-    if present and all(isinstance(value, int) for value in present):
-        return pa.array(values, pa.int64())
-    if present and all(isinstance(value, int | float) for value in present):
-        return pa.array(values, pa.float64())
-    return pa.array([None if value is None else str(value) for value in values], pa.string())

@@ -1,7 +1,8 @@
 """Whole jobs: a run in a simulated building, and each of its stages on anybody's files.
 
 - One command a file: ``run``, ``predict``, ``map``, ``cover``, ``propose_doors``, ``edit``, ``view``, ``world_files``.
-  Their options: ``config``, ``worlds_config``, ``propose_doors_config``, ``view_config``. Doors given: ``given_doors``.
+  Their options: ``config``, ``map_config``, ``worlds_config``, ``propose_doors_config``, ``view_config``. Doors
+  given: ``given_doors``.
 - Parts of a run: ``survey`` (explore and map), ``bounds``, ``drive``; several runs: ``runs``.
 - ``reporting/``: progress, figures, tables, ``run.json``.
 
@@ -13,12 +14,12 @@ from typing import TYPE_CHECKING
 from closedrooms.core.runtime.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from closedrooms.pipeline.config import CoverConfig as CoverConfig
     from closedrooms.pipeline.config import MapConfig as MapConfig
-    from closedrooms.pipeline.config import PredictConfig as PredictConfig
     from closedrooms.pipeline.config import RunConfig as RunConfig
     from closedrooms.pipeline.cover import cover_map as cover_map
     from closedrooms.pipeline.map import map_log as map_log
+    from closedrooms.pipeline.map_config import CoverConfig as CoverConfig
+    from closedrooms.pipeline.map_config import PredictConfig as PredictConfig
     from closedrooms.pipeline.predict import predict_map as predict_map
     from closedrooms.pipeline.propose_doors import doors_map as doors_map
     from closedrooms.pipeline.propose_doors_config import DoorsConfig as DoorsConfig
@@ -26,9 +27,10 @@ if TYPE_CHECKING:
 __getattr__, __dir__, __all__ = lazy_face(
     __name__,
     {
-        "config": ("CoverConfig", "MapConfig", "PredictConfig", "RunConfig"),
+        "config": ("MapConfig", "RunConfig"),
         "cover": ("cover_map",),
         "map": ("map_log",),
+        "map_config": ("CoverConfig", "PredictConfig"),
         "predict": ("predict_map",),
         "propose_doors": ("doors_map",),
         "propose_doors_config": ("DoorsConfig",),

@@ -1,4 +1,4 @@
-"""Options of every command. Nothing heavy is imported, so that ``--help`` is quick."""
+"""Options of runs and of recorded logs. Nothing heavy is imported, so that ``--help`` is quick."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -7,16 +7,13 @@ from typing import Annotated, ClassVar, Literal
 import tyro
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.runtime.options import check_least
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
+from closedrooms.pipeline.map_config import check_completions
 from closedrooms.predictor.config import MethodConfig
 from closedrooms.predictor.methods import DEFAULT_METHOD, find_method
 from closedrooms.sim.config import Body, SimConfig, lidar_preset, noise_level
-
-# Draws of what the rooms may be: the interval does not get better long before.
-MOST_COMPLETIONS = 10_000
 
 NoiseName = Literal["none", "low", "medium", "high"]
 LidarName = Literal["default", "hokuyo-utm-30lx", "hokuyo-urg-04lx", "sick-lms111", "rplidar-a2", "robotis-lds-01"]
@@ -129,51 +126,6 @@ class RunConfig:
         object.__setattr__(self, "predictor", find_method(self.method).checked(self.predictor))
 
 
-@dataclass(frozen=True, kw_only=True)
-class PredictConfig:
-    """Options of ``closedrooms predict``."""
-
-    map: tyro.conf.Positional[Path]
-    """The map: a ROS map_server YAML."""
-
-    doors: Path
-    """Closed doors in the map frame, metres: GeoJSON Points or LineStrings, or a bag of points clicked in RViz."""
-
-    out: Path
-    """Folder to write."""
-
-    method: str = DEFAULT_METHOD
-    """How rooms are predicted: ``paper`` is what the authors describe and ran, ``best`` as good as we can."""
-
-    record: bool = False
-    """Write the recording ``run.rrd`` for the rerun viewer."""
-
-    min_confidence: float = 0.0
-    """Draw only rooms of at least this confidence (expected IoU, 0 to 1) into the map; the others stay in
-    ``rooms.geojson``."""
-
-    allow_outside: bool = False
-    """Open the picture that the map's ``image:`` names also outside the folder of the YAML."""
-
-    predictor: Annotated[MethodConfig | None, tyro.conf.Suppress] = None
-    """Settings of the method, of its own class; its defaults when not given."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "predictor", find_method(self.method).checked(self.predictor))
-        if not 0.0 <= self.min_confidence <= 1.0:
-            raise InvalidInputError(f"min_confidence {self.min_confidence}", expected="0 to 1")
-
-
-def check_completions(count: int) -> None:
-    """Check how many completions are drawn.
-
-    Raises:
-        InvalidInputError: Fewer than none, or more than :data:`MOST_COMPLETIONS`.
-    """
-    if not 0 <= count <= MOST_COMPLETIONS:
-        raise InvalidInputError(f"--completions {count}", expected=f"0 to {MOST_COMPLETIONS}")
-
-
 def named_sim(noise: str = "medium", lidar: str = "default", body: Body = "kinematic") -> SimConfig:
     """Make settings of the simulation with the numbers that a level of noise and a lidar stand for.
 
@@ -181,61 +133,6 @@ def named_sim(noise: str = "medium", lidar: str = "default", body: Body = "kinem
         InvalidInputError: No such level or lidar.
     """
     return SimConfig(noise=noise_level(noise), lidar=lidar_preset(lidar), body=body)
-
-
-@dataclass(frozen=True, kw_only=True)
-class CoverConfig:
-    """Options of ``closedrooms cover``."""
-
-    map: tyro.conf.Positional[Path]
-    """The map: a ROS map_server YAML."""
-
-    out: Path
-    """Folder to write."""
-
-    doors: Path | None = None
-    """Closed doors whose positions the tour shall visit too: GeoJSON in the map frame, metres."""
-
-    start: tuple[float, float] | None = None
-    """Where the robot is, x and y in the map frame [m]: of several parts that are not connected, its own is covered;
-    without it, the largest (``--coverage.parts all`` covers every one)."""
-
-    allow_outside: bool = False
-    """Open the picture that the map's ``image:`` names also outside the folder of the YAML."""
-
-    to: Literal["nav2", "path"] | None = None
-    """Also write the tour for ROS 2: ``path`` as a nav_msgs/Path (``path.yaml``), a path around furniture that can be
-    driven; ``nav2`` as that and as the waypoints that nav2's panel loads (``waypoints.yaml``)."""
-
-    completions: int = 0
-    """Predict the rooms behind ``--doors`` and tell the cost of covering them too, as a distribution: from so many
-    completions of the map, drawn from what the rooms may be."""
-
-    method: str = DEFAULT_METHOD
-    """How rooms are predicted for ``--completions``."""
-
-    seed: int = 0
-    """Of the draws of ``--completions``."""
-
-    robot_radius: float | None = None
-    """Radius of the robot [m] for which every place and path has room; 0.20 m where not given (the same as
-    ``--coverage.graph.robot-radius``)."""
-
-    coverage: CoverageConfig = field(default_factory=CoverageConfig)
-    """Graph and tour."""
-
-    def __post_init__(self) -> None:
-        check_completions(self.completions)
-        check_least(self, seed=0)
-        if not find_method(self.method).disjoint:
-            raise InvalidInputError(
-                f"rooms of {self.method} overlap", expected="a method that a tour can be planned on"
-            )
-        if self.completions and self.doors is None:
-            raise InvalidInputError("--completions without closed doors", expected="--doors DOORS.geojson")
-        if self.robot_radius is not None:
-            graph = replace(self.coverage.graph, robot_radius=self.robot_radius)
-            object.__setattr__(self, "coverage", replace(self.coverage, graph=graph))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -108,12 +108,12 @@ def found_by(method: str, grid: Path, doors: Path, out: Path) -> int:
         return len(doors_map(DoorsConfig(map=grid, out=out.with_suffix(".out.geojson"))).figures["doors"])
     if method == "cover":
         from closedrooms.coverage.config import CoverageConfig
-        from closedrooms.pipeline.config import CoverConfig
         from closedrooms.pipeline.cover import cover_map
+        from closedrooms.pipeline.map_config import CoverConfig
 
         figures = cover_map(CoverConfig(map=grid, doors=doors, out=out, coverage=CoverageConfig(parts="all"))).figures
         return int(figures["tour"]["vertices"])
-    from closedrooms.pipeline.config import PredictConfig
+    from closedrooms.pipeline.map_config import PredictConfig
     from closedrooms.pipeline.predict import predict_map
 
     return len(predict_map(PredictConfig(map=grid, doors=doors, out=out, method=method)).figures["rooms"])

@@ -1,15 +1,14 @@
 """The Voronoi graph of free space, from its skeleton (paper, section 5.1)."""
 
-import importlib.util
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, IntArray
+from closedrooms.core.runtime.compiled import load_compiled
 
 # The eight neighbours of a cell (row, col): the four sides first, so that walks prefer them.
 NEIGHBOURS = np.array([(-1, 0), (0, -1), (0, 1), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)])
@@ -120,22 +119,12 @@ def load_skeletonize() -> Callable[[BoolArray], BoolArray]:
     """Load scikit-image's ``skeletonize`` of two dimensions.
 
     Its package imports scipy.ndimage and scipy.spatial for functions beside it, a fifth of the CPU time of
-    ``closedrooms cover``. The compiled function needs none of them, so its file is loaded by itself; where a version
-    keeps it elsewhere, by the package.
+    ``closedrooms cover``.
     """
-    package = importlib.util.find_spec("skimage")
-    for folder in (package.submodule_search_locations or ()) if package else ():
-        for path in sorted(Path(folder, "morphology").glob("_skeletonize_various_cy.*")):
-            try:
-                spec = importlib.util.spec_from_file_location("_skeletonize_various_cy", path)
-                if spec is None or spec.loader is None:
-                    continue
-                module = importlib.util.module_from_spec(spec)
-                spec.loader.exec_module(module)
-                thin_fast: Callable[[BoolArray], BoolArray] = module._fast_skeletonize
-            except (ImportError, AttributeError):
-                continue
-            return thin_fast
+    compiled = load_compiled("skimage.morphology._skeletonize_various_cy", "_fast_skeletonize")
+    if compiled is not None:
+        thin_fast: Callable[[BoolArray], BoolArray] = compiled._fast_skeletonize
+        return thin_fast
     from skimage.morphology import skeletonize
 
     whole: Callable[[BoolArray], BoolArray] = skeletonize

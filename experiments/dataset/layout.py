@@ -17,6 +17,7 @@ from closedrooms.core.files.incoming import parse_json
 from closedrooms.core.files.outgoing import json_text, new_file, write_json
 from closedrooms.core.files.output_folders import MANIFEST, PROGRAM
 from closedrooms.core.files.schema import KEY, SCHEMA, check_schema
+from closedrooms.experiments.columns import make_table
 from closedrooms.experiments.dataset.checksums import digest
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.sample import FORMAT, NOT_CONTENT
@@ -310,14 +311,14 @@ def write_metadata(folder: Path, rows: Iterable[Mapping[str, Any]]) -> None:
     Raises:
         OutputError: It cannot be written.
     """
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     source = iter(rows)
     with new_file(folder / METADATA) as file, contextlib.ExitStack() as stack:
         writer = None
-        while batch := [dict(entry) for entry in islice(source, ROWS)]:
-            table = pa.Table.from_pylist(batch, schema=writer.schema if writer else None)
+        while batch := list(islice(source, ROWS)):
+            columns = {name: [entry[name] for entry in batch] for name in batch[0]}
+            table = make_table(columns, writer.schema if writer else None)
             writer = writer or stack.enter_context(pq.ParquetWriter(file, table.schema))
             writer.write_table(table)
 

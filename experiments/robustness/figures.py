@@ -11,7 +11,7 @@ from shapely.geometry import Polygon
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import read_doors, read_rooms
 from closedrooms.core.files.rosmap import read_map
-from closedrooms.experiments.evaluation.reporting.figures import same_extent, save_figure
+from closedrooms.experiments.evaluation.reporting.figures import TITLE, same_extent, save_figure
 from closedrooms.experiments.robustness.config import Factor
 from closedrooms.experiments.robustness.levels import UNITS, Case
 from closedrooms.experiments.robustness.onset import LevelResult, Onset
@@ -120,7 +120,7 @@ def draw_maps(path: Path, folder: Path, wanted: Sequence[Case]) -> bool:
             _map(axes, folder / case.name)
         except InvalidInputError:
             continue
-        axes.set_title(f"{case.factor} {case.level:g}", fontsize=9)
+        axes.set_title(f"{case.factor} {case.level:g}", fontsize=9, y=TITLE)
         drawn = True
     for line in grid:
         same_extent(line)

@@ -11,9 +11,6 @@ from closedrooms.core.room import Room
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.control_loop import Step
 from closedrooms.navigation.explorer import Explorer
-from closedrooms.navigation.tour.opened_doors import ReopenedMap
-from closedrooms.navigation.tour.revised_prediction import Revision
-from closedrooms.navigation.tour.tour_follower import TourFollower
 from closedrooms.pipeline.reporting.run_log import RunLog
 from closedrooms.pipeline.reporting.run_scores import room_iou, room_points
 from closedrooms.pipeline.reporting.story import Story
@@ -21,6 +18,9 @@ from closedrooms.predictor.prediction import Prediction
 from closedrooms.predictor.revision import Predict
 
 if TYPE_CHECKING:
+    from closedrooms.navigation.tour.opened_doors import ReopenedMap
+    from closedrooms.navigation.tour.revised_prediction import Revision
+    from closedrooms.navigation.tour.tour_follower import TourFollower
     from closedrooms.visualization.rerun.recorder import Recorder
 
 
@@ -132,8 +132,8 @@ class DriveRecording:
         self,
         recorder: "Recorder",
         log: RunLog,
-        reopened: ReopenedMap,
-        follower: TourFollower,
+        reopened: "ReopenedMap",
+        follower: "TourFollower",
         doors_move: Callable[[float], bool],
     ) -> None:
         self._recorder, self._log, self._reopened, self._follower = recorder, log, reopened, follower
@@ -163,7 +163,7 @@ def record_step(recorder: "Recorder", log: RunLog, step: Step) -> None:
     recorder.contacts(observation.bumps, step.map_T_robot, observation.stamp)
 
 
-def _said(revision: Revision) -> str:
+def _said(revision: "Revision") -> str:
     """Write a revision as one line of the log."""
     looked = f"looked behind {', '.join(revision.doors)}" if revision.doors else "prediction revised"
     changed = f", other shape behind {', '.join(revision.changed)}" if revision.changed else ""

@@ -3,7 +3,7 @@
 import contextlib
 import dataclasses
 import functools
-from importlib.metadata import PackageNotFoundError, version
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +23,30 @@ def versions() -> dict[str, str]:
 
 @functools.cache
 def _versions() -> dict[str, str]:
-    found = {}
+    found, folders = {}, _named_by_folders()
     for name in LIBRARIES:
+        if name in folders:
+            found[name] = folders[name]
+            continue
+        from importlib.metadata import PackageNotFoundError, version
+
         with contextlib.suppress(PackageNotFoundError):
             found[name] = version(name)
+    return found
+
+
+def _named_by_folders() -> dict[str, str]:
+    """List the versions of installed packages as the names of their ``.dist-info`` folders say them.
+
+    The standard library reads each package's whole description with a parser of mails: 0.05 s for ours.
+    """
+    found: dict[str, str] = {}
+    for place in sys.path:
+        with contextlib.suppress(OSError):
+            for folder in Path(place).glob("*.dist-info"):
+                name, _, version = folder.stem.partition("-")
+                if version:
+                    found.setdefault(name.replace("_", "-").lower(), version)
     return found
 
 

@@ -157,7 +157,8 @@ class Terminal:
         """
         from rich.console import Console
 
-        out = Console(file=sys.stdout, soft_wrap=False, width=None if sys.stdout.isatty() else 120)
+        # A colon on either side makes no emoji: their table takes as long to be loaded as ours to be printed.
+        out = Console(file=sys.stdout, soft_wrap=False, width=None if sys.stdout.isatty() else 120, emoji=False)
         try:
             out.print(what, **how)
         except SystemExit as stop:  # what rich makes of it

@@ -62,9 +62,10 @@ def free_islands(grid: OccupancyGrid, area: float, doors: Sequence[Point], reach
         return grid
     _, pieces, figures, _ = cv2.connectedComponentsWithStats((~grid.free).view(np.uint8), connectivity=8)
     cells = figures[:, cv2.CC_STAT_AREA] * grid.frame.resolution**2
-    edge = np.concatenate((pieces[0], pieces[-1], pieces[:, 0], pieces[:, -1]))
+    asked = (cells < area) & (cells >= FILLED * THIN**2)
+    asked[np.concatenate(([0], pieces[0], pieces[-1], pieces[:, 0], pieces[:, -1]))] = False
     gone = np.zeros(len(figures), dtype=np.bool_)
-    for piece in np.setdiff1d(np.flatnonzero((cells < area) & (cells >= FILLED * THIN**2)), (0, *edge)):
+    for piece in np.flatnonzero(asked):
         left, top, width, height = figures[piece, :4]
         own = np.argwhere(pieces[top : top + height, left : left + width] == piece) + np.array((top, left))
         sides = (np.array(cv2.minAreaRect(own.astype(np.float32))[1]) + 1.0) * grid.frame.resolution

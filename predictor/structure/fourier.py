@@ -1,13 +1,13 @@
 """Fourier transforms of pictures by scipy's compiled pocketfft, without what its package imports beside it."""
 
 import importlib
-import importlib.util
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from closedrooms.core.runtime.compiled import load_compiled
 
 Spectrum = npt.NDArray[np.complex64]
 # How pocketfft scales: not at all, or by the number of cells.
@@ -35,21 +35,7 @@ def transform_back(spectrum: Spectrum) -> Spectrum:
 def _pocketfft() -> Any:
     """Import SciPy's compiled transform.
 
-    ``import scipy.fft`` takes 0.2 s, a third of ``closedrooms cover``, for array libraries that nobody uses here. The
-    compiled module needs none of them, so its file is loaded by itself; where a version keeps it elsewhere, by the
-    package.
+    ``import scipy.fft`` takes 0.2 s, a third of ``closedrooms cover``, for array libraries that nobody uses here.
     """
-    package = importlib.util.find_spec("scipy")
-    for folder in (package.submodule_search_locations or ()) if package else ():
-        for path in sorted(Path(folder, "fft", "_pocketfft").glob("pypocketfft.*")):
-            try:
-                spec = importlib.util.spec_from_file_location("pypocketfft", path)
-                if spec is None or spec.loader is None:
-                    continue
-                module = importlib.util.module_from_spec(spec)
-                spec.loader.exec_module(module)
-            except ImportError:
-                continue
-            if hasattr(module, "c2c") and hasattr(module, "good_size"):
-                return module
-    return importlib.import_module("scipy.fft._pocketfft.pypocketfft")
+    module = "scipy.fft._pocketfft.pypocketfft"
+    return load_compiled(module, "c2c", "good_size") or importlib.import_module(module)

@@ -2,11 +2,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import linear_sum_assignment
 from shapely.geometry import box
+from skimage.segmentation import watershed
 
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.experiments.evaluation.scoring.scores import (
+    _assignment,
     added_rooms,
     hidden_area,
     iou,
@@ -14,6 +17,7 @@ from closedrooms.experiments.evaluation.scoring.scores import (
     room_masks,
     split_hidden_area,
 )
+from closedrooms.experiments.evaluation.scoring.watershed import flood
 
 FRAME = GridFrame(0.05, 0.0, 0.0, 120, 240)
 
@@ -79,3 +83,22 @@ def test_iou_is_symmetric_and_one_only_for_equal_masks(seed: int) -> None:
     assert iou(a, b) == iou(b, a)
     assert 0.0 <= iou(a, b) <= 1.0
     assert (iou(a, b) == 1.0) == bool((a == b).all())
+
+
+@given(seed=st.integers(0, 10_000), side=st.integers(1, 40))
+def test_flooding_is_scikit_images_watershed(seed: int, side: int) -> None:
+    draws = np.random.default_rng(seed)
+    height = draws.integers(0, 6, (side, 30)).astype(np.float32)
+    seeds = np.where(draws.random(height.shape) < 0.05, draws.integers(1, 9, height.shape), 0).astype(np.int32)
+    area = draws.random(height.shape) < 0.8
+    assert np.array_equal(flood(height, seeds, area), watershed(height, seeds, mask=area))
+
+
+def test_what_is_not_found_by_its_file_is_taken_from_its_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    _assignment.cache_clear()
+    monkeypatch.setattr("importlib.util.find_spec", lambda _name: None)
+    try:
+        assert _assignment() is linear_sum_assignment
+        test_flooding_is_scikit_images_watershed.hypothesis.inner_test(seed=1, side=20)
+    finally:
+        _assignment.cache_clear()

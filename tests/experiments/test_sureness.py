@@ -1,5 +1,8 @@
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import rankdata
 from shapely.geometry import box
 
 from closedrooms.core.door import ClosedDoor
@@ -9,6 +12,7 @@ from closedrooms.experiments.evaluation.scoring.sureness import (
     auroc,
     calibration_error,
     cells_asked,
+    ranked,
     reliability_rows,
     score_sureness,
     spearman,
@@ -94,3 +98,8 @@ def test_a_sample_without_rooms_says_nothing() -> None:
     nothing = {"method": "m", "sure": {"rooms": [], "cells": 0}}
     assert sureness_rows([nothing, {"method": "authors"}]) == []
     assert reliability_rows([nothing]) == []
+
+
+@given(st.lists(st.integers(0, 9)))
+def test_ranks_are_scipys(values: list[int]) -> None:
+    assert np.array_equal(ranked(np.array(values, dtype=float)), rankdata(values))

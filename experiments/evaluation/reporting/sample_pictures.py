@@ -12,7 +12,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import read_rooms
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.names import plot_text
-from closedrooms.experiments.evaluation.reporting.figures import same_extent, same_scale, save_figure
+from closedrooms.experiments.evaluation.reporting.figures import TITLE, same_extent, same_scale, save_figure
 from closedrooms.experiments.evaluation.reporting.score_summary import MEASURES, estimates
 from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
 from closedrooms.experiments.evaluation.samples.sample_reader import Sample, read_sample
@@ -53,7 +53,7 @@ def draw_worst(path: Path, scores: Sequence[Scores], samples: Mapping[str, Sampl
         except InvalidInputError:
             continue
         _show_case(place, sample, rooms)
-        place.set_title(f"{plot_text(score['sample'])}\n{method}: {np.mean(score['matched']):.2f}", fontsize=8)
+        place.set_title(f"{plot_text(score['sample'])}\n{method}: {np.mean(score['matched']):.2f}", fontsize=8, y=TITLE)
     for line in axes:
         same_scale(line)
     figure.suptitle("worst cases: true free space hidden from the map (orange), predicted rooms (blue outline)")
@@ -109,7 +109,7 @@ def draw_extremes(
         )
         for place, grid, title in zip(line, (sample.observed, prediction.grid, sample.truth), titles, strict=True):
             _show_grid(place, cropped(grid))
-            place.set_title(title, fontsize=9)
+            place.set_title(title, fontsize=9, y=TITLE)
         _outline(line[1], [room.polygon for room in prediction.rooms], OUTLINE)
         _outline(line[2], [room.polygon for room in sample.rooms], OUTLINE)
         _dots(line[0], sample)
@@ -130,7 +130,7 @@ def draw_extremes(
         for place, (grid, doors), title, name in zip(line, grids, figures, names, strict=True):
             _show_grid(place, cropped(grid))
             _show_tour(place, plan_cropped_tour(grid, doors))
-            place.set_title(f"{title}, tour {tour[name]['length_m']:.0f} m", fontsize=9)
+            place.set_title(f"{title}, tour {tour[name]['length_m']:.0f} m", fontsize=9, y=TITLE)
         _dots(line[0], sample)
         same_extent(line)
     save_figure(figure, tours_path)

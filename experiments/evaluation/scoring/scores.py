@@ -1,15 +1,19 @@
 """How far a prediction is from the truth: per hidden room and for the hidden area as a whole."""
 
-from collections.abc import Sequence
+import importlib
+from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from closedrooms.core.arrays import BoolArray, FloatArray
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
+from closedrooms.core.runtime.compiled import load_compiled
 from closedrooms.core.shapes import cells_inside
+from closedrooms.experiments.evaluation.scoring.watershed import flood
 
 # Figures of one sample and one method by their names, as ``scores.json`` holds them.
 Scores = dict[str, Any]
@@ -45,14 +49,12 @@ def split_hidden_area(area: BoolArray, resolution: float) -> list[BoolArray]:
         One mask a room of at least 1 m2, each of the shape of ``area``.
     """
     import cv2
-    from skimage.segmentation import watershed
 
     if not area.any():
         return []
     distance = cv2.distanceTransform(area.astype(np.uint8), cv2.DIST_L2, 5)
     _, seeds = cv2.connectedComponents((distance > SEED_DEPTH / resolution).astype(np.uint8), connectivity=8)
-    labels = watershed(-distance, seeds, mask=area)  # type: ignore[no-untyped-call]
-    return _pieces(np.asarray(labels), MIN_AREA / resolution**2)
+    return _pieces(flood(-distance, seeds, area), MIN_AREA / resolution**2)
 
 
 def added_rooms(observed: OccupancyGrid, completed: OccupancyGrid) -> list[BoolArray]:
@@ -83,8 +85,6 @@ def matched_iou(truth: Sequence[BoolArray], predicted: Sequence[BoolArray]) -> F
         truth: Masks of the hidden rooms.
         predicted: Masks of the predicted rooms, restricted to cells unknown in the map.
     """
-    from scipy.optimize import linear_sum_assignment
-
     figures = np.zeros(len(truth))
     if not len(truth) or not len(predicted):
         return figures
@@ -92,9 +92,19 @@ def matched_iou(truth: Sequence[BoolArray], predicted: Sequence[BoolArray]) -> F
     common = np.array([[np.count_nonzero(room & other) for other in predicted] for room in truth])
     union = sizes[0][:, None] + sizes[1][None] - common
     table = np.where(union > 0, common / np.maximum(union, 1), 1.0)
-    rows, cols = linear_sum_assignment(-table)
+    rows, cols = _assignment()(-table)
     figures[rows] = table[rows, cols]
     return figures
+
+
+@cache
+def _assignment() -> Callable[[FloatArray], tuple[IntArray, IntArray]]:
+    """Load the assignment of least cost without the rest of scipy.optimize, which takes 0.2 s to be imported."""
+    compiled = load_compiled("scipy.optimize._lsap", "linear_sum_assignment")
+    if compiled is None:
+        compiled = importlib.import_module("scipy.optimize")
+    assign: Callable[[FloatArray], tuple[IntArray, IntArray]] = compiled.linear_sum_assignment
+    return assign
 
 
 def iou(a: BoolArray, b: BoolArray) -> float:

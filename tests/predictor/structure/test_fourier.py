@@ -22,7 +22,7 @@ def test_sizes_are_scipys_own():
 
 def test_where_the_compiled_file_is_not_found_the_package_does_the_same(monkeypatch):
     fourier._pocketfft.cache_clear()
-    monkeypatch.setattr(fourier.importlib.util, "find_spec", lambda _name: None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda _name: None)
     assert fourier.quick_size(61) == 63
     fourier._pocketfft.cache_clear()
 
