@@ -13,7 +13,6 @@ from closedrooms.experiments.evaluation.scoring.scores import (
     added_rooms,
     hidden_area,
     iou,
-    keep_closed,
     matched_iou,
     room_masks,
     split_hidden_area,
@@ -53,29 +52,6 @@ def test_small_pieces_are_no_rooms() -> None:
     assert split_hidden_area(area, 0.05) == []
     area[5:26, 5:26] = True
     assert len(split_hidden_area(area, 0.05)) == 1
-
-
-def test_a_hidden_room_without_a_closed_door_is_left_out() -> None:
-    observed, truth = two_rooms()
-    area = hidden_area(observed, truth)
-    rooms = split_hidden_area(area, FRAME.resolution)
-    # As a robot without drift sees it, a quarter of a metre to the side with it.
-    for closed in (box(0.5, 1.6, 4.5, 4.6), box(0.75, 1.6, 4.75, 4.6)):
-        left, kept = keep_closed(area, rooms, room_masks([Room(closed, ("d",))], FRAME))
-        (room,) = kept
-        assert room.sum() * 0.05**2 == pytest.approx(12.0, abs=0.2)
-        assert not (left & ~area).any()
-        assert ((area & ~left) == next(other for other in rooms if other is not room)).all()
-
-
-def test_all_hidden_rooms_stay_where_each_is_behind_a_closed_door() -> None:
-    observed, truth = two_rooms()
-    area = hidden_area(observed, truth)
-    rooms = split_hidden_area(area, FRAME.resolution)
-    closed = room_masks([Room(box(0.5, 1.6, 4.5, 4.6), ("a",)), Room(box(4.8, 1.6, 9.8, 4.6), ("b",))], FRAME)
-    left, kept = keep_closed(area, rooms, closed)
-    assert (left == area).all()
-    assert kept == rooms
 
 
 def test_a_room_is_rasterised_by_the_centres_of_its_cells() -> None:

@@ -25,7 +25,6 @@ from closedrooms.experiments.evaluation.scoring.scores import (
     added_rooms,
     hidden_area,
     iou,
-    keep_closed,
     matched_iou,
     room_masks,
     split_hidden_area,
@@ -257,11 +256,8 @@ def _has_tour(method: str) -> bool:
 
 
 def _hidden(sample: Sample) -> _Hidden:
-    frame = sample.observed.frame
     area = hidden_area(sample.observed, sample.truth)
-    rooms = split_hidden_area(area, frame.resolution)
-    if sample.rooms:
-        area, rooms = keep_closed(area, rooms, room_masks(sample.rooms, frame))
+    rooms = split_hidden_area(area, sample.observed.frame.resolution)
     free = int(np.count_nonzero(sample.truth.free))
     return _Hidden(area, rooms, int(np.count_nonzero(area)) / max(free, 1))
 

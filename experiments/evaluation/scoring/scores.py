@@ -20,9 +20,6 @@ Scores = dict[str, Any]
 # How hidden rooms are told apart on a true map, as measured on the authors' maps (cells of 0.05 m there): closing of
 # the hidden area, least distance of a seed from its edge, least area of a room.
 CLOSING, SEED_DEPTH, MIN_AREA = 0.10, 0.45, 1.0
-# A hidden room belongs to a closed one where so much of it lies in that: 0.89 or more on the authors' maps, next to
-# nothing where a robot left a corner of an open room unseen.
-IN_CLOSED = 0.5
 # Smallest piece of a completed map that counts as one of its rooms [m2].
 MIN_PIECE = 0.25
 
@@ -58,24 +55,6 @@ def split_hidden_area(area: BoolArray, resolution: float) -> list[BoolArray]:
     distance = cv2.distanceTransform(area.astype(np.uint8), cv2.DIST_L2, 5)
     _, seeds = cv2.connectedComponents((distance > SEED_DEPTH / resolution).astype(np.uint8), connectivity=8)
     return _pieces(flood(-distance, seeds, area), MIN_AREA / resolution**2)
-
-
-def keep_closed(
-    area: BoolArray, rooms: Sequence[BoolArray], closed: Sequence[BoolArray]
-) -> tuple[BoolArray, list[BoolArray]]:
-    """Leave out hidden rooms behind no closed door: corners that a robot did not see, rooms that nothing leads to.
-
-    Args:
-        area: The hidden area, shape (rows, cols).
-        rooms: Its rooms.
-        closed: Masks of the true rooms behind closed doors.
-
-    Returns:
-        The area without such rooms, and the others.
-    """
-    inside = union_of(closed, area.shape)
-    kept = [room for room in rooms if np.count_nonzero(room & inside) >= IN_CLOSED * np.count_nonzero(room)]
-    return area & (union_of(kept, area.shape) | ~union_of(rooms, area.shape)), kept
 
 
 def added_rooms(observed: OccupancyGrid, completed: OccupancyGrid) -> list[BoolArray]:
