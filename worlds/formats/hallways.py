@@ -1,5 +1,6 @@
 """Hallways between rooms: each becomes a room with an opening and a door, or a door where no robot stands in it."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,16 +51,18 @@ class JoinedRooms:
             return
         strip = hallway.line.buffer((hallway.width + self._wall) / 2, cap_style="flat", join_style="mitre")
         area = _between(strip, self.polygons, hallway.start, hallway.end)
-        if area is None or area.buffer(-self._wall / 2).is_empty:
+        pieces = _crossing(hallway, strip, self.polygons) if area is None else [(hallway.start, area, hallway.end)]
+        if not pieces or any(piece.buffer(-self._wall / 2).is_empty for _, piece, _ in pieces):
             self._add_door(hallway.line.interpolate(0.5, normalized=True), door_at, open_at, hallway)
             return
-        self.polygons.append(area)
-        self.labels.append("hallway")
-        middle = len(self.polygons) - 1
-        for room, has_door in ((open_at, False), (door_at, True)):
-            self._straighten(middle, room)
-            point = _meeting(self.polygons[middle], self.polygons[room])
-            self._add_door(point, room, middle, hallway, has_door=has_door)
+        for before, piece, behind in pieces:
+            self.polygons.append(piece)
+            self.labels.append("hallway")
+            middle = len(self.polygons) - 1
+            for room in sorted((before, behind), key=lambda room: room == door_at):
+                self._straighten(middle, room)
+                point = _meeting(self.polygons[middle], self.polygons[room])
+                self._add_door(point, room, middle, hallway, has_door=room == door_at)
 
     def _deep_door(self, hallway: Hallway) -> DeepDoor | None:
         """Fit a door through the walls of two rooms that face each other; ``None`` where a robot fits between."""
@@ -144,6 +147,30 @@ def _between(strip: Polygon, polygons: list[Polygon], start: int, end: int) -> P
         if isinstance(part, Polygon) and max(part.distance(polygons[start]), part.distance(polygons[end])) < 0.01
     ]
     return max(between, key=lambda part: part.area, default=None)
+
+
+def _crossing(hallway: Hallway, strip: Polygon, polygons: list[Polygon]) -> list[tuple[int, Polygon, int]]:
+    """Cut a hallway that crosses rooms or other hallways into pieces, each with what it leads from and to.
+
+    Returns:
+        In order from start to end; empty where the pieces do not lead from one to the other.
+    """
+    line = hallway.line
+    parts = shapely.get_parts(areal(strip.difference(shapely.union_all(polygons))))
+    on_line = [
+        (part, [line.project(shapely.Point(p)) for p in shapely.get_coordinates(part.intersection(line))])
+        for part in parts
+        if isinstance(part, Polygon) and part.intersects(line)
+    ]
+    on_line.sort(key=lambda piece: min(piece[1]))
+    stations = [hallway.start]
+    for (_, before), (_, behind) in itertools.pairwise(on_line):
+        between = shapely.ops.substring(line, max(before), min(behind))
+        stations.append(int(np.argmax([polygon.intersection(between).length for polygon in polygons])))
+    stations.append(hallway.end)
+    found = [(stations[k], part, stations[k + 1]) for k, (part, _) in enumerate(on_line)]
+    joined = all(max(part.distance(polygons[a]), part.distance(polygons[b])) < 0.01 for a, part, b in found)
+    return found if joined else []
 
 
 def _meeting(hall: Polygon, room: Polygon) -> shapely.Point:

@@ -192,3 +192,26 @@ def test_no_wall_is_missed_where_a_hallway_begins_at_a_corner(tmp_path: Path) ->
     plan = read(tmp_path, rooms, [{"room_start": "a", "room_end": "b", "width": 0.9}])
     assert (len(plan.doors), len(plan.openings)) == (1, 1)
     assert not [remark for remark in plan.remarks if remark.what == "walls"]
+
+
+def test_hallways_that_cross_open_into_each_other(tmp_path: Path) -> None:
+    places = {"west": (-5, 0), "east": (5, 0), "south": (0, -5), "north": (0, 5)}
+    rooms = [room(name, 3, 3, pose=[*place]) for name, place in places.items()]
+    ends = (("west", "east"), ("south", "north"))
+    plan = read(tmp_path, rooms, [{"room_start": a, "room_end": b, "width": 1.2} for a, b in ends])
+    labels = {r.id: r.label for r in plan.rooms}
+    assert sorted(labels.values()) == sorted([*places, *["hallway"] * 3])
+    # Each hallway has its door at its end; the crossing and the beginnings are open.
+    assert [{labels[side] for side in door.rooms if side} for door in plan.doors] == [
+        {"hallway", "east"},
+        {"hallway", "north"},
+    ]
+    assert len(plan.openings) == 4
+    assert plan.remarks == ()
+
+
+def test_a_hallway_through_a_third_room_joins_all_three(tmp_path: Path) -> None:
+    rooms = [room(name, 3, 3, pose=[x, 0]) for name, x in (("a", 0), ("b", 5), ("c", 10))]
+    plan = read(tmp_path, rooms, [{"room_start": "a", "room_end": "c", "width": 0.9}])
+    assert (len(plan.rooms), len(plan.doors), len(plan.openings)) == (5, 1, 3)
+    assert plan.remarks == ()
