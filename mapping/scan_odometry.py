@@ -11,6 +11,7 @@ from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.matching.correlative_matcher import SearchWindow, WindowSearch
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
+from closedrooms.mapping.matching.sparse_walls import find_sparse_walls
 
 DISTANCE_RATE, ANGLE_RATE = 0.5, 0.3
 """How fast ([m/s], [rad/s]) a robot strays from going on as before: half an indoor robot's speed."""
@@ -117,6 +118,7 @@ class ScanOdometry:
             prior=start,
             prior_information=information,
             iterations=2 * self._matcher.iterations,
+            sparse_walls=find_sparse_walls(points),
         )
         return match.score, match.pose
 

@@ -8,6 +8,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
+from closedrooms.mapping.matching.sparse_walls import SparseWalls
 
 STEP_DONE = 3e-4
 """Step [m and rad, the latter halved] below which a refinement has converged. Remembered stiffness shortens the steps,
@@ -43,6 +44,7 @@ def refine(
     prior: Pose2 | None = None,
     prior_information: FloatArray | None = None,
     iterations: int = 12,
+    sparse_walls: SparseWalls | None = None,
 ) -> Refined:
     """Move a scan uphill on the field until its points lie on surfaces.
 
@@ -56,8 +58,9 @@ def refine(
         prior: What the odometry says; ``None`` means ``guess``.
         prior_information: Its weight ``(x, y, theta)`` in the map frame, shape (3, 3); ``None`` for no prior.
         iterations: Most steps.
+        sparse_walls: Points that must not draw the scan along their walls.
     """
-    slopes = _Slopes(field, points)
+    slopes = _Slopes(field, points, sparse_walls)
     # Everything below is in cells and radians.
     cell = field.lattice.resolution
     scale = np.array([[cell * cell, cell * cell, cell], [cell * cell, cell * cell, cell], [cell, cell, 1.0]])
@@ -100,7 +103,8 @@ class _Slopes:
     Works in cells and on whole arrays, few operations a step: for some hundred points NumPy's overhead is the cost.
     """
 
-    def __init__(self, field: LikelihoodField, points: FloatArray) -> None:
+    def __init__(self, field: LikelihoodField, points: FloatArray, sparse_walls: SparseWalls | None) -> None:
+        self._sparse = sparse_walls
         lattice = field.lattice
         self._values = field.values.reshape(-1)
         self._cols = lattice.cols
@@ -143,11 +147,16 @@ class _Slopes:
         np.subtract(high, low, out=along_y)
         np.multiply(right[1] - right[0], v, out=along_x)
         along_x += right[0]
-        np.multiply(along_y, turned[0], out=turning)
-        turning -= along_x * turned[1]
         np.multiply(along_y, v, out=residual)
         residual += low
         np.subtract(1.0, residual, out=residual)
+        if self._sparse is not None:
+            which, (wall_x, wall_y) = self._sparse[0], rotation @ self._sparse[1]
+            along_wall = along_x[which] * wall_x + along_y[which] * wall_y
+            along_x[which] -= along_wall * wall_x
+            along_y[which] -= along_wall * wall_y
+        np.multiply(along_y, turned[0], out=turning)
+        turning -= along_x * turned[1]
         return np.asarray(self._terms @ self._terms.T)
 
     def score(self) -> float:

@@ -12,6 +12,7 @@ from closedrooms.mapping.matching.correlative_matcher import SearchWindow, Windo
 from closedrooms.mapping.matching.gauss_newton_matcher import Refined, refine
 from closedrooms.mapping.matching.heading_search import search_heading
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
+from closedrooms.mapping.matching.sparse_walls import find_sparse_walls
 from closedrooms.mapping.motion import UncertainMotion
 
 ADVANTAGE = 0.03
@@ -67,8 +68,18 @@ def match_scan(
     sigma_distance, sigma_angle = motion.sigmas(config)
     information = config.prior_weight * np.diag([sigma_distance**-2, sigma_distance**-2, sigma_angle**-2])
 
+    walls = find_sparse_walls(points)
+
     def refined(start: Pose2) -> Refined:
-        return refine(field, points, start, prior=guess, prior_information=information, iterations=config.iterations)
+        return refine(
+            field,
+            points,
+            start,
+            prior=guess,
+            prior_information=information,
+            iterations=config.iterations,
+            sparse_walls=walls,
+        )
 
     doubted = max(config.min_score, config.doubt * usual_score)
     start = guess

@@ -1,0 +1,45 @@
+"""Walls that a scan shows by points far apart: they say where the wall is across, and nothing along it."""
+
+import numpy as np
+
+from closedrooms.core.arrays import FloatArray, IntArray
+
+SPARSE = 0.8
+"""Distance from a point to its nearer neighbour [m] from which the field between the two is empty, ten times its
+standard deviation. Points as far apart lie on those of the next scan where the robot has not moved, and nowhere else:
+in a hall of 63 m without doors, seen by a lidar of 20 m every degree, the map was off by 2.1 and 1.8 m (two drives). Of
+0.3, 0.5 and 0.8 m the last one costs two logs of real robots least (0.003 m) and leaves 0.32 and 0.34 m there."""
+OFF_LINE = 0.1
+"""Distance from the line through its neighbours up to which a point is on the same wall [m]: noise of a lidar."""
+
+SparseWalls = tuple[IntArray, FloatArray]
+"""Which points, shape (k,), and the unit directions of their walls in the robot's frame, shape (2, k)."""
+
+
+def find_sparse_walls(points: FloatArray) -> SparseWalls | None:
+    """Find the points of a scan, shape (n, 2) in beam order [m], that stand far apart along a straight wall.
+
+    Returns:
+        ``None`` where there are none.
+    """
+    if len(points) < 3:
+        return None
+    steps = np.diff(points.T, axis=1)
+    wide = np.hypot(steps[0], steps[1]) > SPARSE
+    sparse = np.flatnonzero(np.concatenate((wide[:1], wide[1:] & wide[:-1], wide[-1:])))
+    if not sparse.size:
+        return None
+    # Each point against the line through its two neighbours; the ends of a wall take the line of the point beside them.
+    before, after = steps[:, :-1], steps[:, 1:]
+    chord = before + after
+    length = np.hypot(chord[0], chord[1]) + 1e-9
+    off = np.abs(before[0] * after[1] - before[1] * after[0]) / length
+    straight = np.zeros(len(points), dtype=np.bool_)
+    straight[1:-1] = (off <= OFF_LINE) & ((before * after).sum(axis=0) > 0.0)
+    beside = np.clip(np.stack((sparse, sparse - 1, sparse + 1)), 0, len(points) - 1)
+    fits = straight[beside]
+    on_wall = fits.any(axis=0)
+    if not on_wall.any():
+        return None
+    chosen = beside[fits.argmax(axis=0), np.arange(len(sparse))][on_wall] - 1
+    return sparse[on_wall], chord[:, chosen] / length[chosen]
