@@ -128,7 +128,7 @@ class Panes:
         """List what the map shows of some of the keyframes: their beams up to the panes."""
         if not len(self.segments):
             return [keyframe.beams for keyframe in chosen]
-        self._ask(keyframes)
+        self._witnesses.call(keyframes)
         crossed = self._witnesses.may_cross([keyframe.index for keyframe in chosen], self.segments)
         return [
             before_glass(keyframe.beams, keyframe.pose, self.segments[mine])
@@ -146,7 +146,8 @@ class Panes:
 
     def _ask(self, keyframes: Sequence[Keyframe]) -> None:
         """Bring up to date what the keyframes say about the places: new ones about all, the others about new ones."""
-        anew = self._witnesses.call(keyframes)
+        self._witnesses.call(keyframes)
+        anew = self._witnesses.take_changed()
         told, self._told = self._told, len(self._asked)
         if not anew and told == self._told:
             return

@@ -87,9 +87,10 @@ class Witnesses:
         self._headings: FloatArray = np.zeros(0)
         self.sensors: FloatArray = np.zeros((0, 2))
         """Where each scan was taken, map frame, shape (keyframes, 2) [m]."""
+        self._changed: set[int] = set()
 
-    def call(self, keyframes: Sequence[Keyframe]) -> list[int]:
-        """Take in all keyframes where they are now; returns the indices of those that are new or have moved."""
+    def call(self, keyframes: Sequence[Keyframe]) -> None:
+        """Take in all keyframes where they are now."""
         for keyframe in keyframes[len(self._views) :]:
             self._views.add(keyframe.beams)
         poses, known = [keyframe.pose for keyframe in keyframes], len(self._poses)
@@ -101,7 +102,12 @@ class Witnesses:
         for k in anew:
             self._headings[k] = poses[k].theta
             self.sensors[k] = poses[k].transform(keyframes[k].beams.origin[None])[0]
-        return anew
+        self._changed.update(anew)
+
+    def take_changed(self) -> list[int]:
+        """List the indices of the keyframes that were new or had moved since the last call."""
+        changed, self._changed = sorted(self._changed), set()
+        return changed
 
     def say(self, chosen: Sequence[int], places: FloatArray, normals: FloatArray, first: int = 0) -> Said:
         """Find what some keyframes, by their indices, say about places, shape (n, 2), from the ``first`` one on."""
