@@ -19,12 +19,16 @@ class GrowingArray:
         self._rows = np.zeros((FIRST_ROWS, *shape))
         self.values: FloatArray = self._rows[:0]
 
-    def append(self, row: float | tuple[float, ...]) -> None:
+    def append(self, row: float | tuple[float, ...] | FloatArray) -> None:
         """Add a row at the end."""
+        self.extend(np.array(row)[None])
+
+    def extend(self, rows: FloatArray) -> None:
+        """Add rows at the end."""
         size = len(self.values)
-        if size == len(self._rows):
-            larger = np.zeros((2 * size, *self._rows.shape[1:]))
-            larger[:size] = self._rows
+        if size + len(rows) > len(self._rows):
+            larger = np.zeros((max(2 * len(self._rows), size + len(rows)), *self._rows.shape[1:]))
+            larger[:size] = self.values
             self._rows = larger
-        self._rows[size] = row
-        self.values = self._rows[: size + 1]
+        self._rows[size : size + len(rows)] = rows
+        self.values = self._rows[: size + len(rows)]

@@ -23,6 +23,9 @@ GONE, GONE_SHARE = 2, 0.4
 gone: the place of somebody who was seen from ten keyframes, and from four not, is free."""
 NOISE = 0.10
 """Distance around a cell in which these are counted [m]."""
+SAME_WALL = 0.20
+"""A scan that met something this near to a place [m] did not go through what stands there: of a wall that was seen from
+both sides, each with a pose of its own error, the faces lie behind each other, and either scan ends at the other."""
 LatticeWindow = tuple[int, int, int, int]
 """First row and column in the arrays, and number of rows and columns."""
 
@@ -58,13 +61,17 @@ class EvidenceGrid:
         self._config = config
         self._lattice = Lattice(config.resolution)
         self._noise = math.ceil(NOISE / config.resolution)
+        span = 2 * math.ceil(SAME_WALL / config.resolution) + 1
+        self._same_wall = np.ones((span, span), dtype=np.uint8)
         shape = self._lattice.frame.shape
         self._hits = np.zeros(shape, dtype=np.int32)
         # Whole numbers, exact up to 2^24: OpenCV adds a mask to floats five times as quickly as to integers.
         self._misses = np.zeros(shape, dtype=np.float32)
+        # The misses of scans that met nothing nearby.
+        self._through = np.zeros(shape, dtype=np.float32)
         self._cells: CellArray = np.full(shape, UNKNOWN, dtype=np.int8)
         self._dirty: LatticeWindow | None = None
-        self._redrawn: LatticeWindow = (0, 0, *shape)
+        self._redrawn: LatticeWindow | None = None
         self._grid: OccupancyGrid | None = None
         self._percent: CellArray = self._probabilities(1, 1)
 
@@ -124,14 +131,17 @@ class EvidenceGrid:
 
     def _count(self, window: LatticeWindow, mask: Mask, flat: IntArray, sign: int) -> None:
         """Add hits (``flat``: indices in the window) and misses (``mask``) of a keyframe, or take them off."""
-        rows, cols = slice(window[0], window[0] + window[2]), slice(window[1], window[1] + window[3])
-        hits, misses = self._hits[rows, cols], self._misses[rows, cols]
+        rows, cols = _slices(window)
         # A cell that several beams hit counts once: the same sum is written for each.
-        hits[flat // window[3], flat % window[3]] += sign
-        if sign > 0:
-            cv2.accumulate(mask, misses)
-        else:
-            cv2.subtract(misses, mask, misses, dtype=cv2.CV_32F)
+        self._hits[rows, cols][flat // window[3], flat % window[3]] += sign
+        met = np.zeros_like(mask)
+        met.ravel()[flat] = 1
+        through = cv2.subtract(mask, cv2.dilate(met, self._same_wall))
+        for counts, crossed in ((self._misses[rows, cols], mask), (self._through[rows, cols], through)):
+            if sign > 0:
+                cv2.accumulate(crossed, counts)
+            else:
+                cv2.subtract(counts, crossed, counts, dtype=cv2.CV_32F)
         self._dirty = window if self._dirty is None else _union(self._dirty, window)
 
     def _crossed(self, outline: FloatArray, window: LatticeWindow) -> Mask:
@@ -152,10 +162,12 @@ class EvidenceGrid:
             return
         self._hits = grown(self._hits, padding)
         self._misses = grown(self._misses, padding)
+        self._through = grown(self._through, padding)
         self._cells = grown(self._cells, padding, UNKNOWN)
-        if self._dirty is not None:
-            row, col, rows, cols = self._dirty
-            self._dirty = (row + padding[0][0], col + padding[1][0], rows, cols)
+        self._dirty, self._redrawn = (
+            None if window is None else (window[0] + padding[0][0], window[1] + padding[1][0], *window[2:])
+            for window in (self._dirty, self._redrawn)
+        )
 
     def grid(self) -> OccupancyGrid:
         """Draw the map: probability in percent where anything was observed, else unknown."""
@@ -177,11 +189,21 @@ class EvidenceGrid:
             gone = self._faded(window) & (misses > 0.0)
             np.copyto(places, misses.astype(np.int32), where=gone)
             self._cells[rows, cols] = self._percent.ravel().take(places)
-            self._redrawn, self._dirty = self._dirty, None
+            self._redrawn = self._dirty if self._redrawn is None else _union(self._redrawn, self._dirty)
+            self._dirty = None
         cells = self._cells.copy()
         cells.flags.writeable = False  # so that it is not copied again
         self._grid = OccupancyGrid(self._lattice.frame, cells)
         return self._grid
+
+    def take_redrawn(self) -> tuple[FloatArray, FloatArray] | None:
+        """Compute the middles of the lower left and the upper right cell of what was drawn since the last call [m]."""
+        if self._redrawn is None:
+            return None
+        (row, col, rows, cols), self._redrawn = self._redrawn, None
+        low = np.array([self._lattice.col0 + col, self._lattice.row0 + row]) + 0.5
+        high = low + np.array([cols - 1, rows - 1])
+        return low * self._lattice.resolution, high * self._lattice.resolution
 
     def crossed(
         self, apart: float, *, share: float = CROSSED_SHARE, within: tuple[FloatArray, FloatArray] | None = None
@@ -194,14 +216,13 @@ class EvidenceGrid:
         Args:
             apart: Reach of the noise of a surface [m].
             share: Scans that went through a cell, beside ``CROSSED``, for each that saw a surface there.
-            within: Lower left and upper right corner of what is looked at, map frame, ``(x, y)`` [m]; without it only
-                what the last :meth:`grid` drew.
+            within: Lower left and upper right corner of what is looked at, map frame, ``(x, y)`` [m]; all without it.
 
         Returns:
             First row and column of the window that was looked at, on the lattice, and its cells.
         """
         lattice = self._lattice
-        row, col, n_rows, n_cols = self._redrawn
+        row, col, n_rows, n_cols = (0, 0, *self._hits.shape)
         if within is not None:
             (row, last_row), (col, last_col) = (cells.tolist() for cells in lattice.cells(np.stack(within)))
             n_rows, n_cols = last_row + 1 - row, last_col + 1 - col
@@ -219,10 +240,10 @@ class EvidenceGrid:
         around a cell, and how many of them were gone through as often.
         """
         around = self._wider(window, self._noise)
-        hits, misses = self._hits[_slices(around)].astype(np.float32), self._misses[_slices(around)]
+        hits, through = self._hits[_slices(around)].astype(np.float32), self._through[_slices(around)]
         span = (2 * self._noise + 1, 2 * self._noise + 1)
-        most = cv2.dilate(np.where(hits > 0.0, misses, np.float32(0.0)), np.ones(span, dtype=np.uint8))
-        again = cv2.boxFilter(np.minimum(hits, misses), -1, span, normalize=False)
+        most = cv2.dilate(np.where(hits > 0.0, through, np.float32(0.0)), np.ones(span, dtype=np.uint8))
+        again = cv2.boxFilter(np.minimum(hits, through), -1, span, normalize=False)
         faded: BoolArray = (most >= GONE) & (again >= GONE_SHARE * cv2.boxFilter(hits, -1, span, normalize=False))
         return faded[window[0] - around[0] :, window[1] - around[1] :][: window[2], : window[3]]
 

@@ -16,7 +16,7 @@ from closedrooms.mapping.beams import Beams, clean, hit_points, matched_range, t
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.door_fusion import fuse_doors
 from closedrooms.mapping.glass.met_surfaces import Glimpse
-from closedrooms.mapping.glass.panes import Panes, before_glass
+from closedrooms.mapping.glass.panes import Panes
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.graph.keyframe_graph import KeyframeGraph
 from closedrooms.mapping.graph.pose_graph import Edge
@@ -43,6 +43,8 @@ GOOD_SCORE = 0.75
 GLIMPSE, GLIMPSE_RANGE = 0.06, 1.2
 """Distance between scans whose near surfaces are looked at for glass [m], and up to which those are near [m]: of a pane
 that is 0.3 m away, 0.1 m is in view."""
+LOOK = 4
+"""Keyframes after which it is looked for glass anew."""
 
 
 class Mapper:
@@ -57,7 +59,7 @@ class Mapper:
         self._graph = KeyframeGraph(self._config)
         self._events = EventLog()
         self._hessian: FloatArray = np.zeros((3, 3))
-        self._drawn = 0
+        self._drawn = self._looked = 0
         self._trusted = True
         self._lost = 0
         self._evidence = EvidenceGrid(self._config)
@@ -357,25 +359,25 @@ class Mapper:
 
     def grid(self) -> OccupancyGrid:
         """Draw the map so far, from the keyframes' present poses."""
-        new = self._drawn < len(self.keyframes)
         grid = self._draw()
-        if not (new and self._config.glass):
+        new = len(self.keyframes) - self._looked
+        if not self._config.glass or new < (1 if self._finished else LOOK):
             return grid
+        self._looked = len(self.keyframes)
         changed = self._panes.update(self.keyframes, self._evidence, moved=self._corrected, last=self._finished)
         self._corrected = False
         if not len(changed):
             return grid
-        for keyframe in self.keyframes:
-            if self._panes.seen_through(keyframe, changed):
-                keyframe.shown = None
+        for keyframe in self._panes.seen_through(self.keyframes, changed):
+            keyframe.shown = None
         self._drawn = 0
         return self._draw()
 
     def _draw(self) -> OccupancyGrid:
         moved = [keyframe for keyframe in self.keyframes[self._drawn :] if _outdated(keyframe)]
         self._evidence.add_all([k.drawn for k in moved if k.drawn is not None], sign=-1)
-        for keyframe in moved:
-            keyframe.shown = before_glass(keyframe.beams, keyframe.pose, self._panes.segments)
+        for keyframe, shown in zip(moved, self._panes.shown(self.keyframes, moved), strict=True):
+            keyframe.shown = shown
             keyframe.drawn = (keyframe.shown, keyframe.pose)
         self._evidence.add_all([k.drawn for k in moved if k.drawn is not None])
         self._drawn = len(self.keyframes)
@@ -402,6 +404,7 @@ class Mapper:
             self._poses_moved()
         if self._config.glass:
             self._finished = True
+            self._looked = 0
             self._panes.start_again()
             for keyframe in self.keyframes:
                 if keyframe.shown is not keyframe.beams:  # what no pane has cut need not be drawn anew

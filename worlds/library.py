@@ -1,5 +1,6 @@
 """Worlds by name or file: the bundled ones, and every format that the importers read."""
 
+import codecs
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -156,7 +157,9 @@ def importer_of(path: Path) -> Importer:
         InvalidInputError: It cannot be read, or no importer knows it.
     """
     formats = importers()
-    head = read_head(path, what="a floor plan", size=HEAD_BYTES).decode("utf-8-sig", errors="replace")
+    content = read_head(path, what="a floor plan", size=HEAD_BYTES)
+    encoding = "utf-16" if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
+    head = content.decode(encoding, errors="replace")
     for importer in formats:
         if importer.recognises(path, head):
             return importer
@@ -207,7 +210,7 @@ def _is_luperto(path: Path, head: str) -> bool:
 
 def _is_houseexpo(path: Path, head: str) -> bool:
     del path
-    return head.lstrip().startswith("{") and '"verts"' in head
+    return head.lstrip().startswith("{") and any(key in head for key in ('"verts"', '"room_category"'))
 
 
 def _is_json(path: Path, head: str) -> bool:

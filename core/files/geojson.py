@@ -1,5 +1,6 @@
 """Doors, rooms and other features in the map frame as GeoJSON (metres, not degrees)."""
 
+import contextlib
 import json
 import math
 from collections.abc import Iterable, Sequence
@@ -26,10 +27,13 @@ MAX_FEATURES = 1_000_000
 # Other shapes of one room that are read; three are written.
 MAX_ALTERNATIVES = 100
 # Properties that editors and drivers spell in capitals (shapefiles, GDAL), by how they are spelt here.
-SPELT = ("id", "state", "width")
+SPELT = ("id", "state", "width", "open", "closed")
+# States of doors that stand open, and of those that do not; any other is told.
+OPEN = ("open", "opened", "false", "0")
+CLOSED = ("closed", "shut", "locked", "true", "1")
 # Doors wider than this are no doors, but are often in centimetres [m].
 ODD_WIDTH = 10.0
-# Several doors that all lie within this are in degrees, or all in one place by mistake [m].
+# Several doors that all lie within this are in degrees, or all in one place by mistake; so is a leaf as short [m].
 ONE_PLACE = 0.05
 DEGREES = ("CRS84", "4326", "4979", "WGS84", "WGS 84")
 # How deep the lists of coordinates of each geometry are, above the positions.
@@ -65,7 +69,7 @@ def read_features(
     """Read geometries and properties of an untrusted file, as we, QGIS or geopandas write it.
 
     A bare Feature or geometry counts as a collection of one. The ``id`` of a Feature stands in its properties when
-    these have none. Features without a geometry (``null``) are skipped.
+    these have none. Features without a geometry (``null``, or an empty one as shapely writes it) are skipped.
 
     Args:
         path: The file.
@@ -86,18 +90,24 @@ def read_features(
     check_count(len(features), MAX_FEATURES, "features", path)
     if remarks is not None:
         remarks += _frame_remarks(data)
-    null = sum(isinstance(f, dict) and f.get("geometry", f) is None for f in features)
+    null = sum(map(_is_null, features))
     if null == len(features) > 0:
-        raise InvalidInputError(f"{null} features without a geometry (null)", expected=what, where=path)
+        raise InvalidInputError(f"{null} features without a geometry (null or empty)", expected=what, where=path)
     if null and remarks is not None:
-        why = "they have no geometry (null)" if null > 1 else "it has no geometry (null)"
+        why = "they have no geometry (null or empty)" if null > 1 else "it has no geometry (null or empty)"
         remarks.append(Remark(action="dropped", what="features" if null > 1 else "feature", why=why, count=null))
     with reading(path, what):
         return [
-            _read_feature(number, feature, path)
-            for number, feature in enumerate(features)
-            if not (isinstance(feature, dict) and feature.get("geometry", feature) is None)
+            _read_feature(number, feature, path) for number, feature in enumerate(features) if not _is_null(feature)
         ]
+
+
+def _is_null(feature: Any) -> bool:
+    """Check whether a feature has no geometry, or an empty one."""
+    geometry = feature.get("geometry", feature) if isinstance(feature, dict) else feature
+    return geometry is None or (
+        isinstance(geometry, dict) and [] in (geometry.get("coordinates"), geometry.get("geometries"))
+    )
 
 
 def _frame_remarks(data: dict[str, Any]) -> list[Remark]:
@@ -199,15 +209,16 @@ def read_doors(path: Path, *, remarks: list[Remark] | None = None) -> list[Close
     """Read closed doors given as Points or LineStrings, or their Multi forms.
 
     One without ``id`` is numbered ``d00``, ``d01``, ... The parts of a Multi geometry are doors of their own. Doors
-    whose ``state`` says ``open``, in any case, are left out.
+    whose ``state`` says ``open``, in any case, are left out, as are those that are ``open`` or not ``closed`` by a
+    property of that name.
 
     Args:
         path: The file.
         remarks: Told what was left out or named here.
 
     Raises:
-        InvalidInputError: Another geometry, an id that is no short text or number, two doors of one id, a width that
-            is no positive number or wider than any door, more than ``MAX_DOORS`` doors.
+        InvalidInputError: Another geometry or a closed line, an id that is no short text or number, two doors of one
+            id, a width that is no positive number or wider than any door, more than ``MAX_DOORS`` doors.
     """
     what = "a GeoJSON FeatureCollection of closed doors (Points or LineStrings)"
     told: list[Remark] = []
@@ -219,7 +230,7 @@ def read_doors(path: Path, *, remarks: list[Remark] | None = None) -> list[Close
     names = _door_names(features, path, told)
     doors, opened = [], []
     for name, (geometry, properties) in zip(names, features, strict=True):
-        if str(properties.get("state", "closed")).strip().lower() == "open":
+        if _is_open(properties):
             opened.append(name)
         else:
             doors.append(_door(name, geometry, properties, path))
@@ -228,10 +239,27 @@ def read_doors(path: Path, *, remarks: list[Remark] | None = None) -> list[Close
         told.append(
             Remark(action="dropped", what=noun, why="the file says open", names=tuple(opened), count=len(opened))
         )
+    told += _unknown_states(doors)
     told += _odd_sizes(doors, path)
     if remarks is not None:
         remarks.extend(told)
     return doors
+
+
+def _is_open(properties: dict[str, Any]) -> bool:
+    """Check whether the properties of a door say that it stands open."""
+    words = [str(properties.get(name, "")).strip().lower() for name in ("state", "open", "closed")]
+    return words[0] in OPEN or words[1] in {"true", "1", "yes"} or words[2] in {"false", "0", "no"}
+
+
+def _unknown_states(doors: Sequence[ClosedDoor]) -> list[Remark]:
+    """Say which doors are in a state of another name, and taken to be closed."""
+    others = tuple(door.id for door in doors if door.state.strip().lower() not in CLOSED)
+    if not others:
+        return []
+    states = ", ".join(sorted({repr_of(door.state) for door in doors if door.id in others})[:3])
+    what = "state" if len(others) == 1 else "states"
+    return [Remark(action="guessed", what=what, why=f"{states} taken as closed", names=others, count=len(others))]
 
 
 def _odd_sizes(doors: Sequence[ClosedDoor], path: Path) -> list[Remark]:
@@ -320,16 +348,19 @@ def _door(name: str, geometry: BaseGeometry, properties: dict[str, Any], path: P
     state = shown(properties.get("state") or "closed", longest=60)
     if isinstance(geometry, Point):
         return ClosedDoor(name, (geometry.x, geometry.y), None, width, state)
-    if isinstance(geometry, LineString):
+    if isinstance(geometry, LineString) and not geometry.is_ring:
         (x0, y0), (x1, y1) = geometry.coords[0][:2], geometry.coords[-1][:2]
         length = math.hypot(x1 - x0, y1 - y0)
         midpoint = (x0 / 2 + x1 / 2, y0 / 2 + y1 / 2)
         if length > WIDEST:
             raise InvalidInputError(f"door {name!r} of {length:.6g} m", expected=f"at most {WIDEST:g} m", where=path)
+        if 0.0 < length < ONE_PLACE:
+            raise InvalidInputError(f"door {name!r} of {length:.2g} m (degrees?)", expected="metres", where=path)
         if length == 0.0:
             return ClosedDoor(name, midpoint, None, width, state)
         return ClosedDoor(name, midpoint, ((x0, y0), (x1, y1)), width or length, state)
-    raise InvalidInputError(f"door {name!r} is a {geometry.geom_type}", expected="a Point or a LineString", where=path)
+    kind = "closed line" if isinstance(geometry, LineString) else geometry.geom_type
+    raise InvalidInputError(f"door {name!r} is a {kind}", expected="a Point or a LineString", where=path)
 
 
 def write_rooms(path: Path, rooms: Sequence[Room]) -> None:
@@ -378,7 +409,7 @@ def read_rooms(path: Path, *, remarks: list[Remark] | None = None) -> list[Room]
 
 def _room(number: int, read: BaseGeometry, properties: dict[str, Any], path: Path) -> Room:
     """Make a room from what a file says of it."""
-    doors, kind, score = properties.get("doors", []), properties.get("kind"), properties.get("score")
+    doors, kind, score = _listed(properties.get("doors")), properties.get("kind"), properties.get("score")
     if not isinstance(doors, list) or not all(isinstance(d, str | int) and is_name(str(d)) for d in doors):
         raise InvalidInputError(f"room {number} with doors {repr_of(doors)}", expected="a list of ids", where=path)
     if kind is not None and not isinstance(kind, str):
@@ -391,6 +422,14 @@ def _room(number: int, read: BaseGeometry, properties: dict[str, Any], path: Pat
     others = _alternatives(number, properties.get("alternatives") or [], path)
     bounded = bool(properties.get("bounded"))
     return Room(geometry, tuple(map(str, doors)), known, score, bounded, confidence, others)  # type: ignore[arg-type]
+
+
+def _listed(value: Any) -> Any:
+    """Read the ids of doors; editors whose tables know no lists keep them as a text in JSON."""
+    if isinstance(value, str):
+        with contextlib.suppress(ValueError):
+            return json.loads(value)
+    return [] if value is None else value
 
 
 def _area(number: int, read: BaseGeometry, path: Path) -> Polygon | MultiPolygon:

@@ -5,8 +5,8 @@ import math
 import cv2
 import numpy as np
 
-from closedrooms.core.arrays import FloatArray, IntArray
-from closedrooms.core.grid import OccupancyGrid
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
+from closedrooms.core.grid import OccupancyGrid, is_occupied
 
 LENGTH, SHORT = 0.45, 0.15
 """Shortest run of places that is a pane wherever it is, a person is 0.4 m wide, and between solid walls [m]."""
@@ -30,6 +30,7 @@ def extend_line(
     line: FloatArray,
     grid: OccupancyGrid,
     may_be: FloatArray,
+    before: FloatArray,
     no_pane: FloatArray,
     driven: FloatArray,
     widest: float,
@@ -41,7 +42,9 @@ def extend_line(
         line: Its ends as they were hit, shape (2, 2) [m].
         grid: The map.
         may_be: Places that may be on a pane, shape (n, 2) [m].
-        no_pane: Places that are not, shape (n, 2) [m].
+        before: Places on panes that were found before, shape (n, 2) [m]: what is drawn of a pane hides what it was
+            drawn from.
+        no_pane: Places that are not on a pane, shape (n, 2) [m].
         driven: Where the robot was, shape (n, 2) [m].
         widest: Gap in the line that is bridged [m].
         farthest: How far it goes on at most, all in all [m].
@@ -52,29 +55,62 @@ def extend_line(
     along = line[1] - line[0]
     along = along / np.hypot(*along)
     across = np.array([-along[1], along[0]])
-    frame, occupied = grid.frame, grid.occupied
-    step = frame.resolution
+    step = grid.frame.resolution
+    steps = np.arange(step, farthest + step / 2.0, step)
     ends, walls = [], 0
     for end, direction in ((line[0], -along), (line[1], along)):
+        places = end + steps[:, None] * direction
+        against = _within(step, places, no_pane) | _within(BODY, places, driven)
+        on_pane, as_before = _within(step, places, may_be), _within(step, places, before)
+        cells = grid.frame.to_cells(places[:, None] + np.array([-step, 0.0, step])[:, None] * across)
+        inside = grid.frame.contains(cells)
+        cells[~inside] = 0
+        at_wall = np.asarray((inside & is_occupied(grid.cells[cells[..., 0], cells[..., 1]])).any(axis=1))
         solid, wall = 0.0, False
-        for t in np.arange(step, farthest + step / 2.0, step):
-            place = end + t * direction
-            if t - solid > widest or _within(step, place, no_pane) or _within(BODY, place, driven):
+        for number, t in enumerate(steps.tolist()):
+            if t - solid > widest or against[number]:
                 break
-            cells = frame.to_cells(place + np.array([-step, 0.0, step])[:, None] * across)
-            inside = ((cells >= 0) & (cells < np.array(frame.shape))).all(axis=1)
-            if _within(step, place, may_be):
-                solid = float(t)
-            elif occupied[cells[inside, 0], cells[inside, 1]].any():
-                solid, wall = float(t), True
+            if on_pane[number]:
+                solid = t
+            elif at_wall[number]:
+                solid, wall = t, True
+            elif as_before[number]:
+                solid = t
         ends.append(end + (solid + MARGIN) * direction)
         walls += wall
     return np.array(ends), walls == 2
 
 
-def _within(distance: float, place: FloatArray, places: FloatArray) -> bool:
-    """Check whether some of the places, shape (n, 2), lie within a distance of one [m]."""
-    return bool((np.hypot(*(places - place).T) < distance).any())
+def _within(distance: float, places: FloatArray, others: FloatArray) -> BoolArray:
+    """Mark the places, shape (n, 2), that have one of others, shape (m, 2), within a distance [m]."""
+    low, high = places.min(axis=0) - distance, places.max(axis=0) + distance
+    x, y = others[:, 0], others[:, 1]
+    near = others[(x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1])]
+    within: BoolArray = (np.hypot(*(near[:, None] - places).transpose(2, 0, 1)) < distance).any(axis=0)
+    return within
+
+
+def without_covered(segments: FloatArray) -> FloatArray:
+    """Leave out the panes, shape (n, 2, 2) [m], that lie along a longer one."""
+    lengths = np.hypot(*(segments[:, 1] - segments[:, 0]).T)
+    kept: list[int] = []
+    for number in np.argsort(-lengths, kind="stable").tolist():
+        for a, b in segments[kept]:
+            along = b - a
+            share = np.clip((segments[number] - a) @ along / (along @ along), 0.0, 1.0)
+            if (np.hypot(*(segments[number] - a - share[:, None] * along).T) < THICK).all():
+                break
+        else:
+            kept.append(number)
+    return segments[sorted(kept)]
+
+
+def sample(segments: FloatArray, step: float) -> FloatArray:
+    """List places along panes, shape (n, 2, 2), at most ``step`` apart, shape (m, 2) [m]."""
+    counts = np.ceil(np.hypot(*(segments[:, 1] - segments[:, 0]).T) / step).astype(np.int64).tolist()
+    return np.concatenate(
+        [np.zeros((0, 2)), *(np.linspace(a, b, n + 1) for (a, b), n in zip(segments, counts, strict=True))]
+    )
 
 
 def find_candidates(places: FloatArray, resolution: float) -> IntArray:

@@ -1,18 +1,26 @@
-"""What one scan tells about any place: whether its beams went past, ended there, or ended before."""
+"""What scans tell about any place: whether their beams went past, ended there, or ended before."""
 
 import math
 
-import cv2
 import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.mapping.beams import Beams
+from closedrooms.mapping.growing_array import GrowingArray
 
 LATERAL = 0.12
 """Half width of what must have been crossed for a place to be seen through [m]: along a wall that is seen at a grazing
 angle, the next beam may go on for metres."""
 WIDEST = 64
 """Most directions to either side that are looked at: places nearer than that allows count as out of view."""
+SECTORS = 64
+"""Sectors of the circle of whose beams the longest one is known."""
+SECTOR = math.tau / SECTORS
+"""Width of a sector [rad]."""
+ROUNDING = 1e-6
+"""Angle that no rounding reaches [rad]."""
+TURN = 8.0
+"""Angle that keeps the directions of one scan from those of the next [rad]: more than a turn, and exact."""
 FACE_REACH = 12
 """Points to either side through which the direction of a surface is drawn: at 1 m, half a degree apart and with 2 cm of
 noise, they tell it to 4 degrees."""
@@ -20,59 +28,108 @@ FACE_GAP = 0.25
 """Step between neighbouring points that ends a surface [m]."""
 
 
-class View:
-    """The space that one scan crossed, by direction, in the robot frame."""
+class Views:
+    """The space that scans crossed, by direction, each seen from its sensor and turned as its robot stood.
 
-    def __init__(self, beams: Beams) -> None:
+    Scans have numbers in the order in which they are added.
+    """
+
+    def __init__(self) -> None:
+        # Directions [rad] in order, scan after scan, each turned on by TURN: so one search finds those of many scans.
+        self._bearings, self._ranges = GrowingArray(), GrowingArray()
+        self._firsts, self._lasts, self._steps = GrowingArray(), GrowingArray(), GrowingArray()
+        self._farthest = GrowingArray(SECTORS)
+
+    def __len__(self) -> int:
+        """Count the scans."""
+        return len(self._steps.values)
+
+    def add(self, beams: Beams) -> None:
+        """Add a scan."""
         outline = beams.outline - beams.origin
         ranges = np.hypot(outline[:, 0], outline[:, 1])
         seen = ranges > 0.0
         bearings, ranges = np.arctan2(outline[seen, 1], outline[seen, 0]), ranges[seen]
         order = np.argsort(bearings, kind="stable")
-        self._origin = beams.origin
-        self._bearings, self._ranges = bearings[order], ranges[order]
-        self._levels: dict[int, FloatArray] = {}
+        bearings, ranges = bearings[order], ranges[order]
+        farthest = np.zeros(SECTORS)
+        np.maximum.at(farthest, ((bearings + math.pi) / SECTOR).astype(np.int64) % SECTORS, ranges)
+        first = len(self._ranges.values)
+        self._firsts.append(first)
+        self._lasts.append(first + len(ranges) - 1)
         # Median of the steps: sectors without a measurement leave larger ones.
-        self._step = float(np.median(np.diff(self._bearings))) if len(order) > 1 else math.inf
+        self._steps.append(float(np.median(np.diff(bearings))) if len(ranges) > 1 else math.inf)
+        self._farthest.append(farthest)
+        self._bearings.extend(bearings + TURN * (len(self) - 1))
+        self._ranges.extend(ranges)
 
-    def _lowest(self, level: int) -> FloatArray:
-        """Shortest range within 2 ** level directions to either side."""
-        if level not in self._levels:
-            window = np.ones((1, 2 * (1 << level) + 1), dtype=np.uint8)
-            shortest = cv2.erode(self._ranges[None], window, borderType=cv2.BORDER_REPLICATE)
-            self._levels[level] = np.asarray(shortest[0], dtype=np.float64)
-        return self._levels[level]
-
-    def beyond(self, points: FloatArray, lateral: FloatArray | float = LATERAL) -> FloatArray:
-        """Measure how far beams went beyond places, all those within ``lateral`` [m] of each.
+    def beyond(self, numbers: IntArray, offsets: FloatArray, lateral: FloatArray | float = LATERAL) -> FloatArray:
+        """Measure how far beams of scans went beyond places, all those within ``lateral`` [m] of each.
 
         Args:
-            points: Robot frame, shape (n, 2) [m].
+            numbers: Of the scans, one for each place, shape (n,).
+            offsets: The places, from the sensor, in the robot's axes, shape (n, 2) [m].
             lateral: Half width of what is looked at [m], one or shape (n,).
 
         Returns:
             Shape (n,) [m]: around 0 where the scan ended there, negative where it ended before, NaN out of its view.
         """
-        offsets = points - self._origin
-        bearing, distance = np.arctan2(offsets[:, 1], offsets[:, 0]), np.hypot(offsets[:, 0], offsets[:, 1])
-        if len(self._bearings) < 2:
-            return np.full(len(points), np.nan)
-        at = np.searchsorted(self._bearings, bearing)
-        at = np.clip(at, 1, len(self._bearings) - 1)
-        at -= bearing - self._bearings[at - 1] < self._bearings[at] - bearing
-        half = np.ceil(np.maximum(lateral / np.maximum(distance, 1e-6) / self._step, 1.0))
-        seen = (np.abs(self._bearings[at] - bearing) < 2.0 * self._step) & (half <= WIDEST)
-        level = np.log2(half).astype(np.int64)
-        limit = np.full(len(points), np.nan)
-        for number in np.unique(level[seen]).tolist():
-            of_level = np.flatnonzero(seen & (level == number))
-            # Two windows of a power of two that overlap.
-            aside, lowest = half[of_level].astype(np.int64) - (1 << number), self._lowest(number)
-            last = len(lowest) - 1
-            low, high = np.maximum(at[of_level] - aside, 0), np.minimum(at[of_level] + aside, last)
-            limit[of_level] = np.minimum(lowest[low], lowest[high])
+        distance = np.hypot(offsets[:, 0], offsets[:, 1])
+        limit = np.full(len(offsets), np.nan)
+        if not len(self._ranges.values):
+            return limit
+        bearing = np.arctan2(offsets[:, 1], offsets[:, 0]) + TURN * numbers
+        first, last = (of_scans.values[numbers].astype(np.int64) for of_scans in (self._firsts, self._lasts))
+        bearings, step = self._bearings.values, self._steps.values[numbers]
+        at = np.searchsorted(bearings, bearing)
+        at = np.minimum(np.maximum(at, first + 1), np.maximum(last, 0))
+        at -= bearing - bearings[at - 1] < bearings[at] - bearing
+        half = np.ceil(np.maximum(lateral / np.maximum(distance, 1e-6) / step, 1.0))
+        seen = np.flatnonzero((last > first) & (np.abs(bearings[at] - bearing) < 2.0 * step) & (half <= WIDEST))
+        at, aside = at[seen], half[seen].astype(np.int64)
+        low, high = np.maximum(at - aside, first[seen]), np.minimum(at + aside, last[seen])
+        if len(seen):
+            _, which, begins = stretches(low, high + 1)
+            limit[seen] = np.minimum.reduceat(self._ranges.values[which], begins)
         result: FloatArray = limit - distance
         return result
+
+    def may_cross(self, numbers: IntArray, segments: FloatArray) -> BoolArray:
+        """Mark segments that beams of scans may cross, shape (n, m): no others do.
+
+        Args:
+            numbers: Of the scans, shape (n,).
+            segments: As each of them sees them, from the sensor, in the robot's axes, shape (n, m, 2, 2) [m].
+        """
+        a, b = segments[..., 0, :], segments[..., 1, :]
+        turn, facing = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0], (a * b).sum(axis=-1)
+        right = np.where(turn[..., None] >= 0.0, a, b)
+        # Anticlockwise from the segment's right end to the end of each sector.
+        ends = np.arange(1, SECTORS + 1) * SECTOR - math.pi
+        past = (ends - np.arctan2(right[..., 1], right[..., 0])[..., None] + ROUNDING) % math.tau
+        beside = past <= (np.arctan2(np.abs(turn), facing) + SECTOR + 2.0 * ROUNDING)[..., None]
+        farthest = np.where(beside, self._farthest.values[numbers][:, None], 0.0)
+        along = b - a
+        share = -(a * along).sum(axis=-1) / np.maximum((along * along).sum(axis=-1), 1e-12)
+        nearest = a + np.clip(share, 0.0, 1.0)[..., None] * along
+        crossed: BoolArray = farthest.max(axis=-1) > np.hypot(nearest[..., 0], nearest[..., 1])
+        return crossed
+
+
+def stretches(begins: IntArray, ends: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """List the numbers of several ranges one after the other.
+
+    Args:
+        begins: First number of each range, shape (n,).
+        ends: The number after its last one, shape (n,).
+
+    Returns:
+        Of each number to which range it belongs, and itself, shape (m,) each; where each range begins among them, (n,).
+    """
+    counts = ends - begins
+    firsts = np.cumsum(counts) - counts
+    owners = np.repeat(np.arange(len(counts)), counts)
+    return owners, np.arange(len(owners)) + (begins - firsts)[owners], firsts
 
 
 def faces(points: FloatArray, at: IntArray, towards: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -8,17 +8,24 @@ from pathlib import Path
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray
+from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.archives import TruncatedError, log_lines
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.logs.carmen_lines import WITH_POSES, CarmenLog, ScanLine, flaser_field_of_view
+from closedrooms.mapping.logs.carmen_lines import WITH_POSES, CarmenLog, FieldOfView, ScanLine, flaser_field_of_view
 from closedrooms.mapping.logs.carmen_odometry import LocatedScans, motion_of
 from closedrooms.mapping.logs.clocks import forward
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 
 MAX_LINE = 1_000_000
 """Bytes; a scan of MAX_BEAMS fits."""
+IMPOSSIBLE_RANGE, MOST_IMPOSSIBLE = 100.0, 0.25
+"""Range [m] that no lidar of these logs has, and share of the ranges beyond it from which they are in another unit."""
+FULL_TURN = (0.05, 0.8, 20)
+"""Scans whose first and last ranges differ by at most this share, in at least this share of at least so many scans,
+go all around, where others differ: the two ends of a narrower view look apart."""
+STATED_VIEW = {"laser_front_laser_fov", "laser_front_laser_resolution"}
 DEFAULT_RANGE = 80.0
 """Longest range of the SICK LMS that most of these logs come from [m]."""
 NO_RETURN_COUNT = 10
@@ -53,7 +60,7 @@ def read_carmen(path: Path, *, gzipped: bool) -> RecordedRun:
         if other != kind
     ]
     scans, guesses = _with_sector(log.scans[kind], log.settings)
-    motion = motion_of(scans, log.moves, log.settings)
+    motion = motion_of(scans, log.moves, log.settings, rear=kind == "RAWLASER2")
     return _run(motion, log.settings, [*remarks, *guesses])
 
 
@@ -76,16 +83,36 @@ def _kind(log: CarmenLog) -> str | None:
 
 def _with_sector(scans: list[ScanLine], settings: dict[str, float]) -> tuple[list[ScanLine], list[Remark]]:
     """Give scans that do not say their field of view the one of the log's parameters or of a SICK LMS."""
-    resolved, guessed = [], 0
+    resolved, guessed, turned = [], 0, 0
+    around = not settings.keys() & STATED_VIEW and _goes_around(scans)
     for scan in scans:
         if scan.angle_min is not None:
             resolved.append(scan)
             continue
         fov, guess = flaser_field_of_view(scan.ranges.size, settings)
+        if around:
+            increment = 2.0 * math.pi / scan.ranges.size
+            fov, guess, turned = FieldOfView(-math.pi, increment), False, turned + 1
         guessed += guess
         resolved.append(replace(scan, angle_min=fov.angle_min, increment=fov.increment))
-    why = "the log has no laser_front_laser_fov; taken to be half a turn"
-    return resolved, [Remark(action="guessed", what="fields of view", why=why, count=guessed)] if guessed else []
+    why = "the log has no laser_front_laser_fov; taken to be"
+    shares = ((guessed, "half a turn"), (turned, "a whole turn, as their first and last beams meet"))
+    return resolved, [
+        Remark(action="guessed", what="fields of view", why=f"{why} {share}", count=count)
+        for count, share in shares
+        if count
+    ]
+
+
+def _goes_around(scans: list[ScanLine]) -> bool:
+    """Check whether the first and the last beam of scans see the same surface, as neighbours do."""
+    near, share, least = FULL_TURN
+    ends = np.array([scan.ranges[[0, -1, scan.ranges.size // 2]] for scan in scans])
+    ends = ends[(ends > 0.0).all(axis=1) & (ends < DEFAULT_RANGE).all(axis=1)]
+    if len(ends) < least:
+        return False
+    last, middle = ((np.abs(ends[:, 0] - ends[:, i]) <= near * ends[:, 0]).mean() for i in (1, 2))
+    return bool(last >= share and middle <= 0.5)
 
 
 def _reading_remarks(log: CarmenLog) -> list[Remark]:
@@ -109,6 +136,10 @@ def _run(motion: LocatedScans, settings: dict[str, float], remarks: list[Remark]
     remarks = [*remarks, *motion.remarks]
     if not scans:
         return RecordedRun((), np.empty((0, 3)), None, tuple(remarks))
+    ranges = np.concatenate([scan.ranges for scan in scans])
+    if (ranges > IMPOSSIBLE_RANGE).mean() > MOST_IMPOSSIBLE:
+        middle = f"half of the ranges are above {np.median(ranges):.0f}"
+        raise InvalidInputError(f"{middle} (centimetres?)", expected=f"metres, up to {IMPOSSIBLE_RANGE:g}")
     stamps, backwards = forward(np.array([scan.stamp for scan in scans]))
     limit = _range_max(scans, settings)
     sweeps = tuple(_sweep(scan, float(stamp), limit, motion.mount) for scan, stamp in zip(scans, stamps, strict=True))

@@ -9,7 +9,7 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
-from closedrooms.mapping.logs.carmen_lines import OdometryLine, ScanLine
+from closedrooms.mapping.logs.carmen_lines import LARGEST_ANGLE, OdometryLine, ScanLine
 from closedrooms.mapping.logs.recorded_odometry import lost_remarks, odometry_at
 
 SAME_ROBOT = 1.5
@@ -51,7 +51,9 @@ class LocatedScans:
     remarks: tuple[Remark, ...] = ()
 
 
-def motion_of(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[str, float]) -> LocatedScans:
+def motion_of(
+    scans: list[ScanLine], moves: list[OdometryLine], settings: dict[str, float], *, rear: bool = False
+) -> LocatedScans:
     """Find the odometry of the scans.
 
     As recorded, a scan carries its own, or has the ODOM lines around it. In logs that a mapping program corrected, the
@@ -63,10 +65,11 @@ def motion_of(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[s
         scans: Of one laser, in the order of the file; all with poses or none.
         moves: The ODOM lines.
         settings: Parameters of the log.
+        rear: Whether the laser, where it does not say where it sits, is the one at the back.
     """
     own = [(scan.laser, scan.robot) for scan in scans if scan.laser is not None and scan.robot is not None]
     if len(own) < len(scans) or _stuck([robot for _, robot in own], moves):
-        return _paired(scans, moves, settings)
+        return _paired(scans, moves, _stated_mount(settings, "rearlaser" if rear else "frontlaser"))
     robots = [robot for _, robot in own]
     poses = _array(robots)
     echoes = _echoes(scans, robots, moves)
@@ -74,7 +77,11 @@ def motion_of(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[s
     strays = [robot.distance(moves[s.since - 1].pose) for s, robot in zip(scans, robots, strict=True) if s.since > 0]
     if not echoes and not (strays and max(strays) > STRAY and not corrected):
         if corrected:
-            return LocatedScans(scans, poses, _array([laser for laser, _ in own]))
+            lasers = _array([laser for laser, _ in own])
+            if _travelled(lasers) == 0.0:
+                why = "the poses of the laser never change; it is taken to sit in the middle of the robot"
+                return LocatedScans(scans, poses, remarks=(Remark(action="guessed", what="mounting", why=why),))
+            return LocatedScans(scans, poses, lasers)
         return LocatedScans(scans, poses, None, robots[0].inverse() @ own[0][0])
     raw = _raw_odometry(moves, echoes)
     known = np.array([scan.since > 0 for scan in scans])
@@ -92,9 +99,11 @@ def _stuck(robots: Sequence[Pose2], moves: list[OdometryLine]) -> bool:
     return _travelled(_array(robots)) == 0.0 and _travelled(_array([move.pose for move in moves])) > LEAST_DISTANCE
 
 
-def _paired(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[str, float]) -> LocatedScans:
+def _paired(
+    scans: list[ScanLine], moves: list[OdometryLine], mounting: tuple[Pose2, tuple[Remark, ...]]
+) -> LocatedScans:
     """Pair scans without poses with the ODOM lines around them."""
-    mount, remarks = _stated_mount(settings)
+    mount, remarks = mounting
     if not moves:
         why = "no ODOM lines and no poses in the scans; found by matching scans alone"
         remark = Remark(action="guessed", what="motion", why=why)
@@ -115,16 +124,24 @@ def _paired(scans: list[ScanLine], moves: list[OdometryLine], settings: dict[str
     return LocatedScans(kept, odometry, None, mount, remarks=(*remarks, guessed, *lost_remarks(known)))
 
 
-def _stated_mount(settings: dict[str, float]) -> tuple[Pose2, tuple[Remark, ...]]:
-    """Read where the front laser sits from CARMEN's parameters, whose default is the middle of the robot."""
-    names = ("robot_frontlaser_offset", "robot_frontlaser_side_offset", "robot_frontlaser_angular_offset")
-    values = [settings.get(name, 0.0) for name in names]
-    if not all(map(math.isfinite, values)):
-        values = [0.0, 0.0, 0.0]
+def _stated_mount(settings: dict[str, float], laser: str) -> tuple[Pose2, tuple[Remark, ...]]:
+    """Read where a laser sits from CARMEN's parameters, whose default is the middle of the robot; the rear looks back.
+
+    Args:
+        settings: Parameters of the log.
+        laser: ``frontlaser`` or ``rearlaser``.
+    """
+    names = tuple(f"robot_{laser}_{which}offset" for which in ("", "side_", "angular_"))
+    usual = (0.0, 0.0, 0.0 if laser == "frontlaser" else math.pi)
+    x, y, angle = (settings.get(name, value) for name, value in zip(names, usual, strict=True))
+    if not all(map(math.isfinite, (x, y, angle))):
+        x, y, angle = usual
+    angle = math.radians(angle) if abs(angle) > LARGEST_ANGLE else angle
     if any(name in settings for name in names):
-        return Pose2(*values), ()
-    why = "no robot_frontlaser_offset in the log; the laser is taken to sit in the middle of the robot"
-    return Pose2(), (Remark(action="guessed", what="mounting", why=why),)
+        return Pose2(x, y, angle), ()
+    back = "" if laser == "frontlaser" else " and to look back"
+    why = f"no {names[0]} in the log; the laser is taken to sit in the middle of the robot{back}"
+    return Pose2(x, y, angle), (Remark(action="guessed", what="mounting", why=why),)
 
 
 def _echoes(scans: list[ScanLine], robots: Sequence[Pose2], moves: list[OdometryLine]) -> set[int]:

@@ -9,6 +9,9 @@ from closedrooms.core.remarks import Remark
 
 SAME_CLOCK = 1.0
 """Difference of two clocks [s] beyond which it is no delay on the way to the recorder."""
+AHEAD, WITH_RECORDER = 0.25, 0.05
+"""Time [s] by which one clock is ahead of the recorder's that it cannot be the other's, which is ahead by no more than
+the second: no delay is negative."""
 RESTART = 1.0
 """Step back [s] of a clock that started again; less is messages out of order."""
 LEAST_GAP, GAP = 1.0, 5.0
@@ -80,8 +83,9 @@ def scan_and_odometry_times(scans: Times, odometry: Times | None) -> tuple[Float
     if recorder and untold:
         why = "their sensor's clock is not set, or starts again; the times of recording are taken"
     elif recorder and len(streams) == 2:
-        apart = abs(float(np.median(streams[0].lag) - np.median(streams[1].lag)))
-        if apart > SAME_CLOCK:
+        lags = [float(np.median(times.lag)) for times in streams]
+        apart = abs(lags[0] - lags[1])
+        if apart > SAME_CLOCK or (min(lags) < -AHEAD and max(lags) >= -WITH_RECORDER):
             why = (
                 f"clocks of lidar and odometry are {apart:.1f} s apart; laid over each other by the times of recording"
             )

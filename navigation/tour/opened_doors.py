@@ -15,7 +15,7 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.core.shapes import mark_doorways
 from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.glass.panes import before_glass
+from closedrooms.mapping.glass.before_glass import before_glass
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
 from closedrooms.navigation.control_loop import MapMaker

@@ -5,7 +5,7 @@ back at one jamb, runs straight over the width of a door, and steps forward agai
 unknown, and wide enough for a room. Faces are looked at as profiles: depth of the face over the distance along the
 wall, one profile for each wall direction and each line of faces. A piece of a profile that lies back is a candidate;
 how clearly it does so against the roughness of the face, and how complete the face is there, make its score; rows of
-windows score low.
+windows, and what is in the back wall of a row of rooms, score low.
 """
 
 import math
@@ -18,6 +18,7 @@ from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.grid import OccupancyGrid, is_free, is_known
 from closedrooms.predictor.structure.door_proposal_config import ProposalConfig
+from closedrooms.predictor.structure.room_rows import LEAST_IN_ROW, count_rooms_in_row
 from closedrooms.predictor.structure.wall_directions import find_wall_directions
 from closedrooms.predictor.structure.wall_faces import WallFaces, find_faces
 from closedrooms.predictor.structure.window_rows import Niche, find_window_rows
@@ -35,7 +36,7 @@ LEAST_CONTRAST = 1.3
 # Score: logistic regression of log(contrast) and share of the leaf's face that was seen, fitted on every other bundled
 # world (office-01, -03, ... school-08) at medium noise by benchmarks/quality/door_proposals.py.
 INTERCEPT, PER_CONTRAST, PER_SEEN = -10.87, 3.04, 8.37
-# Share of its score that a window in a row keeps: the clearest niche, at 0.99, ends below everything that is proposed.
+# Share of its score that a window keeps: the clearest niche, at 0.99, ends below everything that is proposed.
 WINDOW = 0.2
 # A wall and what noise put behind it take so many cells behind a leaf.
 WALL_CELLS = 4.0
@@ -132,11 +133,15 @@ def propose_doors(grid: OccupancyGrid, config: ProposalConfig | None = None) -> 
             math.dist(proposal.midpoint, other.midpoint) > max(proposal.width, other.width) / 2 for other, _ in kept
         ):
             kept.append((proposal, niche))
-    windows = find_window_rows(grid, [niche for _, niche in kept])
-    scored = [
-        replace(proposal, score=WINDOW * proposal.score) if window else proposal
-        for (proposal, _), window in zip(kept, windows.tolist(), strict=True)
-    ]
+    windows = find_window_rows(grid, [niche for _, niche in kept]).tolist()
+    scored = []
+    for (proposal, niche), window in zip(kept, windows, strict=True):
+        # What would be left out anyhow is not looked at.
+        likely = proposal.score >= config.min_score
+        if window or (likely and count_rooms_in_row(grid, niche) >= LEAST_IN_ROW):
+            scored.append(replace(proposal, score=WINDOW * proposal.score))
+        else:
+            scored.append(proposal)
     scored.sort(key=lambda proposal: (-proposal.score, proposal.segment))
     return tuple(proposal for proposal in scored if proposal.score >= config.min_score)
 

@@ -19,3 +19,11 @@ def test_writing_to_the_values_writes_to_the_array_beyond_its_first_size() -> No
         array.append(float(i))
         array.values[:] += 1.0
     assert np.array_equal(array.values, np.full(1000, 1000.0))
+
+
+@given(st.lists(st.integers(0, 700), max_size=6))
+def test_many_rows_at_once_are_those_rows(counts: list[int]) -> None:
+    array, rows = GrowingArray(2), np.arange(2.0 * sum(counts)).reshape(-1, 2)
+    for some in np.split(rows, np.cumsum(counts)[:-1]) if counts else []:
+        array.extend(some)
+    assert np.array_equal(array.values, rows)

@@ -155,6 +155,24 @@ def test_a_wall_stays_with_its_noise_however_often_that_is_missed() -> None:
     assert grid.occupied[rows, cols].all()
 
 
+@pytest.mark.parametrize("apart", [0.05, 0.1, 0.15])
+def test_a_wall_seen_from_both_sides_stays_though_each_scan_ends_beyond_the_face_that_the_other_saw(
+    apart: float,
+) -> None:
+    evidence = EvidenceGrid(MapperConfig())
+    y = np.arange(40) * 0.05 - 0.98
+    faces = {side: np.column_stack((np.full(40, 2.02 + side * apart / 2), y)) for side in (1, -1)}
+    for side, face in faces.items():
+        # The room to the left ends at the face to the right, and the other way round: the poses do not agree.
+        outline = np.vstack((face, [(2.02 - 3.0 * side, y[-1]), (2.02 - 3.0 * side, y[0])]))
+        for _ in range(6):
+            evidence.add(Beams(face, outline, np.zeros(2)), Pose2())
+    grid = evidence.grid()
+    band = np.column_stack((np.repeat(np.arange(1.52, 2.53, 0.05), 36), np.tile(y[2:-2], 21)))
+    rows, cols = grid.frame.to_cells(band).T
+    assert grid.occupied[rows, cols].reshape(21, 36).any(axis=0).all()
+
+
 def test_the_place_that_somebody_left_is_seen_as_free_though_the_rest_was_drawn_long_before() -> None:
     evidence = EvidenceGrid(MapperConfig())
     seen(evidence, PERSON, 5)
@@ -295,3 +313,18 @@ def test_beside_a_surface_that_stands_nothing_counts_as_crossed() -> None:
         assert not crossed[near].any()
         ring = cv2.dilate(near.astype(np.uint8), np.ones((3, 3))) > 0
         assert crossed[ring & ~near].all()
+
+
+def test_what_was_redrawn_is_told_once_also_when_the_map_grows_meanwhile() -> None:
+    evidence = EvidenceGrid(MapperConfig())
+    square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    assert evidence.take_redrawn() is None
+    evidence.add(Beams(square, square, np.zeros(2)), Pose2())
+    evidence.grid()
+    evidence.add(Beams(square, square, np.zeros(2)), Pose2(-7.0, -9.0, 0.0))
+    evidence.grid()
+    found = evidence.take_redrawn()
+    assert found is not None
+    assert np.abs(found[0] - (-8.0, -10.0)).max() <= 0.03
+    assert np.abs(found[1] - (1.0, 1.0)).max() <= 0.03
+    assert evidence.take_redrawn() is None

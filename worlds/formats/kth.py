@@ -23,6 +23,8 @@ SAME_DOOR = 0.8
 # Widths of a single door and of the widest passage that is still a door [m].
 NARROWEST, WIDEST = 0.6, 2.4
 MAX_SPACES = 5000
+# Doors whose width is changed by more than this are told [m].
+NOTICED = 0.05
 
 
 def read_kth(path: str | Path) -> FloorPlan:
@@ -133,6 +135,7 @@ def _portals(
     found: list[tuple[int, Portal]] = []
     widths: list[float] = []
     outside: list[str] = []
+    other_widths: list[str] = []
     for number, space in enumerate(spaces):
         for line, (a, b) in _lines(space, metres):
             if _field(line, "type").lower() != "portal":
@@ -146,11 +149,18 @@ def _portals(
                 outside.append(name)
                 continue
             width = min(max(widths[-1], NARROWEST), WIDEST)
+            if abs(width - widths[-1]) > NOTICED:
+                other_widths.append(name)
             pair = (min(number, other), max(number, other))
             found.append((number, Portal(middle, pair, True, width, name)))
     if outside:
         why = "they lead outside or to a room that is not there"
         remarks.append(Remark(action="dropped", what="portals", why=why, names=tuple(outside), count=len(outside)))
+    if other_widths:
+        why = f"drawn narrower than {NARROWEST:g} m or wider than {WIDEST:g} m, made as wide as that"
+        remarks.append(
+            Remark(action="repaired", what="doors", why=why, names=tuple(other_widths), count=len(other_widths))
+        )
     portals = pair_portals(found, within=SAME_DOOR)
     single = 2 * len(portals) - len(found)
     if single:

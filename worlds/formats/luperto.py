@@ -19,6 +19,11 @@ from closedrooms.worlds.plan import FloorPlan, PlanRoom
 
 WHAT = "a floor plan (Luperto XML)"
 MAX_SPACES = 5000
+# Metres in the units that a scale may have, in the singular.
+UNITS = {
+    "mm": 0.001, "millimeter": 0.001, "millimetre": 0.001, "cm": 0.01, "centimeter": 0.01, "centimetre": 0.01,
+    "m": 1.0, "meter": 1.0, "metre": 1.0, "in": 0.0254, "inch": 0.0254, "ft": 0.3048, "foot": 0.3048, "feet": 0.3048,
+}  # fmt: skip
 
 
 def read_luperto(path: str | Path) -> FloorPlan:
@@ -58,14 +63,17 @@ def _scale(root: Any, path: Path) -> float:
     pixels = text(child(child(scale, "represented_distance"), "value"))
     real = text(child(child(scale, "real_distance"), "value"))
     unit = text(child(child(scale, "real_distance"), "um")) or "cm"
-    factor = {"cm": 0.01, "m": 1.0, "mm": 0.001}.get(unit.strip().lower())
+    name = unit.strip().lower()
+    factor = UNITS.get(name, UNITS.get(name.removesuffix("s"), UNITS.get(name.removesuffix("es"))))
     try:
         value = float(real) * (factor or math.nan) / float(pixels)
     except (ValueError, ZeroDivisionError):
         value = math.nan
     if not (math.isfinite(value) and value > 0.0):
         raise InvalidInputError(
-            f"scale of {real!r} {unit} for {pixels!r} pixels", expected="a length in cm and pixels above 0", where=path
+            f"scale of {real!r} {unit} for {pixels!r} pixels",
+            expected="a length in mm, cm, m, inches or feet, and pixels above 0",
+            where=path,
         )
     return value
 

@@ -17,6 +17,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.formats.hallways import Hallway, JoinedRooms, extend_into_rooms
 from closedrooms.worlds.formats.portals import plan_of_portals
+from closedrooms.worlds.formats.room_outlines import cut_out_inner_rooms
 from closedrooms.worlds.formats.settlement import Source, settle
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
 from closedrooms.worlds.wall_assembly import clean_coverage
@@ -55,6 +56,10 @@ def read_pyrobosim(path: str | Path) -> FloorPlan:
     wall = _wall_width(rows)
     # Footprints are free floor: the walls' centre lines lie half a wall further out.
     footprints = _placed_footprints(rows, names, path)
+    footprints, inner = cut_out_inner_rooms(footprints, apart=wall)
+    if inner:
+        why, told = "inside another room, cut out of that", tuple(names[number] for number in inner)
+        remarks.append(Remark(action="repaired", what="rooms", why=why, names=told, count=len(told)))
     overlap = sum(footprint.area for footprint in footprints) - shapely.union_all(footprints).area
     if overlap > 0.01:
         why = f"{overlap:.2f} square metres given to one room each"
@@ -67,6 +72,9 @@ def read_pyrobosim(path: str | Path) -> FloorPlan:
         fewer = ends[hallway.start] < ends[hallway.end]
         building.add(hallway, door_at_start=fewer)
     polygons = clean_coverage(building.polygons, snap=0.01)
+    lost = next((label for label, polygon in zip(building.labels, polygons, strict=True) if polygon.is_empty), None)
+    if lost is not None:
+        raise InvalidInputError(f"the {lost} lies on other rooms", expected="rooms side by side", where=path)
     rooms = tuple(
         PlanRoom(f"r{i:02d}", label, p) for i, (label, p) in enumerate(zip(building.labels, polygons, strict=True))
     )
@@ -80,7 +88,10 @@ def read_pyrobosim(path: str | Path) -> FloorPlan:
     source = Source(
         rooms=len(rooms),
         doors=len(building.portals) + len(building.deep_doors) + dropped,
-        walls=shapely.union_all([outline.boundary for outline in outlines]),
+        # Where hallways begin, walls are open.
+        walls=shapely.union_all([outline.boundary for outline in outlines]).difference(
+            shapely.union_all([hallway.line.buffer(hallway.width / 2 + wall) for hallway in hallways])
+        ),
         within=wall + 0.05,
         door_widths=[hallway.width for hallway in hallways],
     )

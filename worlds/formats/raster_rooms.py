@@ -22,6 +22,8 @@ SMALLEST = 1.0
 HALF_WIDEST, HALF_DEFAULT = 1.2, 0.45
 # No door is narrower or wider [m].
 NARROWEST, WIDEST = 0.3, 12.0
+# A door whose end lies up to this far from its jamb goes up to it [m]: people draw and programs find them so.
+SHORT_OF = 0.3
 # On both sides of a door free space begins within this [m].
 DEEPEST = 0.8
 
@@ -43,26 +45,47 @@ def find_rooms_and_doors(
         for number, why in bad.items():
             remarks.append(Remark(action="dropped", what="doors", why=why, names=(given[number].id,), loss=True))
             del segments[number]
-        rooms, labels = _rooms(grid, list(segments.values()))
+        shut = _shut(grid, [_to_jambs(segment, grid) for segment in segments.values()])
+        rooms, labels = _rooms(grid, shut)
         made = {n: _door(given[n], segment, labels, grid.frame, rooms) for n, segment in segments.items()}
         bad = {n: door for n, door in made.items() if isinstance(door, str)}
         if not bad:
             break
     placed = [door for door in made.values() if not isinstance(door, str)]
     frames = [frame for _, frame in placed]
-    shut = _shut(grid, list(segments.values()))
     tiny = int((grid.free & ~shut & (labels == 0)).sum())
     if tiny:
         why = f"below {SMALLEST} square metres each, no rooms"
         remarks.append(Remark(action="dropped", what="free cells", why=why, count=tiny))
-    return rooms, [door for door, _ in placed], frames, shut & ~mark_gaps(frames, grid.frame)
+    doors = [door for door, _ in placed]
+    outside = _outside(labels, rooms, doors)
+    if outside is not None:
+        why = f"{outside.polygon.area:.1f} square metres reach all four edges of the map, without a door: the outside"
+        remarks.append(Remark(action="dropped", what="free area", why=why))
+        rooms = [room for room in rooms if room is not outside]
+    return rooms, doors, frames, shut & ~mark_gaps(frames, grid.frame)
 
 
-def _rooms(grid: OccupancyGrid, segments: Sequence[Segment]) -> tuple[list[PlanRoom], Labels]:
+def _outside(labels: Labels, rooms: Sequence[PlanRoom], doors: Sequence[PlanDoor]) -> PlanRoom | None:
+    """Find the free area around a building in the picture of a plan; ``None`` where there is nothing but that.
+
+    Args:
+        labels: Numbers of the rooms, from 1; the outermost cells belong to none.
+        rooms: In the order of their numbers.
+        doors: Between them.
+    """
+    edges = [set(edge.tolist()) for edge in (labels[1], labels[-2], labels[:, 1], labels[:, -2])]
+    everywhere = set.intersection(*edges) - {0}
+    found = [rooms[number - 1] for number in everywhere if len(rooms) > 1]
+    entered = {room for door in doors for room in door.rooms}
+    return next((room for room in found if room.id not in entered), None)
+
+
+def _rooms(grid: OccupancyGrid, shut: BoolArray) -> tuple[list[PlanRoom], Labels]:
     """Find connected free areas with all doors shut, and the number of the room (from 1) of each cell."""
     import cv2
 
-    free = (grid.free & ~_shut(grid, segments)).astype(np.uint8)
+    free = (grid.free & ~shut).astype(np.uint8)
     count, found = cv2.connectedComponents(free, connectivity=4)
     sizes = np.bincount(found.ravel(), minlength=count) * grid.frame.resolution**2
     large = [component for component in range(1, count) if sizes[component] >= SMALLEST]
@@ -100,6 +123,19 @@ def _shut(grid: OccupancyGrid, segments: Sequence[Segment]) -> BoolArray:
         cv2.line(drawn, ends[0], ends[1], 1, thickness=2)
     covered: BoolArray = (drawn > 0) & grid.free
     return covered
+
+
+def _to_jambs(segment: Segment, grid: OccupancyGrid) -> Segment:
+    """Extend a door that ends shortly before its jambs to those."""
+    a, b = np.array(segment)
+    along = (b - a) / math.dist(a, b)
+    steps = np.arange(0.0, SHORT_OF, grid.frame.resolution / 4)
+    ends = []
+    for end, outward in ((a, -along), (b, along)):
+        blocked = _values(grid, ~grid.free, end + steps[:, None] * outward)
+        ends.append(end + steps[int(np.argmax(blocked))] * outward)
+    (x0, y0), (x1, y1) = (end.tolist() for end in ends)
+    return ((x0, y0), (x1, y1))
 
 
 def _segment(door: ClosedDoor, grid: OccupancyGrid) -> Segment:

@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from closedrooms.core.remarks import Remark
 from closedrooms.worlds.door_hinges import hung
 from closedrooms.worlds.formats.rmf_level import RmfLevel, read_level
 from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
+from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom, Wall
 
 # Thickness that the RMF tools give walls [m].
@@ -25,6 +27,8 @@ WALL = 0.1
 LOOSE_END = 0.5
 # Faces between walls that are smaller than this, or narrower, are no rooms [square metres, m].
 SMALLEST, NARROWEST = 1.0, 0.35
+# What is drawn on a line lies this near to it [m].
+ON_LINE = 0.06
 # On each side of a door its room is looked for this far away [m].
 PROBE = 0.3
 
@@ -51,7 +55,9 @@ def read_rmf(path: str | Path, level: str | None = None) -> FloorPlan:
     lines = [LineString(s) for s in (*read.walls, *(door.segment for door in read.doors), *closers)]
     rooms, faces = _rooms(lines, read, remarks)
     if not rooms:
-        raise no_rooms(f"walls that close rooms on level {name}", faces, remarks, path)
+        raise no_rooms(f"walls that close rooms on level {name}", [face.area for face in faces], remarks, path)
+    rooms = _without_surroundings(rooms, read, closers, remarks)
+    remarks += _open_walls(faces, read)
     doors = _doors(read, rooms, remarks)
     segments = [*read.walls, *closers, *(door.segment for door in read.doors)]
     walls = tuple(Wall(f"w{number:03d}", segment, WALL) for number, segment in enumerate(segments))
@@ -75,23 +81,46 @@ def _closers(level: RmfLevel, remarks: list[Remark]) -> list[Segment]:
     """Add walls that the file leaves out: from loose ends to the next wall, and along the floor's edge."""
     lines = [LineString(s) for s in (*level.walls, *(door.segment for door in level.doors))]
     loose = _loose_ends(lines)
-    edges: list[Segment] = []
-    if not level.floor.is_empty:
-        bare = level.floor.boundary.difference(shapely.union_all(lines).buffer(LOOSE_END))
-        for line in shapely.get_parts(shapely.line_merge(bare) if bare.geom_type == "MultiLineString" else bare):
-            if line.length > LOOSE_END:
-                points = [(round(x, 4), round(y, 4)) for x, y in shapely.get_coordinates(line).tolist()]
-                edges += [(a, b) for a, b in itertools.pairwise(points) if math.dist(a, b) > 0.01]
+    rim = level.holes.boundary.buffer(ON_LINE)
+    edges = _bare_stretches(level.floor.boundary.difference(rim), lines, LOOSE_END)
+    ends = _loose_ends([*lines, *map(LineString, edges)], reach=2 * LOOSE_END) if edges else []
+    gaps = _gaps(level, [*lines, *map(LineString, (*loose, *edges, *ends))])
+    all_closers = [*loose, *edges, *ends, *gaps]
+    if gaps:
+        all_closers += _loose_ends([*lines, *map(LineString, all_closers)], reach=2 * ON_LINE)
     if loose:
         why = f"closed by up to {LOOSE_END} m of wall each"
         remarks.append(Remark(action="repaired", what="loose ends of walls", why=why, count=len(loose)))
-    if edges:
-        length = sum(math.dist(*edge) for edge in edges)
+    if edges or gaps:
+        length = sum(math.dist(*edge) for edge in (*edges, *gaps))
         why = f"{length:.1f} m along the floor's edge, which has none in the file"
-        remarks.append(Remark(action="guessed", what="walls", why=why, count=len(edges)))
-        ends = _loose_ends([*lines, *(LineString(edge) for edge in edges)], reach=2 * LOOSE_END)
-        return [*loose, *edges, *ends]
-    return loose
+        remarks.append(Remark(action="guessed", what="walls", why=why, count=len(edges) + len(gaps)))
+    return all_closers
+
+
+def _bare_stretches(outline: BaseGeometry, lines: Sequence[LineString], within: float) -> list[Segment]:
+    """List the stretches of an outline that are longer than ``within`` [m] and further than that from every line."""
+    bare = outline.difference(shapely.union_all(lines).buffer(within))
+    found: list[Segment] = []
+    for line in shapely.get_parts(shapely.line_merge(bare) if bare.geom_type == "MultiLineString" else bare):
+        if line.length > within:
+            points = [(round(x, 4), round(y, 4)) for x, y in shapely.get_coordinates(line).tolist()]
+            found += [(a, b) for a, b in itertools.pairwise(points) if math.dist(a, b) > 0.01]
+    return found
+
+
+def _gaps(level: RmfLevel, lines: Sequence[LineString]) -> list[Segment]:
+    """Close the floor that is in no room where its edge has no wall: an entrance that is drawn without a door.
+
+    The rim of a hole in the floor is closed, too.
+    """
+    rim = _bare_stretches(level.holes.boundary, lines, ON_LINE)
+    lines = [*lines, *map(LineString, rim)]
+    rooms, _ = _rooms(lines, level, [])
+    left = level.floor.difference(shapely.union_all([room.polygon for room in rooms]))
+    open_floor = areal(left.buffer(-NARROWEST / 2, join_style="mitre").buffer(NARROWEST / 2, join_style="mitre"))
+    parts = [part for part in shapely.get_parts(open_floor) if part.area >= SMALLEST]
+    return [*rim, *(_bare_stretches(shapely.union_all(parts).boundary, lines, ON_LINE) if parts else [])]
 
 
 def _loose_ends(lines: Sequence[LineString], reach: float = LOOSE_END) -> list[Segment]:
@@ -118,8 +147,8 @@ def _loose_ends(lines: Sequence[LineString], reach: float = LOOSE_END) -> list[S
 
 def _rooms(
     lines: Sequence[BaseGeometry], level: RmfLevel, remarks: list[Remark]
-) -> tuple[tuple[PlanRoom, ...], list[float]]:
-    """Find the faces between walls and doors, named after the waypoints in them, and the areas of all faces."""
+) -> tuple[tuple[PlanRoom, ...], list[Polygon]]:
+    """Find the rooms between walls and doors, named after the waypoints in them, and all faces."""
     # On a grid of 1 cm, so that feet of loose ends and edges of floors lie on their wall.
     noded = shapely.union_all(np.array(lines, dtype=object), grid_size=0.01)
     faces = [f for f in shapely.get_parts(shapely.polygonize([noded])) if isinstance(f, Polygon)]
@@ -139,7 +168,38 @@ def _rooms(
     if outside:
         why = "no floor under them"
         remarks.append(Remark(action="dropped", what="areas between walls", why=why, count=outside))
-    return tuple(rooms), [face.area for face in shapes]
+    return tuple(rooms), shapes
+
+
+def _without_surroundings(
+    rooms: Sequence[PlanRoom], level: RmfLevel, closers: Sequence[Segment], remarks: list[Remark]
+) -> tuple[PlanRoom, ...]:
+    """Leave out the floor around a building, if it is drawn larger than that: no wall outside, no door to it."""
+    edges = shapely.union_all([LineString(closer) for closer in closers]).buffer(ON_LINE)
+    middles = shapely.union_all([LineString(door.segment).centroid for door in level.doors])
+
+    def surrounds(room: PlanRoom) -> bool:
+        outside = LineString(room.polygon.exterior)
+        bare = outside.intersection(edges).length > 0.9 * outside.length
+        return bool(room.polygon.interiors) and bare and room.polygon.distance(middles) > PROBE
+
+    kept = [room for room in rooms if not surrounds(room)]
+    if not kept or len(kept) == len(rooms):
+        return tuple(rooms)
+    area = sum(room.polygon.area for room in rooms) - sum(room.polygon.area for room in kept)
+    why = f"{area:.1f} square metres around the walls, without a wall outside or a door to them"
+    remarks.append(Remark(action="dropped", what="floor", why=why))
+    return tuple(replace(room, id=f"r{number:02d}") for number, room in enumerate(kept))
+
+
+def _open_walls(faces: Sequence[Polygon], level: RmfLevel) -> list[Remark]:
+    """Find walls that bound no face and stand in none: what they would close is open somewhere, and missing."""
+    near = shapely.union_all(faces).buffer(LOOSE_END)
+    length = shapely.union_all([LineString(wall) for wall in level.walls]).difference(near).length
+    if length < LOOSE_END:
+        return []
+    why = f"{length:.1f} m of walls close none: what lies between them is open somewhere and missing"
+    return [Remark(action="dropped", what="rooms", why=why, loss=True)]
 
 
 def _doors(level: RmfLevel, rooms: Sequence[PlanRoom], remarks: list[Remark]) -> list[PlanDoor]:

@@ -1,6 +1,7 @@
 """One level of an Open-RMF building: its vertices, walls, doors and floor in metres, and where its names stand."""
 
 import math
+import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,7 +55,8 @@ class RmfLevel:
         walls: Centre lines of its walls, each once [m].
         doors: Those that can be doors.
         listed_doors: How many the file lists.
-        floor: What it calls floor [m], empty where it names none.
+        floor: What it calls floor, without its holes [m], empty where it names none.
+        holes: Of its floors [m].
     """
 
     name: str
@@ -64,6 +66,7 @@ class RmfLevel:
     doors: tuple[RmfDoor, ...]
     listed_doors: int
     floor: Polygon | MultiPolygon
+    holes: Polygon | MultiPolygon
 
 
 def read_level(path: Path, level: str | None, remarks: list[Remark]) -> RmfLevel:
@@ -109,6 +112,7 @@ def read_level(path: Path, level: str | None, remarks: list[Remark]) -> RmfLevel
         door = _door(row, number, vertices, remarks)
         if door is not None:
             doors.append(door)
+    floor, holes = (_areas(fields, key, vertices, remarks, path) for key in ("floors", "holes"))
     return RmfLevel(
         name,
         tuple(vertices),
@@ -116,7 +120,8 @@ def read_level(path: Path, level: str | None, remarks: list[Remark]) -> RmfLevel
         tuple(dict.fromkeys(wall for wall in walls if math.dist(*wall) > 0.01)),
         tuple(doors),
         len(listed),
-        _floor(fields, vertices, remarks, path),
+        areal(floor.difference(holes)),
+        holes,
     )
 
 
@@ -163,7 +168,10 @@ def _pixel(data: dict[str, Any], fields: dict[str, Any], path: Path, remarks: li
 
 
 def _scale(data: dict[str, Any], fields: dict[str, Any], path: Path, remarks: list[Remark]) -> float:
-    """Read metres per pixel: the mean of the level's measurements, else of another level's."""
+    """Read metres per pixel: the mean of the level's measurements, else of another level's.
+
+    Where they disagree it is their median: one that was mistyped does not count then.
+    """
     for name, level in [("", fields), *((n, f) for n, f in data["levels"].items() if isinstance(f, dict))]:
         values = [_measured(row, _rows(level, "vertices", path)) for row in _rows(level, "measurements", path)]
         usable = [value for value in values if value is not None]
@@ -173,8 +181,9 @@ def _scale(data: dict[str, Any], fields: dict[str, Any], path: Path, remarks: li
             why = f"the level has no measurements, those of level {str(name)[:40]} are taken"
             remarks.append(Remark(action="guessed", what="scale", why=why))
         if max(usable) > (1.0 + DISAGREE) * min(usable):
-            why = f"measurements say {min(usable):.4g} to {max(usable):.4g} m a pixel, their mean is taken"
+            why = f"measurements say {min(usable):.4g} to {max(usable):.4g} m a pixel, their median is taken"
             remarks.append(Remark(action="guessed", what="scale", why=why))
+            return statistics.median(usable)
         return sum(usable) / len(usable)
     raise InvalidInputError("a building without measurements", expected="a measured distance for scale", where=path)
 
@@ -239,16 +248,16 @@ def _door(row: Any, number: int, vertices: Sequence[Point | None], remarks: list
     return RmfDoor(name, segment, KINDS.get(kind, "hinged"))
 
 
-def _floor(
-    fields: dict[str, Any], vertices: Sequence[Point | None], remarks: list[Remark], path: Path
+def _areas(
+    fields: dict[str, Any], key: str, vertices: Sequence[Point | None], remarks: list[Remark], path: Path
 ) -> Polygon | MultiPolygon:
-    """Join the floors of a level to one area [m]."""
+    """Join the floors of a level, or their holes, to one area [m]."""
     areas = []
-    for number, row in enumerate(_rows(fields, "floors", path)):
+    for number, row in enumerate(_rows(fields, key, path)):
         try:
             ring = [vertices[int(index)] for index in row["vertices"]]
             areas.append(shapely.make_valid(Polygon([corner for corner in ring if corner is not None])))
         except (IndexError, KeyError, TypeError, ValueError, OverflowError):
-            why = "without an outline"
-            remarks.append(Remark(action="dropped", what="floors", why=why, names=(f"floors[{number}]",), loss=True))
+            names = (f"{key}[{number}]",)
+            remarks.append(Remark(action="dropped", what=key, why="without an outline", names=names, loss=True))
     return areal(shapely.union_all(areas))

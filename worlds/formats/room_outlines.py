@@ -18,6 +18,8 @@ GAP = 0.6
 JOG = 0.12
 # Coordinates of plans are kept to this [m].
 GRID = 1e-4
+# A room of which this share lies inside another one, at least so many times larger, is a part cut out of that.
+INSIDE, LARGER = 0.95, 2.0
 # Outlines below this area are no rooms [square metres].
 SMALLEST = 0.2
 
@@ -53,6 +55,12 @@ def clean_outlines(
     given = [_on_grid(outline) for outline in outlines if outline is not None]
     if not given:
         return list(outlines)
+    given, inner = cut_out_inner_rooms(given)
+    if inner:
+        present = [name for name, outline in zip(names, outlines, strict=True) if outline is not None]
+        why = "drawn inside another room, cut out of that"
+        told = tuple(present[number] for number in inner)
+        remarks.append(Remark(action="repaired", what="rooms", why=why, names=told, count=len(told)))
     overlap = sum(outline.area for outline in given) - shapely.union_all(given).area
     polygons, gaps = without_gaps(clean_coverage(given, snap=JOG / 2), GAP, touching=GRID)
     polygons = clean_coverage(polygons, gap=GAP, snap=JOG / 2)
@@ -72,6 +80,31 @@ def clean_outlines(
             polygon = None
         result.append(polygon)
     return result
+
+
+def cut_out_inner_rooms(outlines: Sequence[Polygon], *, apart: float = 0.0) -> tuple[list[Polygon], list[int]]:
+    """Cut rooms that are drawn inside others, such as shafts, out of those.
+
+    Args:
+        outlines: Valid polygons [m].
+        apart: What stays between the two [m].
+
+    Returns:
+        The outlines, and the numbers of the inner rooms.
+    """
+    result, inner = list(outlines), []
+    first, second = STRtree(outlines).query(outlines, predicate="intersects")
+    for small, large in sorted(zip(first.tolist(), second.tolist(), strict=True)):
+        area = outlines[small].area
+        if small == large or outlines[large].area < LARGER * area:
+            continue
+        if outlines[small].intersection(outlines[large]).area >= INSIDE * area:
+            left = areal(result[large].difference(outlines[small].buffer(apart, join_style="mitre")))
+            # A room that is cut in two would lose one of the pieces.
+            if isinstance(left, Polygon):
+                result[large] = left
+                inner.append(small)
+    return result, inner
 
 
 def hull_areas(corners: Sequence[Sequence[Point]]) -> list[float]:

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.connectivity import connected_parts
@@ -23,6 +24,9 @@ NARROWEST_MEDIAN_DOOR, WIDEST_MEDIAN_DOOR, USUAL_DOOR = 0.65, 6.0, 0.9
 SMALLEST_MEDIAN_ROOM, LARGEST_MEDIAN_ROOM, USUAL_ROOM = 1.5, 1500.0, 20.0
 # Walls shorter than this in all may be lost by rounding [m].
 NOTICED = 0.05
+# So far before the faces of a door's wall, and beside it, there has to be a way for a robot of this radius, narrower in
+# a door that leaves it less than this on both sides [m].
+BEFORE, RADIUS, CLEAR = 0.3, 0.15, 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +61,8 @@ def settle(plan: FloorPlan, remarks: Iterable[Remark], source: Source, path: Pat
         InvalidInputError: What is left is not a valid plan.
     """
     kept, bad = _without_bad_passages(plan)
+    kept, blocked = _without_blocked_passages(kept)
+    bad += blocked
     odd = _odd_scale(kept, source.door_widths)
     try:
         validate(kept, str(path))
@@ -86,15 +92,51 @@ def merged(remarks: Iterable[Remark]) -> list[Remark]:
 
 def _without_bad_passages(plan: FloorPlan) -> tuple[FloorPlan, list[Remark]]:
     """Leave out doors and openings that are not as they should be, each named with its reason."""
-    faults = passage_faults(plan)
+    return _without_passages(plan, {number: what for number, (what, _) in passage_faults(plan).items()})
+
+
+def _without_blocked_passages(plan: FloorPlan) -> tuple[FloorPlan, list[Remark]]:
+    """Leave out doors and openings that another wall stands before, so that nobody gets through."""
+    axes, walls = wall_axes(plan), wall_area(plan)
+    shapely.prepare(walls)
+    ends = np.array([passage.segment for passage in plan.passages], dtype=np.float64).reshape(-1, 2, 2)
+    along = ends[:, 1] - ends[:, 0]
+    width = np.hypot(*along.T)
+    thickness = np.array([axes.thickness(passage.segment) or 0.0 for passage in plan.passages])
+    reach = ((thickness / 2 + BEFORE) / width)[:, None] * np.column_stack((-along[:, 1], along[:, 0]))
+    middles = ends.mean(axis=1)
+    straight = shapely.linestrings(np.stack((middles - reach, middles + reach), axis=1))
+    blocked = [
+        number
+        for number in np.flatnonzero(shapely.intersects(walls, straight)).tolist()
+        if not _leads_through(ends[number], reach[number], walls)
+    ]
+    return _without_passages(plan, dict.fromkeys(blocked, "another wall stands before them"))
+
+
+def _leads_through(segment: FloatArray, reach: FloatArray, walls: BaseGeometry) -> bool:
+    """Check that a robot gets from ``reach`` [m] before a passage, shape (2, 2), to as far behind it, past clutter."""
+    along = segment[1] - segment[0]
+    width = float(np.hypot(*along))
+    beside = BEFORE / width * along
+    wide = np.array([segment[0] - beside, segment[1] + beside])
+    around = shapely.Polygon([*(wide - reach), *(wide + reach)[::-1]]).difference(walls)
+    room_for_it = around.buffer(-min(RADIUS, width / 2 - CLEAR), quad_segs=4)
+    near = 0.5 * BEFORE / np.hypot(*reach) * reach
+    sides = [shapely.LineString(wide + sign * (reach - near)).buffer(0.01) for sign in (1.0, -1.0)]
+    return any(all(part.intersects(side) for side in sides) for part in shapely.get_parts(room_for_it))
+
+
+def _without_passages(plan: FloorPlan, faults: dict[int, str]) -> tuple[FloorPlan, list[Remark]]:
+    """Leave out doors and openings, given by their number among ``plan.passages`` with the reason."""
     if not faults:
         return plan, []
     passages = plan.passages
     kept = [passage for number, passage in enumerate(passages) if number not in faults]
     remarks = []
-    for number, (what, _) in faults.items():
+    for number, why in faults.items():
         kind = "doors" if isinstance(passages[number], PlanDoor) else "openings"
-        remarks.append(Remark(action="dropped", what=kind, why=what, names=(passages[number].id,), loss=True))
+        remarks.append(Remark(action="dropped", what=kind, why=why, names=(passages[number].id,), loss=True))
     doors = tuple(passage for passage in kept if isinstance(passage, PlanDoor))
     openings = tuple(passage for passage in kept if isinstance(passage, Opening))
     return replace(plan, doors=doors, openings=openings), remarks

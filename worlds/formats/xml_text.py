@@ -1,11 +1,12 @@
 """XML: untrusted files, read without entities and without regard to the case of names; numbers as we write them."""
 
+import contextlib
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import ParseError
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.incoming import MAX_DEPTH, read_text
+from closedrooms.core.files.incoming import MAX_DEPTH, read_bytes
 
 MAX_BYTES = 100_000_000
 
@@ -13,15 +14,19 @@ MAX_BYTES = 100_000_000
 def parse_xml(path: Path, *, what: str) -> Any:
     """Parse the root element of an XML file.
 
+    It is UTF-8, whatever it declares, else what it declares or its first bytes say.
+
     Raises:
         InvalidInputError: Missing, too large, no XML, XML with entities, or nested deeper than any plan is.
     """
     from defusedxml import DefusedXmlException, ElementTree
 
-    content = read_text(path, what=what, max_bytes=MAX_BYTES)
+    content = read_bytes(path, what=what, max_bytes=MAX_BYTES)
+    with contextlib.suppress(UnicodeDecodeError):
+        content = content.decode("utf-8-sig").encode()
     try:
         # As bytes: ElementTree refuses text with an encoding declaration.
-        root = ElementTree.fromstring(content.encode())
+        root = ElementTree.fromstring(content)
     except ParseError as error:
         raise InvalidInputError(f"broken XML ({error})", expected=what, where=path) from error
     except DefusedXmlException as error:

@@ -1,6 +1,5 @@
 """The messages of a bag that say something of a robot's motion and scans, read one by one."""
 
-import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -10,7 +9,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
 from closedrooms.mapping.logs.bags.bag_options import BagOptions
 from closedrooms.mapping.logs.bags.bag_scans import ECHOES, SCAN
-from closedrooms.mapping.logs.bags.transform_tree import TransformTree, clean_name, transform_matrix
+from closedrooms.mapping.logs.bags.transform_tree import TransformTree, clean_name, seen_from_above, transform_matrix
 
 ODOMETRY = "nav_msgs/msg/Odometry"
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
@@ -25,6 +24,7 @@ class BagMessages:
         scans: Messages of the scans.
         odometry: ``header stamp, recording time, x, y, yaw`` of each.
         base: Frame of the robot that the odometry moves.
+        frame: Frame that it moves in.
         tree: The transforms.
         broken: Messages that could not be read, by what they should hold.
         surplus: Scans beyond ``MAX_SCANS``.
@@ -33,6 +33,7 @@ class BagMessages:
     scans: list[tuple[Any, float]] = field(default_factory=list)
     odometry: list[tuple[float, float, float, float, float]] = field(default_factory=list)
     base: str = ""
+    frame: str = ""
     tree: TransformTree = field(default_factory=TransformTree)
     broken: Counter[str] = field(default_factory=Counter)
     surplus: int = 0
@@ -52,6 +53,11 @@ def choose_connections(connections: Iterable[Any], options: BagOptions) -> tuple
         echoes = set()
     scan = _topic(scans | echoes, options.scan_topic, "sensor_msgs/LaserScan or MultiEchoLaserScan", topics)
     transforms = set().union(*(topics.get(kind, set()) for kind in TRANSFORMS))
+    others = {topic for topic in transforms if topic != options.odometry_topic and not _beside(topic, scan)}
+    if 0 < len(others) < len(transforms):
+        why = f"{scan} lies in another namespace"
+        remarks.append(Remark(action="dropped", what="transforms", why=why, names=tuple(sorted(others))))
+        transforms -= others
     odometry = topics.get(ODOMETRY, set())
     asked = options.odometry_topic
     taken = {scan, *transforms}
@@ -59,6 +65,11 @@ def choose_connections(connections: Iterable[Any], options: BagOptions) -> tuple
         taken.add(_topic(odometry, asked, "nav_msgs/Odometry", topics))
     kinds = {SCAN, ECHOES, ODOMETRY, *TRANSFORMS}
     return [c for c in connections if c.topic in taken and c.msgtype in kinds], remarks
+
+
+def _beside(topic: str, scan: str) -> bool:
+    """Check whether a topic lies in the namespace of the scans or one around it: robots share names of frames."""
+    return f"/{scan.strip('/')}".startswith(f"/{topic.strip('/')}".rpartition("/")[0] + "/")
 
 
 def _topic(found: set[str], asked: str | None, kind: str, topics: dict[str, set[str]]) -> str:
@@ -107,8 +118,8 @@ def _take_odometry(messages: BagMessages, message: Any, recorded: float) -> None
     pose = message.pose.pose
     turned, at = pose.orientation, pose.position
     matrix = transform_matrix((at.x, at.y, at.z), (turned.x, turned.y, turned.z, turned.w))
-    yaw = math.atan2(matrix[1, 0], matrix[0, 0])
-    messages.odometry.append((stamp_of(message), recorded, at.x, at.y, yaw))
+    messages.odometry.append((stamp_of(message), recorded, *seen_from_above(matrix)))
+    messages.frame = clean_name(message.header.frame_id)
     messages.base = clean_name(message.child_frame_id) or messages.base
 
 

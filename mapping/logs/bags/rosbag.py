@@ -1,6 +1,7 @@
 """Recorded runs in rosbag 1, rosbag 2 and MCAP files, through the optional ``rosbags``."""
 
 import contextlib
+import math
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
@@ -25,7 +26,14 @@ from closedrooms.mapping.logs.bags.bag_messages import (
 )
 from closedrooms.mapping.logs.bags.bag_options import BagOptions
 from closedrooms.mapping.logs.bags.bag_scans import ranges_of, scan_of, sector_of, sweep_of
-from closedrooms.mapping.logs.bags.transform_tree import Mount, TransformTree, clean_name
+from closedrooms.mapping.logs.bags.transform_tree import (
+    CORRECTED_FRAMES,
+    LEVEL,
+    Mount,
+    TransformTree,
+    clean_name,
+    last_name,
+)
 from closedrooms.mapping.logs.clocks import Times, forward, scan_and_odometry_times
 from closedrooms.mapping.logs.recorded_odometry import bridge_jumps, jump_remarks, odometry_at
 from closedrooms.mapping.logs.recorded_run import RecordedRun
@@ -210,14 +218,18 @@ def _motion(
     moving = messages.tree.odometry(lidar)
     # Simulators and drivers without wheels publish an odometry that stands still beside transforms that move.
     stands = options.odometry_topic is None and len(odometry) > 0 and not np.ptp(odometry[:, 2:], axis=0).any()
-    if len(odometry) and not (stands and moving is not None and np.ptp(moving.track[:, 2:], axis=0).any()):
+    better = moving is not None and bool(np.ptp(moving.track[:, 2:], axis=0).any())
+    outside = last_name(messages.frame).startswith(CORRECTED_FRAMES) and options.odometry_topic is None
+    if len(odometry) and not (better and (stands or outside)):
+        told = Remark(action="guessed", what="odometry", why=f"poses in {messages.frame} are taken for it")
         base = messages.base or messages.tree.base_of(lidar)
         if messages.base or base is None:
-            return odometry, base, []
+            return odometry, base, [told] if outside else []
         why = f"the odometry does not say what it moves; taken to be {base}"
         return odometry, base, [Remark(action="guessed", what="frame of the robot", why=why)]
     if moving is not None:
         what = "nav_msgs/Odometry never changes" if stands else "no nav_msgs/Odometry"
+        what = f"nav_msgs/Odometry holds poses in {messages.frame}" if outside and len(odometry) else what
         why = f"{what}; taken from the transforms {moving.frame} to {moving.base}"
         return moving.track, moving.base, [Remark(action="guessed", what="odometry", why=why)]
     if options.odometry_topic is not None:
@@ -250,4 +262,9 @@ def _mounts(
         if frame and found is not None and found != clean_name(frame):
             why = f"{frame} is not among the transforms; taken to be {found}"
             remarks.append(Remark(action="guessed", what="frame", why=why))
-    return {frame: tree.mount(base or "", frame) for frame in frames}, remarks
+    mounts = {frame: tree.mount(base or "", frame) for frame in frames}
+    for frame, mount in mounts.items():
+        if mount.tilt > LEVEL:
+            why = f"{frame} is tilted by {math.degrees(mount.tilt):.0f} degrees; taken to be level"
+            remarks.append(Remark(action="guessed", what="mounting", why=why))
+    return mounts, remarks

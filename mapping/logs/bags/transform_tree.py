@@ -17,6 +17,8 @@ ODOMETRY_FRAMES = ("odom", "odometry")
 """What the name of a frame begins with that drifts with the odometry (REP-105)."""
 CORRECTED_FRAMES = ("map", "world", "earth", "vicon", "mocap")
 """Frames that do not drift: poses in them were corrected or measured from outside."""
+LEVEL = math.radians(3.0)
+"""Tilt of a lidar up to which there is nothing to say: 10 m away its sweep is half a metre off."""
 STEADY, STEADY_ANGLE = 0.02, 0.02
 """Change ([m], [rad]) up to which a transform on /tf counts as constant."""
 MOST_TILT = math.radians(15.0)
@@ -25,10 +27,17 @@ MOST_TILT = math.radians(15.0)
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """Mounting of a lidar: its pose in the plane of the robot, and whether its z axis points down."""
+    """Mounting of a lidar.
+
+    Attributes:
+        pose: In the plane of the robot.
+        upside_down: Its z axis points down.
+        tilt: From level [rad].
+    """
 
     pose: Pose2
     upside_down: bool
+    tilt: float = 0.0
 
 
 @dataclass(slots=True)
@@ -154,12 +163,12 @@ class TransformTree:
                 expected="one on /tf_static or /tf, or --mount X Y YAW",
             )
         matrix = found[goal]
-        if abs(matrix[2, 2]) < math.cos(MOST_TILT):
-            tilt = math.degrees(math.acos(min(1.0, abs(matrix[2, 2]))))
+        tilt = math.acos(min(1.0, abs(matrix[2, 2])))
+        if tilt > MOST_TILT:
             raise InvalidInputError(
-                f"{lidar} tilted by {tilt:.0f} degrees", expected="a level lidar, or --mount X Y YAW"
+                f"{lidar} tilted by {math.degrees(tilt):.0f} degrees", expected="a level lidar, or --mount X Y YAW"
             )
-        return Mount(Pose2(*_planar(matrix)), upside_down=bool(matrix[2, 2] < 0.0))
+        return Mount(Pose2(*_planar(matrix)), bool(matrix[2, 2] < 0.0), tilt)
 
     def _joined(self, start: str, goal: str) -> bool:
         """Check whether moving transforms lead there too."""
@@ -203,10 +212,13 @@ class TransformTree:
             # Wheels and joints move too, below the robot: a frame that the robot moves in lies above it or is named so.
             if last_name(outside).startswith(CORRECTED_FRAMES) or (inverted and not _is_odometry(outside)):
                 continue
-            track = np.array(self._links[parent, child].track)
+            link = self._links[parent, child]
+            track = np.array(link.track)
             if inverted:
                 for row in track:
                     row[2:] = Pose2(*row[2:]).inverse().as_tuple()
+            elif link.matrix[2, 2] < 0.0:
+                track[:, 3:] *= -1.0  # see seen_from_above
             return TransformOdometry(outside, child if not inverted else parent, track)
         return None
 
@@ -251,6 +263,12 @@ def transform_matrix(
             [0.0, 0.0, 0.0, 1.0],
         ]
     )
+
+
+def seen_from_above(matrix: FloatArray) -> tuple[float, float, float]:
+    """Project the pose of a robot, shape (4, 4); in a frame whose z axis points down (NED) it would be mirrored."""
+    x, y, yaw = _planar(matrix)
+    return (x, -y, -yaw) if matrix[2, 2] < 0.0 else (x, y, yaw)
 
 
 def _planar(matrix: FloatArray) -> tuple[float, float, float]:

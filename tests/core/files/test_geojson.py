@@ -276,3 +276,41 @@ def test_doors_in_degrees_or_centimetres_are_found_out(tmp_path: Path) -> None:
         read_doors(collection(tmp_path / "d", *degrees))
     _, remarks = told(collection(tmp_path / "d", point(0, 0, id="a", width=90), point(3, 0, id="b", width=0.9)))
     assert remarks == ["guessed 1 widths (a): above 10; taken as metres (they look like centimetres)"]
+
+
+def test_states_of_any_form_are_read_and_unknown_ones_told(tmp_path: Path) -> None:
+    left_out = ({"state": "Opened"}, {"state": False}, {"open": True}, {"Open": 1}, {"closed": False}, {"closed": "no"})
+    kept = ({"state": True}, {"state": "Shut"}, {"open": False}, {"closed": True}, {"state": None}, {"state": ""})
+    opened = [point(i, 0, id=f"o{i}", **state) for i, state in enumerate(left_out)]
+    closed = [point(i, 5, id=f"c{i}", **state) for i, state in enumerate(kept)]
+    doors, remarks = told(collection(tmp_path / "d", *opened, *closed))
+    assert [door.id for door in doors] == [f"c{i}" for i in range(len(kept))]
+    assert [remark.partition(" (")[0] for remark in remarks] == ["dropped 6 doors"]
+    doors, remarks = told(collection(tmp_path / "d", point(0, 0, id="a", state="offen"), point(3, 0, id="b")))
+    assert [door.id for door in doors] == ["a", "b"]
+    assert remarks == ["guessed 1 state (a): 'offen' taken as closed"]
+
+
+def test_closed_lines_and_leaves_in_degrees_are_refused(tmp_path: Path) -> None:
+    ring = multi("LineString", [[1, 1], [2, 1], [2, 1.1], [1, 1.1], [1, 1]], id="a")
+    with pytest.raises(InvalidInputError, match="door 'a' is a closed line"):
+        read_doors(collection(tmp_path / "d", ring))
+    leaf = multi("LineString", [[8.68, 49.41], [8.680012, 49.41]], id="a")
+    with pytest.raises(InvalidInputError, match=r"door 'a' of 1.2e-05 m \(degrees\?\)"):
+        read_doors(collection(tmp_path / "d", leaf))
+
+
+@pytest.mark.parametrize(
+    "empty", [{"type": "Point", "coordinates": []}, {"type": "GeometryCollection", "geometries": []}]
+)
+def test_empty_geometries_are_skipped_as_null_ones_are(tmp_path: Path, empty: dict[str, Any]) -> None:
+    feature = {"type": "Feature", "properties": {"id": "x"}, "geometry": empty}
+    doors, remarks = told(collection(tmp_path / "d", feature, point(0, 0, id="a")))
+    assert [door.id for door in doors] == ["a"]
+    assert remarks == ["dropped feature: it has no geometry (null or empty)"]
+
+
+@pytest.mark.parametrize(("given", "doors"), [('[ "d01", "d02" ]', ("d01", "d02")), (None, ()), (["d01"], ("d01",))])
+def test_doors_of_rooms_are_read_from_tables_without_lists(tmp_path: Path, given: Any, doors: tuple[str, ...]) -> None:
+    room = multi("Polygon", [[[0, 0], [1, 0], [1, 1], [0, 0]]], doors=given)
+    assert read_rooms(collection(tmp_path / "r", room))[0].doors == doors

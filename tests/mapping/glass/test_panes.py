@@ -8,8 +8,8 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams, clean
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.glass.panes import before_glass
-from closedrooms.mapping.glass.scan_view import View, faces
+from closedrooms.mapping.glass.before_glass import before_glass
+from closedrooms.mapping.glass.scan_view import Views, faces
 from closedrooms.mapping.mapper import Mapper
 from tests.conftest import SegmentWorld
 
@@ -135,6 +135,28 @@ def test_a_pane_that_was_seen_from_the_front_in_part_goes_on_to_the_wall() -> No
     assert occupied_share(grid, map_T_world, PANE) > 0.95
 
 
+@pytest.mark.parametrize("short", [False, True])
+def test_a_pane_that_was_found_when_all_was_seen_stays_as_it_is_while_the_robot_goes_on(short: bool) -> None:
+    # Of the long one only the left end was met.
+    pane = (3.7, 6.0, 4.3, 6.0) if short else PANE
+    world = GlassWorld(walls_beside(pane) if short else HALL, pane)
+    route = ROUTE if short else [(7.0, 3.0), (3.4, 3.0), (3.4, 5.2), (3.4, 3.0)]
+    drive = world.drive([*route, (7.0, 3.0), (1.0, 1.0)], beams=720)
+    turn = len(world.drive(route, beams=720).scans)
+    mapper = Mapper()
+    for scan, odometry in zip(drive.scans[:turn], drive.odometry[:turn], strict=True):
+        mapper.process(scan, Pose2(*odometry))
+    mapper.finish()
+    mapper.grid()
+    found = mapper.panes
+    assert len(found) == 1
+    for scan, odometry in zip(drive.scans[turn:], drive.odometry[turn:], strict=True):
+        mapper.process(scan, Pose2(*odometry))
+        mapper.grid()
+        assert len(mapper.panes) == 1
+        assert np.abs(mapper.panes - found).max() < 0.1
+
+
 def test_a_doorway_beside_a_pane_that_the_robot_drove_through_stays_open() -> None:
     # At an angle, so that nothing else tells that there is no glass.
     pane = (3.0, 6.0, 4.0, 6.0)
@@ -190,9 +212,10 @@ def test_somebody_who_stood_in_a_doorway_is_no_pane() -> None:
 
 @pytest.mark.parametrize("lateral", [0.0, 0.12])
 def test_a_view_tells_how_far_beams_went_beyond_a_place(office: SegmentWorld, lateral: float) -> None:
-    view = View(clean(office.scan(Pose2(6.0, 1.0, 0.0), beams=720), max_range=25.0))
+    views = Views()
+    views.add(clean(office.scan(Pose2(6.0, 1.0, 0.0), beams=720), max_range=25.0))
     places = np.array([[3.0, 0.0], [5.95, 0.0], [6.6, 0.0]])
-    assert view.beyond(places, lateral) == pytest.approx([3.0, 0.05, -0.6], abs=0.03)
+    assert views.beyond(np.zeros(3, dtype=np.int64), places, lateral) == pytest.approx([3.0, 0.05, -0.6], abs=0.03)
 
 
 def test_a_view_looks_at_all_beams_beside_a_place_and_no_others(office: SegmentWorld) -> None:
@@ -201,7 +224,9 @@ def test_a_view_looks_at_all_beams_beside_a_place_and_no_others(office: SegmentW
     draws = np.random.default_rng(3).uniform(size=(3, 200))
     bearing, distance, lateral = np.pi * (1.8 * draws[0] - 0.9), 1.0 + 3.0 * draws[1], 0.02 + 0.2 * draws[2]
     places = distance[:, None] * np.column_stack((np.cos(bearing), np.sin(bearing)))
-    beyond = View(beams).beyond(places, lateral)
+    views = Views()
+    views.add(beams)
+    beyond = views.beyond(np.zeros(200, dtype=np.int64), places, lateral)
     off, step = np.abs(bearings - bearing[:, None]), 2.0 * np.pi / len(bearings)
     nearest_in = [np.where(off <= (lateral / distance)[:, None] + slack, ranges, np.inf).min(axis=1) - distance
                   for slack in (-step, 2.0 * step)]  # fmt: skip

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from closedrooms.mapping.beams import Beams
-from closedrooms.mapping.glass.scan_view import FACE_GAP, FACE_REACH, View, faces
+from closedrooms.mapping.glass.scan_view import FACE_GAP, FACE_REACH, LATERAL, TURN, Views, faces, stretches
 
 
 def circle(
@@ -15,6 +15,18 @@ def circle(
     angles = -view / 2 + view / beams * np.arange(beams)
     outline = np.array(origin) + radius * np.column_stack((np.cos(angles), np.sin(angles)))
     return Beams(outline, outline, np.array(origin))
+
+
+class View:
+    """One scan after another one, asked about places in the robot's frame."""
+
+    def __init__(self, beams: Beams) -> None:
+        self._views, self._origin = Views(), beams.origin
+        self._views.add(circle(1.0, beams=7))
+        self._views.add(beams)
+
+    def beyond(self, points: np.ndarray, lateral: np.ndarray | float = LATERAL) -> np.ndarray:
+        return self._views.beyond(np.ones(len(points), dtype=np.int64), points - self._origin, lateral)
 
 
 @pytest.mark.parametrize("origin", [(0.0, 0.0), (2.0, -1.0)])
@@ -70,6 +82,56 @@ def test_sectors_without_a_measurement_are_out_of_view() -> None:
     angles = -math.pi + math.tau / 720 * np.array([98, 99, 104, 150, 195, 200, 300])
     found = view.beyond(2.0 * np.column_stack((np.cos(angles), np.sin(angles))), 0.01)
     assert np.isnan(found).tolist() == [False, False, True, True, True, False, False]
+
+
+def test_many_scans_asked_at_once_say_what_each_says() -> None:
+    rng = np.random.default_rng(2)
+    scans = [circle(3.0), circle(2.0, beams=40), circle(4.0, beams=1), circle(5.0, view=2.0), circle(0.0)]
+    scans += [Beams(ends, ends, np.zeros(2)) for ends in (circle(1.0).outline * rng.uniform(1, 5, (720, 1)),)]
+    views = Views()
+    for beams in scans:
+        views.add(beams)
+    assert len(views) == len(scans)
+    numbers, offsets = rng.integers(0, len(scans), 500), rng.uniform(-5.0, 5.0, (500, 2))
+    lateral = rng.uniform(0.0, 0.3, 500)
+    found = views.beyond(numbers, offsets, lateral)
+    assert np.isfinite(found).any()
+    for number, offset, aside, said in zip(numbers, offsets, lateral, found, strict=True):
+        alone = View(scans[number]).beyond(offset[None], np.array([aside]))[0]
+        assert said == pytest.approx(alone, abs=1e-9, nan_ok=True)
+    assert len(Views().beyond(numbers[:0], offsets[:0])) == 0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_every_segment_that_a_beam_crosses_is_among_those_that_may_be_and_few_others_are(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    angles = np.sort(rng.uniform(-math.pi, math.pi, 500))
+    ranges = 1.0 + 4.0 * (np.sin(3.0 * angles + seed) > 0.0) + rng.uniform(0.0, 0.2, 500)
+    outline = ranges[:, None] * np.column_stack((np.cos(angles), np.sin(angles)))
+    views = Views()
+    views.add(circle(20.0))
+    views.add(Beams(outline, outline, np.zeros(2)))
+    segments = rng.uniform(-6.0, 6.0, (300, 1, 2)) + rng.uniform(-1.5, 1.5, (300, 2, 2))
+    possible = views.may_cross(np.array([1]), segments[None])[0]
+    a, b = segments[:, None, 0], segments[:, None, 1]
+    sides = [outline[:, 0] * p[..., 1] - outline[:, 1] * p[..., 0] for p in (a, b)]
+    along = b - a
+    # The beam to p meets the line through a and b at t p.
+    t = (a[..., 0] * along[..., 1] - a[..., 1] * along[..., 0]) / (
+        outline[:, 0] * along[..., 1] - outline[:, 1] * along[..., 0]
+    )
+    crossed = ((sides[0] * sides[1] < 0.0) & (t > 0.0) & (t < 1.0)).any(axis=1)
+    assert 30 < crossed.sum() < 270
+    assert possible[crossed].all()
+    assert np.count_nonzero(possible & ~crossed) < 0.3 * np.count_nonzero(~crossed)
+
+
+def test_ranges_of_numbers_stand_one_after_the_other() -> None:
+    owners, numbers, firsts = stretches(np.array([4, 2, 9, 0]), np.array([6, 2, 10, 3]))
+    assert owners.tolist() == [0, 0, 2, 3, 3, 3]
+    assert numbers.tolist() == [4, 5, 9, 0, 1, 2]
+    assert firsts.tolist() == [0, 2, 2, 3]
+    assert math.tau < TURN
 
 
 def wall(angle: float, distance: float = 2.0, spread: float = 0.7, count: int = 61, shift: float = 0.0) -> np.ndarray:

@@ -95,6 +95,7 @@ class BagMaker:
         y: float = 0.0,
         yaw: float = 0.0,
         *,
+        frame: str = "odom",
         child: str = "base_link",
         topic: str = "/odom",
         recorded: float | None = None,
@@ -105,7 +106,7 @@ class BagMaker:
         pose = self._make("geometry_msgs/msg/Pose", self._make("geometry_msgs/msg/Point", x, y, 0.0), turned)
         message = self._make(
             "nav_msgs/msg/Odometry",
-            self._header(stamp, "odom"),
+            self._header(stamp, frame),
             child,
             self._make("geometry_msgs/msg/PoseWithCovariance", pose, np.zeros(36)),
             self._make(

@@ -221,6 +221,35 @@ def test_a_field_of_view_that_nothing_says_is_told_as_a_guess(tmp_path: Path) ->
     assert told(run) == [("guessed", "fields of view", 1)]
 
 
+def around_a_room(beams: int, *, view: float = 2.0 * math.pi) -> list[str]:
+    """Scans of a room of 8 x 5 m out of which the robot walks a metre, centred ahead."""
+    angles = (np.arange(beams) - beams / 2.0) * view / beams
+    lines = []
+    for i in range(40):
+        x = 0.5 + 0.025 * i
+        towards = np.maximum([np.cos(angles), -np.cos(angles), np.sin(angles), -np.sin(angles)], 1e-9)
+        walls = np.array([8.0 - x, x, 3.5, 1.5])[:, None] / towards
+        ranges = " ".join(f"{r:.3f}" for r in np.min(walls, axis=0))
+        lines.append(flaser(x, stamp=1.0 + i, ranges=ranges))
+    return lines
+
+
+def test_scans_whose_ends_meet_go_all_around(tmp_path: Path) -> None:
+    run = read_run(write(tmp_path, *around_a_room(360)))
+    assert (run.scans[0].angle_min, run.scans[0].angle_increment) == (-math.pi, pytest.approx(math.pi / 180))
+    assert told(run) == [("guessed", "fields of view", 40)]
+    half = read_run(write(tmp_path, *around_a_room(360, view=math.pi)))
+    assert half.scans[0].angle_increment == pytest.approx(math.pi / 360)
+    stated = read_run(write(tmp_path, "PARAM laser_front_laser_fov 3.1415926 host 0", *around_a_room(360)))
+    assert stated.scans[0].angle_increment == pytest.approx(math.pi / 360)
+
+
+def test_ranges_in_centimetres_are_refused(tmp_path: Path) -> None:
+    ranges = " ".join(str(150 + 2 * k) for k in range(180))
+    with pytest.raises(InvalidInputError, match=r"half of the ranges are above 329 \(centimetres\?\)"):
+        read_run(write(tmp_path, flaser(0.0, ranges=ranges), flaser(0.5, ranges=ranges)))
+
+
 def test_raw_scans_take_the_odometry_of_their_time(tmp_path: Path) -> None:
     lines = []
     for i in range(10):
@@ -323,6 +352,17 @@ def test_poses_that_a_writer_left_zero_are_none(tmp_path: Path) -> None:
     run = read_run(write(tmp_path, *lines))
     assert run.odometry[:, 0] == pytest.approx(0.2 * np.arange(10))
     assert run.reference is None
+
+
+def test_a_rear_laser_sits_where_its_own_parameters_say_and_looks_back(tmp_path: Path) -> None:
+    lines = [odom(0.2 * i, clock=1.0 + i) + "\n" + laser_line("RAWLASER2", stamp=1.0 + i) for i in range(10)]
+    settings = "PARAM robot_frontlaser_offset 0.3 host 0", "PARAM robot_rearlaser_offset -0.25 host 0"
+    assert read_run(write(tmp_path, *settings, *lines)).scans[0].robot_T_sensor == (-0.25, 0.0, pytest.approx(-math.pi))
+    run = read_run(write(tmp_path, *lines))
+    assert run.scans[0].robot_T_sensor == (0.0, 0.0, pytest.approx(-math.pi))
+    assert told(run) == [("guessed", "mounting", 1)]
+    degrees = "PARAM robot_rearlaser_angular_offset 90 host 0"
+    assert read_run(write(tmp_path, degrees, *lines)).scans[0].robot_T_sensor[2] == pytest.approx(math.pi / 2)
 
 
 def test_a_reset_of_the_odometry_is_bridged_and_counted(tmp_path: Path) -> None:

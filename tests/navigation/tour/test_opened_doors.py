@@ -6,7 +6,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.beams import clean
 from closedrooms.mapping.config import MapperConfig
-from closedrooms.mapping.glass.panes import before_glass
+from closedrooms.mapping.glass.before_glass import before_glass
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
 from closedrooms.mapping.mapper import Mapper

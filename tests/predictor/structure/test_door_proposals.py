@@ -255,7 +255,8 @@ def test_candidates_look_at_the_cells_around_them_and_not_at_the_whole_map(monke
     propose_doors(one)
     looks = len(whole)
     whole.clear()
-    beside = np.concatenate([one.cells] * 6, axis=1)
+    # Every other one stands back: side by side in one line they would be a row of rooms.
+    beside = np.concatenate([one.cells, np.roll(one.cells, 30, axis=0)] * 3, axis=1)
     six = OccupancyGrid(GridFrame(RESOLUTION, -5.0, -5.0, SIZE, 6 * SIZE), beside)
     assert len(propose_doors(six)) == 6
     assert len(whole) == looks

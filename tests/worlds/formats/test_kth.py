@@ -91,6 +91,8 @@ def test_doors_are_as_wide_as_drawn_within_what_a_door_can_be(tmp_path: Path, pi
     plan = two_rooms(tmp_path, 80 - pixels / 2, 80 + pixels / 2)
     assert plan.doors[0].width == pytest.approx(width)
     assert plan.doors[0].midpoint == pytest.approx((4.0, -4.0))
+    changed = ["drawn narrower" in remark.why for remark in plan.remarks if remark.what == "doors"]
+    assert any(changed) == (abs(pixels * 0.05 - width) > 1e-9)
 
 
 def test_a_door_on_one_contour_only_is_told(tmp_path: Path) -> None:

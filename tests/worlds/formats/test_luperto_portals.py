@@ -62,7 +62,13 @@ B = space("b", box(0, 40, 80, 80))
         (scale(10, 50, "CM"), 0.05),
         (scale(10, 2, " m "), 0.2),
         (scale(10, 500, "mm"), 0.05),
-        (scale(10, 5, "inch"), None),
+        (scale(10, 5, "inch"), 0.0127),
+        (scale(10, 5, "Inches"), 0.0127),
+        (scale(10, 5, "in"), 0.0127),
+        (scale(10, 5, "feet"), 0.1524),
+        (scale(10, 5, "meters"), 0.5),
+        (scale(10, 50, "centimetre"), 0.05),
+        (scale(10, 5, "px"), None),
         (scale(0, 5), None),
         (scale(10, -5), None),
         (scale(10, "x"), None),
@@ -71,7 +77,9 @@ B = space("b", box(0, 40, 80, 80))
 )
 def test_the_scale_is_a_length_in_pixels(tmp_path: Path, size: str, metres: float | None) -> None:
     if metres is None:
-        with pytest.raises(InvalidInputError, match="expected a length in cm and pixels above 0"):
+        with pytest.raises(
+            InvalidInputError, match="expected a length in mm, cm, m, inches or feet, and pixels above 0"
+        ):
             read(tmp_path, A, B, size=size)
     else:
         plan = read(tmp_path, A, B, size=size)

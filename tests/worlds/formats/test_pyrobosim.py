@@ -172,3 +172,23 @@ def test_hallways_of_pyrobosim_before_2_0_say_from_and_to(tmp_path: Path) -> Non
     plan = read(tmp_path, rooms, [{"from": "a", "to": "b", "width": 0.9}])
     assert len(plan.doors) == 1
     assert plan.remarks == ()
+
+
+def test_a_room_inside_another_one_is_cut_out_of_it_and_one_on_another_refused(tmp_path: Path) -> None:
+    hall = {"room_start": "hall", "room_end": "closet", "width": 0.9}
+    plan = read(tmp_path, [room("hall", 8, 6), room("closet", 2, 2, pose=[1, 0])], [hall])
+    assert {room.label: pytest.approx(room_interior(plan, room.id).area) for room in plan.rooms} == {
+        "hall": 48.0 - 2.4 * 2.4,
+        "closet": 4.0,
+    }
+    (door,) = plan.doors
+    assert set(door.rooms) == {"r00", "r01"}
+    with pytest.raises(InvalidInputError, match="lies on other rooms"):
+        read(tmp_path, [room("a", 4, 3), room("b", 4, 3)], [])
+
+
+def test_no_wall_is_missed_where_a_hallway_begins_at_a_corner(tmp_path: Path) -> None:
+    rooms = [room("a", 4, 4), room("b", 4, 4, pose=[5, 5])]
+    plan = read(tmp_path, rooms, [{"room_start": "a", "room_end": "b", "width": 0.9}])
+    assert (len(plan.doors), len(plan.openings)) == (1, 1)
+    assert not [remark for remark in plan.remarks if remark.what == "walls"]

@@ -164,6 +164,9 @@ def test_measurements_that_disagree_or_stand_on_another_level_are_said(tmp_path:
     data = building(coordinate_system="reference_image")
     data["levels"]["L1"]["measurements"] += [[2, 4, {"distance": [3, 6.0]}]]
     assert ["measurements say 1 to 1.2 m a pixel" in remark.why for remark in read(tmp_path, data).remarks] == [True]
+    # One that was mistyped does not count beside two that agree.
+    data["levels"]["L1"]["measurements"] += [[0, 1, {"distance": [3, 1000.0]}]]
+    assert max(room.polygon.bounds[2] for room in read(tmp_path, data).rooms) == pytest.approx(12.0)
     other = building()["levels"]["L1"]
     del data["levels"]["L1"]["measurements"]
     data["levels"]["up"] = other

@@ -5,7 +5,13 @@ import shapely
 from shapely.geometry import Polygon, box
 
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.formats.room_outlines import clean_outlines, hull_areas, outline_lines, repaired
+from closedrooms.worlds.formats.room_outlines import (
+    clean_outlines,
+    cut_out_inner_rooms,
+    hull_areas,
+    outline_lines,
+    repaired,
+)
 
 BOW = Polygon([(0, 0), (4, 4), (4, 0), (0, 3)])
 
@@ -104,3 +110,21 @@ def test_where_two_rooms_claim_the_same_floor_neither_wall_counts() -> None:
 def test_areas_of_broken_outlines_are_those_of_their_hulls() -> None:
     corners = [[(0.0, 0.0), (4.0, 3.0), (4.0, 0.0), (0.0, 3.0)], [(0.0, 0.0), (1.0, 1.0)], [(0, 0), (2, 0), (0, 2)]]
     assert hull_areas(corners) == pytest.approx([12.0, 2.0])
+
+
+def test_a_room_inside_another_one_is_cut_out_of_it_and_told() -> None:
+    remarks: list[Remark] = []
+    hall, shaft = clean_outlines([box(0, 0, 8, 6), box(3, 2, 5, 4)], remarks, names=["hall", "shaft"])
+    assert hall is not None
+    assert shaft is not None
+    assert hall.area == pytest.approx(44.0)
+    assert shaft.area == pytest.approx(4.0)
+    assert kinds(remarks) == [("repaired", "rooms", ("shaft",), False)]
+
+
+def test_of_two_outlines_of_one_room_neither_is_inside_the_other() -> None:
+    outlines = [box(0, 0, 4, 3), box(0, 0, 4, 2.9), box(4, 0, 8, 3)]
+    assert cut_out_inner_rooms(outlines) == (outlines, [])
+    # One that would cut its surroundings in two stays as it is.
+    across = [box(0, 0, 8, 6), box(3, 0, 4, 6)]
+    assert cut_out_inner_rooms(across) == (across, [])

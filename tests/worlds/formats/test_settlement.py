@@ -11,7 +11,7 @@ from shapely.geometry import LineString, box
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.formats.settlement import Source, merged, no_rooms, settle
-from closedrooms.worlds.plan import FloorPlan, Opening, PlanRoom, Wall
+from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom, Wall
 
 FILE = Path("floor.xml")
 
@@ -177,3 +177,24 @@ def test_a_plan_that_fails_for_its_scale_says_so(small: FloorPlan) -> None:
         settle(doubled, [], Source(door_widths=[0.09]), FILE)
     assert str(plain.value).count(str(FILE)) == 1
     assert "scale" not in str(plain.value)
+
+
+@pytest.mark.parametrize(
+    ("before", "blocked"),
+    [
+        (((0.0, 3.3), (4.0, 3.3)), True),  # a wall along the whole wall, 0.2 m clear
+        (((0.0, 3.6), (4.0, 3.6)), False),  # a robot turns off between the two
+        (((1.3, 3.2), (1.4, 3.2)), False),  # a post: there is a way around it
+    ],
+)
+def test_a_door_that_another_wall_stands_before_is_no_door(
+    before: tuple[tuple[float, float], tuple[float, float]], blocked: bool
+) -> None:
+    rooms = (PlanRoom("r0", "hall", box(0, 0, 4, 3)), PlanRoom("r1", "office", box(0, 3, 4, 6)))
+    sides = [((0, 0), (4, 0)), ((4, 0), (4, 6)), ((4, 6), (0, 6)), ((0, 6), (0, 0)), ((0, 3), (4, 3)), before]
+    walls = tuple(Wall(f"w{n}", side, 0.1) for n, side in enumerate(sides))
+    door = PlanDoor("d0", ((0.9, 3.0), (1.8, 3.0)), ("r0", "r1"), opens_into="r1")
+    plan = settle(FloorPlan("a", rooms, walls, (door,)), [], Source(doors=1), FILE)
+    assert plan.doors == (() if blocked else (door,))
+    told = [(remark.names, remark.loss) for remark in plan.remarks if remark.what == "doors"]
+    assert told == ([(("d0",), True)] if blocked else [])

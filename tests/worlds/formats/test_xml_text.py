@@ -34,3 +34,26 @@ def test_names_are_found_in_any_case_and_namespace_at_their_level(tmp_path: Path
 
 def test_numbers_are_written_to_five_decimals_without_minus_zero() -> None:
     assert number_text(1.0, -0.000001, 2.1234567) == "1 0 2.12346"
+
+
+@pytest.mark.parametrize(
+    ("declared", "encoding"),
+    [("ISO-8859-1", "iso-8859-1"), ("windows-1252", "cp1252"), ("UTF-16", "utf-16"), ("UTF-8", "utf-8-sig"),
+     ("ISO-8859-1", "utf-8"), (None, "utf-8")],
+)  # fmt: skip
+def test_a_file_is_read_in_the_encoding_that_it_declares(tmp_path: Path, declared: str | None, encoding: str) -> None:
+    path = tmp_path / "a.xml"
+    head = f'<?xml version="1.0" encoding="{declared}"?>' if declared else ""
+    path.write_bytes(f"{head}<r><a>Büro</a><b x='é'/></r>".encode(encoding))
+    root = parse_xml(path, what="a plan")
+    assert [len(inner) for inner in (children(root, "a"), children(root, "b"))] == [1, 1]
+    if (declared, encoding) != ("ISO-8859-1", "utf-8"):
+        assert (text(child(root, "a")), attribute(child(root, "b"), "x")) == ("Büro", "é")
+
+
+@pytest.mark.parametrize("head", ["", '<?xml version="1.0" encoding="UTF-8"?>', '<?xml version="1.0" encoding="x-y"?>'])
+def test_bytes_that_are_no_text_of_the_declared_encoding_are_refused(tmp_path: Path, head: str) -> None:
+    path = tmp_path / "a.xml"
+    path.write_bytes(head.encode() + b"<r>B\xfcro</r>")
+    with pytest.raises(InvalidInputError, match="broken XML"):
+        parse_xml(path, what="a plan")

@@ -356,6 +356,49 @@ def test_different_clocks_are_said(new_bag: Bags) -> None:
     assert "88.0 s apart" in str(run.remarks[0])
 
 
+@pytest.mark.parametrize(("ahead", "laid"), [(0.6, True), (0.2, False)])
+def test_a_lidar_whose_clock_is_ahead_of_the_recorder_is_put_back(new_bag: Bags, ahead: float, laid: bool) -> None:
+    run = stamped(new_bag(), lambda i: right(i) + ahead, right)
+    assert (("repaired", "stamps") in told(run)) == laid
+    late = 0.0 if laid else ahead
+    count = len(run.scans)
+    assert run.odometry[0, 0] == pytest.approx(0.5 * late, abs=0.011)
+    assert np.diff(run.odometry[: count - 5, 0]) == pytest.approx(np.full(count - 6, 0.05), abs=1e-6)
+
+
+# Frames of several robots, and frames upside down.
+
+
+def test_transforms_of_another_namespace_are_another_robots(any_bag: Any) -> None:
+    any_bag.transform("base_link", "laser", (0.3, 0.0, 0.0), topic="/one/tf_static")
+    any_bag.transform("base_link", "laser", (-0.2, 0.0, 0.0), (0.0, 0.0, 3.0), stamp=100.05, topic="/two/tf_static")
+    for i in range(11):
+        any_bag.scan(100.0 + 0.1 * i, topic="/one/scan").odometry(100.0 + 0.1 * i, 0.05 * i)
+    run = read_run(any_bag.write())
+    assert run.scans[0].robot_T_sensor == pytest.approx((0.3, 0.0, 0.0))
+    assert told(run) == [("dropped", "transforms")]
+
+
+def test_odometry_in_a_frame_whose_z_axis_points_down_is_not_mirrored(new_bag: Bags) -> None:
+    bag, plain = new_bag().transform("base_link", "laser"), new_bag().transform("base_link", "laser")
+    for i in range(11):
+        stamp, x, y, yaw = 100.0 + 0.1 * i, 0.05 * i, 0.01 * i, 0.03 * i
+        bag.transform("odom_ned", "base_link", (x, -y, 0.0), (math.pi, 0.0, -yaw), stamp=stamp, topic="/tf").scan(stamp)
+        plain.transform("odom", "base_link", (x, y, 0.0), (0.0, 0.0, yaw), stamp=stamp, topic="/tf").scan(stamp)
+    assert read_run(bag.write()).odometry == pytest.approx(read_run(plain.write()).odometry)
+
+
+def test_corrected_poses_give_way_to_transforms_of_the_odometry(new_bag: Bags) -> None:
+    bag = new_bag().transform("base_link", "laser")
+    for i in range(11):
+        stamp = 100.0 + 0.1 * i
+        bag.transform("odom", "base_link", (0.05 * i, 0.0, 0.0), stamp=stamp, topic="/tf").scan(stamp)
+        bag.odometry(stamp, 0.07 * i, frame="map")
+    run = read_run(bag.write())
+    assert run.odometry[:, 0] == pytest.approx(0.05 * np.arange(11))
+    assert told(run) == [("guessed", "odometry")]
+
+
 # Jumps of the odometry.
 
 

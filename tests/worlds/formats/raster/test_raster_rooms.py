@@ -159,3 +159,39 @@ def test_gaps_are_the_cells_under_a_doors_piece_of_wall() -> None:
     expected[0:5, 0] = True
     assert np.array_equal(marked, expected)
     assert not mark_gaps([], frame).any()
+
+
+@pytest.mark.parametrize(("short", "kept"), [(0.0, True), (0.1, True), (0.2, True), (0.45, False)])
+def test_a_door_that_ends_shortly_before_its_jambs_parts_its_rooms_all_the_same(short: float, kept: bool) -> None:
+    grid = floor(gap=(15, 34))
+    y = wall_at()[1]
+    door = ClosedDoor("d", (2.35, y), ((1.4 + short, y), (3.3 - short, y)))
+    rooms, doors, frames, beside = find_rooms_and_doors(grid, [door], [])
+    assert len(rooms) == (2 if kept else 1)
+    assert len(doors) == kept
+    if kept:
+        # What the door leaves of the gap is wall.
+        assert grid.free[31, 15:34].all()
+        assert (beside | mark_gaps(frames, grid.frame))[31, 15:34].all()
+
+
+@pytest.mark.parametrize(("door", "rooms"), [(False, 2), (True, 3)])
+def test_free_space_all_around_a_building_is_no_room_unless_a_door_leads_there(door: bool, rooms: int) -> None:
+    inner = floor()
+    cells = np.full((inner.frame.rows + 22, inner.frame.cols + 22), FREE, dtype=np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = UNKNOWN
+    cells[11:-11, 11:-11] = inner.cells
+    cells[11, 30:39] = FREE if door else OCCUPIED
+    grid = OccupancyGrid(GridFrame(CELL, -1.2, -1.2, *cells.shape), cells)
+    y = wall_at()[1]
+    given = [ClosedDoor("d", (2.35, y), ((1.9, y), (2.8, y)))]
+    given += [ClosedDoor("out", (2.25, -0.05), ((1.8, -0.05), (2.7, -0.05)))] * door
+    remarks: list[Remark] = []
+    found, doors, _, _ = find_rooms_and_doors(grid, given, remarks)
+    assert (len(found), len(doors)) == (rooms, 1 + door)
+    assert [(remark.action, remark.what) for remark in remarks] == ([] if door else [("dropped", "free area")])
+    # A map whose only free area reaches its edges is that area.
+    cells = np.full((30, 30), FREE, dtype=np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = UNKNOWN
+    found, _, _, _ = find_rooms_and_doors(OccupancyGrid(GridFrame(CELL, 0.0, 0.0, 30, 30), cells), [], [])
+    assert len(found) == 1
