@@ -1,6 +1,5 @@
 """What ``--config`` reads: settings that somebody wrote, or the manifest of an earlier result."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -62,6 +61,8 @@ def _inputs(manifest: Mapping[str, Any]) -> dict[str, Any]:
 def _parsed(path: Path) -> Any:
     if path.suffix.lower() != ".toml":
         return read_json(path, what="settings (JSON or TOML)", max_bytes=MOST_BYTES)
+    import tomllib
+
     try:
         return tomllib.loads(read_text(path, what="settings (TOML)", max_bytes=MOST_BYTES))
     except (ValueError, RecursionError) as error:

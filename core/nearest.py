@@ -1,6 +1,5 @@
 """What was meant by a name that does not exist."""
 
-import difflib
 from collections.abc import Iterable
 
 from closedrooms.core.names import shown
@@ -13,6 +12,8 @@ LONGEST = 80
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """Find the name that was meant; empty where none is near."""
+    import difflib
+
     return next(iter(difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)), "")
 
 
