@@ -3,23 +3,24 @@
     python benchmarks/fitting/fit_confidence.py FIT [FIT ...] [--methods best paper ...] [--every 1] [--held-out MODEL]
 
 FIT are folders of samples, as ``drawn_maps.py`` and ``closedrooms dataset`` write them; a building of another use is
-refused. Drawn maps are a kinder world than those of a robot: the rooms of every folder count the same altogether, and
-``--every`` takes a number for each folder, or one for all. The curve of confidence is fitted on what other buildings
-gave (five folds over groups of buildings), so that a regression that knows its own buildings too well does not pass for
-sure; the curve of cells is fitted on the buildings themselves. For the method ``learned`` MODEL, the folder that
-``closedrooms train`` wrote, names the buildings that its network has not learned from: only those are looked at.
+refused; ``--every`` takes a number for each folder, or one for all. A true room that several maps hide counts once: of
+eight rooms of a floor, ``closedrooms dataset`` makes eight maps that hide 36. The curve of confidence is fitted on what
+other buildings gave (five folds over groups of buildings), so that a regression that knows its own buildings too well
+does not pass for sure; the curve of cells is fitted on the buildings themselves. For the method ``learned`` MODEL, the
+folder that ``closedrooms train`` wrote, names the buildings that its network has not learned from: only those are
+looked at.
 
     python benchmarks/fitting/drawn_maps.py PLANS --use fit --maps 10 --generated 80 --bundled --out DRAWN
     closedrooms dataset PLAN ... --repetitions 2 --max-closed 8 --out RUNS
     python benchmarks/fitting/fit_confidence.py DRAWN RUNS --methods learned --every 6 2 --held-out MODEL
-    python benchmarks/fitting/fit_confidence.py DRAWN RUNS --methods best --every 20 2
+    python benchmarks/fitting/fit_confidence.py DRAWN RUNS --methods best --every 2 2
 """
 
 import argparse
 import itertools
 import json
 import sys
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -64,7 +65,7 @@ class Collected:
     features: list[FloatArray] = field(default_factory=list)
     ious: list[float] = field(default_factory=list)
     groups: list[str] = field(default_factory=list)
-    folders: list[int] = field(default_factory=list)
+    true: list[tuple[str, str]] = field(default_factory=list)
     nearest: list[tuple[float, bool]] = field(default_factory=list)
     cells: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
     variants: dict[str, list[FloatArray]] = field(default_factory=lambda: defaultdict(list))
@@ -93,21 +94,20 @@ def smooth(shares: list[FloatArray]) -> FloatArray:
     return np.asarray(total / total.sum())
 
 
-def learn_rooms(
-    collected: Collected, folder: int, sample: Sample, prediction: Prediction, beliefs: list[Belief]
-) -> None:
+def learn_rooms(collected: Collected, sample: Sample, prediction: Prediction, beliefs: list[Belief]) -> None:
     """Measure features and IoU of every room, and which of its shapes came nearest."""
-    truth = {door: room.polygon for room in sample.rooms for door in room.doors}
+    truth = {door: room for room in sample.rooms for door in room.doors}
     measured = measure_rooms(sample.observed, prediction.rooms, beliefs)
     for room, belief, features in zip(prediction.rooms, beliefs, measured, strict=True):
         if room.doors[0] not in truth:
             continue
-        true = truth[room.doors[0]]
+        hidden = truth[room.doors[0]]
+        true = hidden.polygon
         own = polygon_iou(room.polygon, true)
         collected.features.append(features)
         collected.ious.append(own)
         collected.groups.append(group_of(sample.world))
-        collected.folders.append(folder)
+        collected.true.append((sample.world, hidden.doors[0]))
         others = [polygon_iou(other.polygon, true) for other in belief.alternatives]
         best = max([own, *others])
         for other, iou in zip(belief.alternatives, others, strict=True):
@@ -153,9 +153,8 @@ def fit(collected: Collected, variants: dict[str, FloatArray], counted: int = le
     """Fit the numbers of one method, for which so many of the features of every method count."""
     x, y = np.array(collected.features), np.array(collected.ious)
     x[:, counted : len(NAMES)] = 0.0
-    # Every folder counts the same, a room once on average.
-    sizes = np.bincount(collected.folders)
-    each = len(y) / (np.count_nonzero(sizes) * sizes[collected.folders])
+    seen = Counter(collected.true)
+    each = np.array([1.0 / seen[room] for room in collected.true])
     mean = np.average(x, axis=0, weights=each)
     scale = np.maximum(np.sqrt(np.average((x - mean) ** 2, axis=0, weights=each)), 1e-6)
     model, shifted = Ridge(alpha=RIDGE), (x - mean) / scale
@@ -168,7 +167,7 @@ def fit(collected: Collected, variants: dict[str, FloatArray], counted: int = le
     thought, free = (np.concatenate(values) for values in zip(*collected.cells, strict=True))
     curve = knots(thought[thought >= 0.01], free[thought >= 0.01])
     return {
-        "rooms": len(y),
+        "rooms": len(seen),
         "mean": [round(v, 5) for v in mean.tolist()],
         "weights": [round(v, 5) for v in (model.coef_ / scale).tolist()],
         "intercept": round(float(model.intercept_), 5),
@@ -181,12 +180,12 @@ def fit(collected: Collected, variants: dict[str, FloatArray], counted: int = le
 
 def predictions(
     folders: list[Path], method: str, every: list[int], held_out: set[str] | None
-) -> Iterator[tuple[int, Sample, Prediction]]:
-    """Yield the number of the folder, samples and the raw prediction of a method."""
+) -> Iterator[tuple[Sample, Prediction]]:
+    """Yield samples and the raw prediction of a method."""
     chosen = find_method(method)
     steps = every * len(folders) if len(every) == 1 else every
     lots = [find_samples([folder])[::step] for folder, step in zip(folders, steps, strict=True)]
-    for folder, path in ((number, path) for number, paths in enumerate(lots) for path in paths):
+    for path in itertools.chain(*lots):
         sample = read_sample(path)
         if held_out is not None and group_of(sample.world) not in held_out:
             continue
@@ -194,7 +193,7 @@ def predictions(
             sys.exit(f"{sample.world} is not of the use fit")
         config = chosen.config()
         shared = {"started": Starts(sample).of(config)[0]} if chosen.shares_faces else {}
-        yield folder, sample, chosen.resolved_function(sample.observed, sample.doors, config, **shared)
+        yield sample, chosen.resolved_function(sample.observed, sample.doors, config, **shared)
 
 
 def collect(
@@ -202,26 +201,26 @@ def collect(
 ) -> tuple[Collected, dict[str, FloatArray]]:
     """Collect from every third sample how often each variant is right, from the others how sure to be then."""
     collected = Collected()
-    waiting: list[tuple[int, Sample, Prediction]] = []
+    waiting: list[tuple[Sample, Prediction]] = []
     variants: dict[str, FloatArray] = {}
-    for number, (folder, sample, prediction) in enumerate(predictions(folders, method, every, held_out)):
+    for number, (sample, prediction) in enumerate(predictions(folders, method, every, held_out)):
         if prediction.beliefs or not prediction.rooms:
-            learn_rooms(collected, folder, sample, prediction, list(prediction.beliefs))
+            learn_rooms(collected, sample, prediction, list(prediction.beliefs))
             learn_cells(collected, sample, list(prediction.beliefs))
         elif number % 3 == 0:
             learn_variants(collected, sample, prediction)
         else:
-            waiting.append((folder, sample, replace(prediction, grid=sample.observed)))
+            waiting.append((sample, replace(prediction, grid=sample.observed)))
     everything = [share for shares in collected.variants.values() for share in shares]
     for kind in KINDS:
         variants[kind] = smooth(collected.variants[kind] or everything)
-    for folder, sample, prediction in waiting:
+    for sample, prediction in waiting:
         doors = {door.id: door for door in sample.doors}
         beliefs = [
             RoomVariants(sample.observed, room, doors[room.doors[0]].midpoint).believe(variants[room.kind or "none"])
             for room in prediction.rooms
         ]
-        learn_rooms(collected, folder, sample, prediction, beliefs)
+        learn_rooms(collected, sample, prediction, beliefs)
         learn_cells(collected, sample, beliefs)
     return collected, variants
 
