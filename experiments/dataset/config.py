@@ -14,6 +14,12 @@ from closedrooms.navigation.config import NavigationConfig
 from closedrooms.pipeline.config import NoiseName, named_sim
 from closedrooms.sim.config import SimConfig
 
+# Of what stands in a dataset.
+FORMAT = 1
+SURVEYS = "surveys"
+# Options that say nothing about a sample's content.
+NOT_CONTENT = ("out", "worlds", "workers", "scheduler", "repetitions", "max_closed", "format", "shard_mb")
+
 MapSource = Literal["erased", "simulated"]
 Format = Literal["folders", "shards"]
 # A shard is sent to an object store as a whole, and read into a viewer: Hugging Face asks for at most 5 GB.

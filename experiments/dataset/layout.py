@@ -19,10 +19,8 @@ from closedrooms.core.files.output_folders import MANIFEST, PROGRAM
 from closedrooms.core.files.schema import KEY, SCHEMA, check_schema
 from closedrooms.experiments.columns import make_table
 from closedrooms.experiments.dataset.checksums import digest
-from closedrooms.experiments.dataset.config import DatasetConfig
-from closedrooms.experiments.dataset.sample import FORMAT, NOT_CONTENT
+from closedrooms.experiments.dataset.config import FORMAT, NOT_CONTENT, SURVEYS, DatasetConfig
 from closedrooms.experiments.dataset.shard import DATA, PARTS
-from closedrooms.experiments.dataset.survey_store import SURVEYS
 from closedrooms.experiments.dataset.variants import (
     SPLITS,
     Variant,

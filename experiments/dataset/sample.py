@@ -18,11 +18,11 @@ from closedrooms.core.files.tum import write_trajectory
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.experiments.dataset.checksums import checksums
-from closedrooms.experiments.dataset.config import DatasetConfig
+from closedrooms.experiments.dataset.config import FORMAT, NOT_CONTENT, SURVEYS, DatasetConfig
 from closedrooms.experiments.dataset.erase import Eraser
 from closedrooms.experiments.dataset.open_survey import survey_open
 from closedrooms.experiments.dataset.shard import Shard
-from closedrooms.experiments.dataset.survey_store import SURVEYS, read_survey, survey_folder, write_survey
+from closedrooms.experiments.dataset.survey_store import read_survey, survey_folder, write_survey
 from closedrooms.experiments.dataset.variants import Variant, World, noise_seed
 from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.logs.recorded_run import RecordedRun
@@ -41,10 +41,6 @@ from closedrooms.worlds.truth import rasterise, reachable, true_rooms, truth_bou
 
 if TYPE_CHECKING:
     from closedrooms.visualization.rerun.recorder import Recorder
-
-FORMAT = 1
-# What says nothing about a sample's content.
-NOT_CONTENT = ("out", "worlds", "workers", "scheduler", "repetitions", "max_closed", "format", "shard_mb")
 
 
 @dataclass(frozen=True, slots=True)

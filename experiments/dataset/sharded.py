@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError
-from closedrooms.experiments.dataset.config import DatasetConfig
+from closedrooms.experiments.dataset.config import SURVEYS, DatasetConfig
 from closedrooms.experiments.dataset.dataset_card import card
 from closedrooms.experiments.dataset.layout import (
     CARD,
@@ -21,7 +21,7 @@ from closedrooms.experiments.dataset.sample import Task, TaskResult
 from closedrooms.experiments.dataset.shard import DATA, PARTS, Shard, read_shard
 from closedrooms.experiments.dataset.shard_plan import ShardPlan
 from closedrooms.experiments.dataset.shards import Filling, Part, work
-from closedrooms.experiments.dataset.survey_store import SURVEYS, survey_folder, survey_name
+from closedrooms.experiments.dataset.survey_store import survey_folder, survey_name
 from closedrooms.experiments.dataset.variants import (
     SPLITS,
     Split,

@@ -13,7 +13,7 @@ from closedrooms.core.files.incoming import read_json
 from closedrooms.core.files.output_folders import MANIFEST, output_folder
 from closedrooms.core.files.tum import read_trajectory, write_trajectory
 from closedrooms.experiments.dataset.checksums import check, checksums
-from closedrooms.experiments.dataset.config import DatasetConfig
+from closedrooms.experiments.dataset.config import SURVEYS, DatasetConfig
 from closedrooms.experiments.dataset.open_survey import OpenSurvey
 from closedrooms.experiments.dataset.packing import SCANS, SURVEY, read_rows, unpack
 from closedrooms.experiments.dataset.variants import World
@@ -22,8 +22,6 @@ from closedrooms.mapping.logs.npz import read_scans, write_scans
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.sim.simulation import Simulation
 from closedrooms.worlds.plan import FloorPlan
-
-SURVEYS = "surveys"
 
 
 def write_survey(folder: Path, survey: OpenSurvey, about: dict[str, Any]) -> None:
