@@ -69,7 +69,7 @@ def test_a_robot_without_a_scan_that_fits_goes_on_as_in_its_last_step(office: An
     nothing = np.empty((0, 2))
     assert followed_at(odometry, office, Pose2(1.0, 1.0), 5.0) == Pose2()
     moved = followed_at(odometry, office, Pose2(1.2, 1.0, 0.1), 5.5)
-    assert moved.as_tuple() == pytest.approx((0.2, 0.0, 0.1), abs=0.02)
+    assert moved.as_tuple() == pytest.approx((0.2, 0.0, 0.1), abs=0.03)
     # As far again in as much time, and half as far in half of it; longer than a step it does not go on.
     for seconds, share in ((0.5, 1.0), (0.25, 0.5), (2.0, 1.0)):
         before = odometry._pose

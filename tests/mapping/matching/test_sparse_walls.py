@@ -1,13 +1,14 @@
 """Points far apart along a wall must not hold a scan back along it."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
-from closedrooms.mapping.config import MatcherConfig
-from closedrooms.mapping.matching.gauss_newton_matcher import refine
-from closedrooms.mapping.matching.likelihood_field import LikelihoodField
+from closedrooms.mapping.mapper import Mapper
+from closedrooms.mapping.matching import sparse_walls
 from closedrooms.mapping.matching.sparse_walls import find_sparse_walls
 
 WALL = np.column_stack((np.arange(0.0, 12.0, 1.5), np.full(8, 2.0)))
@@ -28,7 +29,7 @@ def test_every_point_of_a_sparse_wall_is_found_with_its_direction(angle: float) 
 
 
 def test_dense_walls_corners_and_scattered_posts_are_left_alone() -> None:
-    dense = np.column_stack((np.arange(0.0, 6.0, 0.2), np.full(30, 2.0)))
+    dense = np.column_stack((np.arange(0.0, 3.0, 0.1), np.full(30, 2.0)))
     posts = np.array([[0.0, 0.0], [3.0, 4.0], [6.0, 0.0], [9.0, 4.0], [12.0, 0.0]])
     there_and_back = np.array([[0.0, 0.0], [3.0, 0.02], [1.0, 0.0]])
     for points in (dense, posts, there_and_back, WALL[:2], np.empty((0, 2))):
@@ -41,16 +42,18 @@ def test_dense_walls_corners_and_scattered_posts_are_left_alone() -> None:
     assert horizontal[10] == pytest.approx(0.0)
 
 
-def test_a_scan_moves_across_a_sparse_wall_and_not_along_it() -> None:
-    """The field holds the points as seen before; the robot has moved by 0.06 m along the wall, and 0.04 m across."""
-    field = LikelihoodField(0.05, MatcherConfig())
-    field.add(WALL)
-    moved = Pose2(0.06, 0.04, 0.0)
-    points = WALL - [0.0, 0.04]
-    held = refine(field, points, Pose2(0.06, 0.0, 0.0), prior=Pose2(0.06, 0.0, 0.0), prior_information=np.eye(3) * 1e-3)
-    free = refine(
-        field, points, Pose2(0.06, 0.0, 0.0), prior_information=np.eye(3) * 1e-3, sparse_walls=find_sparse_walls(points)
-    )
-    assert held.pose.x < 0.03
-    assert free.pose.x == pytest.approx(moved.x, abs=0.002)
-    assert free.pose.y == pytest.approx(moved.y, abs=0.007)
+def test_a_plain_hall_that_is_longer_than_the_lidar_sees_keeps_its_length(
+    segment_world: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hall = segment_world([(0.0, 0.0, 52.0, 0.0), (52.0, 0.0, 52.0, 2.4), (52.0, 2.4, 0.0, 2.4), (0.0, 2.4, 0.0, 0.0)])
+    drive = hall.drive([(21.0, 1.2), (31.0, 1.2)], step=0.1, beams=360, noise=0.02, distance_noise=0.01)
+
+    def off() -> float:
+        mapper = Mapper()
+        for scan, pose in zip(drive.scans, drive.odometry, strict=True):
+            mapper.process(scan, Pose2(*pose))
+        return abs(mapper.pose.x - float(drive.truth[-1, 0]))
+
+    assert off() < 0.4
+    monkeypatch.setattr(sparse_walls, "SPARSE", np.inf)
+    assert off() > 2.0
