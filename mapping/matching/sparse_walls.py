@@ -7,8 +7,8 @@ from closedrooms.core.arrays import FloatArray, IntArray
 SPARSE = 0.25
 """Distance from a point to its nearer neighbour [m] from which the field sinks between the two, to less than a third. A
 scan of such points fits the one before best where the robot has not moved: from the middle of a plain hall, where a
-lidar of 20 m sees no end, a map never left its first scan (with 0.5 m it still does; with 0.3 m 2 % of the way are lost),
-and in a hall of 63 m it was off by 2.1 m (0.34 m now). Two logs of real robots lose 0.010 and 0.012 m."""
+lidar of 20 m sees no end, a map never left its first scan (with 0.5 m it still does; with 0.3 m it loses 2 %), and in
+a hall of 63 m it was off by 2.1 m (0.34 m now). Two logs of real robots lose 0.010 and 0.012 m."""
 OFF_LINE = 0.1
 """Distance from the line through its neighbours up to which a point is on the same wall [m]: noise of a lidar."""
 
