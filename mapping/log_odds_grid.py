@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -24,8 +25,9 @@ gone: the place of somebody who was seen from ten keyframes, and from four not, 
 NOISE = 0.10
 """Distance around a cell in which these are counted [m]."""
 SAME_WALL = 0.20
-"""A scan that met something this near to a place [m] did not go through what stands there: of a wall that was seen from
-both sides, each with a pose of its own error, the faces lie behind each other, and either scan ends at the other."""
+"""A scan that met something this near to a place [m] did not go through what was seen there from the other side: of a
+wall that was seen from both, each with a pose of its own error, the faces lie behind each other, and either scan ends
+at the other."""
 LatticeWindow = tuple[int, int, int, int]
 """First row and column in the arrays, and number of rows and columns."""
 
@@ -40,6 +42,7 @@ class Imprint:
         shape: Rows and columns of the window.
         misses: Which cells were crossed: the window's mask, eight cells a byte.
         hits: Cells that were hit, as flat indices in the window, each once.
+        viewpoint: Of the scan: row and column in the window.
     """
 
     row: int
@@ -47,6 +50,7 @@ class Imprint:
     shape: tuple[int, int]
     misses: Mask
     hits: IntArray
+    viewpoint: tuple[float, float]
 
 
 class EvidenceGrid:
@@ -67,8 +71,13 @@ class EvidenceGrid:
         self._hits = np.zeros(shape, dtype=np.int32)
         # Whole numbers, exact up to 2^24: OpenCV adds a mask to floats five times as quickly as to integers.
         self._misses = np.zeros(shape, dtype=np.float32)
-        # The misses of scans that met nothing nearby.
+        # The misses of scans that met nothing nearby, and the number of the others.
         self._through = np.zeros(shape, dtype=np.float32)
+        self._beside = np.zeros(shape, dtype=np.int16)
+        # Sums of the directions (rows, columns) from which each cell was hit, and missed by scans that met something
+        # nearby, to eighths of a turn.
+        self._hit_from = [np.zeros(shape, dtype=np.int16) for _ in range(2)]
+        self._beside_from = [np.zeros(shape, dtype=np.int16) for _ in range(2)]
         self._cells: CellArray = np.full(shape, UNKNOWN, dtype=np.int8)
         self._dirty: LatticeWindow | None = None
         self._redrawn: LatticeWindow | None = None
@@ -90,11 +99,11 @@ class EvidenceGrid:
 
     def imprint(self, beams: Beams, map_T_robot: Pose2) -> Imprint | None:
         """Find what :meth:`add` would count, for :meth:`count_imprint`; ``None`` for a scan that crossed nothing."""
-        for (row, col, rows, cols), mask, hits in self._draw([(beams, map_T_robot)]):
+        for (row, col, rows, cols), mask, hits, viewpoint in self._draw([(beams, map_T_robot)]):
             lattice = self._lattice
             hits.sort()
             once = hits[np.diff(hits, prepend=-1) > 0]  # sooner than np.unique
-            return Imprint(row + lattice.row0, col + lattice.col0, (rows, cols), np.packbits(mask), once)
+            return Imprint(row + lattice.row0, col + lattice.col0, (rows, cols), np.packbits(mask), once, viewpoint)
         return None
 
     def count_imprint(self, imprint: Imprint, *, sign: int = 1) -> None:
@@ -102,10 +111,12 @@ class EvidenceGrid:
         rows, cols = imprint.shape
         mask = np.unpackbits(imprint.misses, count=rows * cols).reshape(rows, cols)
         window = (imprint.row - self._lattice.row0, imprint.col - self._lattice.col0, rows, cols)
-        self._count(window, mask, imprint.hits, sign)
+        self._count(window, mask, imprint.hits, imprint.viewpoint, sign)
 
-    def _draw(self, scans: Sequence[tuple[Beams, Pose2]]) -> Iterator[tuple[LatticeWindow, Mask, IntArray]]:
-        """Draw the window of each scan that crossed anything, its crossed cells and flat indices of those hit.
+    def _draw(
+        self, scans: Sequence[tuple[Beams, Pose2]]
+    ) -> Iterator[tuple[LatticeWindow, Mask, IntArray, tuple[float, float]]]:
+        """Draw each scan that crossed anything: window, crossed cells, flat indices of those hit, viewpoint in it.
 
         The arrays grow to hold them all.
         """
@@ -121,22 +132,34 @@ class EvidenceGrid:
         row_lows, col_lows = lattice.cells(lows)
         row_highs, col_highs = lattice.cells(highs)
         corners = np.stack((row_lows, col_lows, row_highs - row_lows + 1, col_highs - col_lows + 1), axis=1)
-        for (row, col, rows, cols), outline, hits in zip(corners.tolist(), outlines, points, strict=True):
+        views = np.array([pose.transform(beams.origin) for beams, pose in crossing]) / lattice.resolution
+        views = views[:, ::-1] - corners[:, :2] - (lattice.row0 + 0.5, lattice.col0 + 0.5)
+        for (row, col, rows, cols), outline, hits, view in zip(
+            corners.tolist(), outlines, points, views.tolist(), strict=True
+        ):
             window = (row, col, rows, cols)
             mask = self._crossed(outline, window)
             hit_rows, hit_cols = lattice.cells(hits)
             flat = (hit_rows - row) * cols + hit_cols - col
             mask.ravel()[flat] = 0
-            yield window, mask, flat
+            yield window, mask, flat, (view[0], view[1])
 
-    def _count(self, window: LatticeWindow, mask: Mask, flat: IntArray, sign: int) -> None:
+    def _count(
+        self, window: LatticeWindow, mask: Mask, flat: IntArray, viewpoint: tuple[float, float], sign: int
+    ) -> None:
         """Add hits (``flat``: indices in the window) and misses (``mask``) of a keyframe, or take them off."""
         rows, cols = _slices(window)
         # A cell that several beams hit counts once: the same sum is written for each.
-        self._hits[rows, cols][flat // window[3], flat % window[3]] += sign
+        hit = np.divmod(flat, window[3])
+        self._hits[rows, cols][hit] += sign
+        _count_sides(self._hit_from, (rows, cols), hit, viewpoint, sign)
         met = np.zeros_like(mask)
         met.ravel()[flat] = 1
-        through = cv2.subtract(mask, cv2.dilate(met, self._same_wall))
+        near = cv2.bitwise_and(mask, cv2.dilate(met, self._same_wall))
+        beside = np.divmod(np.flatnonzero(near), window[3])
+        self._beside[rows, cols][beside] += sign
+        _count_sides(self._beside_from, (rows, cols), beside, viewpoint, sign)
+        through = cv2.subtract(mask, near)
         for counts, crossed in ((self._misses[rows, cols], mask), (self._through[rows, cols], through)):
             if sign > 0:
                 cv2.accumulate(crossed, counts)
@@ -163,6 +186,9 @@ class EvidenceGrid:
         self._hits = grown(self._hits, padding)
         self._misses = grown(self._misses, padding)
         self._through = grown(self._through, padding)
+        self._beside = grown(self._beside, padding)
+        self._hit_from = [grown(sums, padding) for sums in self._hit_from]
+        self._beside_from = [grown(sums, padding) for sums in self._beside_from]
         self._cells = grown(self._cells, padding, UNKNOWN)
         self._dirty, self._redrawn = (
             None if window is None else (window[0] + padding[0][0], window[1] + padding[1][0], *window[2:])
@@ -240,7 +266,14 @@ class EvidenceGrid:
         around a cell, and how many of them were gone through as often.
         """
         around = self._wider(window, self._noise)
-        hits, through = self._hits[_slices(around)].astype(np.float32), self._through[_slices(around)]
+        cells = _slices(around)
+        hits = self._hits[cells].astype(np.float32)
+        # Who ended just behind what was seen from the same side went through its place.
+        (hit_row, hit_col), (row, col) = (
+            [sums[cells] for sums in both] for both in (self._hit_from, self._beside_from)
+        )
+        same_side = np.multiply(hit_row, row, dtype=np.int32) + np.multiply(hit_col, col, dtype=np.int32) > 0
+        through = self._through[cells] + np.where(same_side, self._beside[cells], np.int16(0))
         span = (2 * self._noise + 1, 2 * self._noise + 1)
         most = cv2.dilate(np.where(hits > 0.0, through, np.float32(0.0)), np.ones(span, dtype=np.uint8))
         again = cv2.boxFilter(np.minimum(hits, through), -1, span, normalize=False)
@@ -282,3 +315,17 @@ def _slices(window: LatticeWindow) -> tuple[slice, slice]:
 def _union(a: LatticeWindow, b: LatticeWindow) -> LatticeWindow:
     row, col = min(a[0], b[0]), min(a[1], b[1])
     return (row, col, max(a[0] + a[2], b[0] + b[2]) - row, max(a[1] + a[3], b[1] + b[3]) - col)
+
+
+def _count_sides(
+    sums: list[np.ndarray[Any, np.dtype[np.int16]]],
+    window: tuple[slice, slice],
+    cells: tuple[IntArray, IntArray],
+    viewpoint: tuple[float, float],
+    sign: int,
+) -> None:
+    """Add to two sums the direction, to an eighth of a turn, in which the viewpoint lies from cells of a window."""
+    away = [at - axis for at, axis in zip(viewpoint, cells, strict=True)]
+    far = np.maximum(np.hypot(*away), 1e-9)
+    for total, part in zip(sums, away, strict=True):
+        total[window][cells] += (sign * np.rint(part / far)).astype(np.int16)

@@ -166,11 +166,29 @@ def test_a_wall_seen_from_both_sides_stays_though_each_scan_ends_beyond_the_face
         # The room to the left ends at the face to the right, and the other way round: the poses do not agree.
         outline = np.vstack((face, [(2.02 - 3.0 * side, y[-1]), (2.02 - 3.0 * side, y[0])]))
         for _ in range(6):
-            evidence.add(Beams(face, outline, np.zeros(2)), Pose2())
+            evidence.add(Beams(face, outline, np.array([2.02 - 3.0 * side, 0.0])), Pose2())
     grid = evidence.grid()
     band = np.column_stack((np.repeat(np.arange(1.52, 2.53, 0.05), 36), np.tile(y[2:-2], 21)))
     rows, cols = grid.frame.to_cells(band).T
     assert grid.occupied[rows, cols].reshape(21, 36).any(axis=0).all()
+
+
+@pytest.mark.parametrize("before", [0.1, 0.15])
+def test_the_place_of_somebody_who_stood_at_a_wall_is_free_once_scans_from_there_end_at_the_wall(before: float) -> None:
+    evidence = EvidenceGrid(MapperConfig())
+    y = np.arange(40) * 0.05 - 0.98
+    wall = np.column_stack((np.full(40, 2.02), y))
+    blocked = wall.copy()
+    blocked[15:25, 0] -= before
+    for points, scans in ((blocked, 10), (wall, 8)):
+        outline = np.vstack((points, [(-1.0, y[-1]), (-1.0, y[0])]))
+        for _ in range(scans):
+            evidence.add(Beams(points, outline, np.array([-1.0, 0.0])), Pose2())
+    grid = evidence.grid()
+    rows, cols = grid.frame.to_cells(blocked[17:23]).T
+    assert not grid.occupied[rows, cols].any()
+    rows, cols = grid.frame.to_cells(wall[1:-1]).T
+    assert grid.occupied[rows, cols].all()
 
 
 def test_the_place_that_somebody_left_is_seen_as_free_though_the_rest_was_drawn_long_before() -> None:
