@@ -8,8 +8,9 @@ import numpy as np
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.grid import OccupancyGrid, is_occupied
 
-LENGTH, SHORT = 0.45, 0.15
-"""Shortest run of places that is a pane wherever it is, a person is 0.4 m wide, and between solid walls [m]."""
+ALONE, LENGTH, SHORT = 0.75, 0.45, 0.15
+"""Shortest run of places that is a pane with a solid wall at one end, between two (a person is 0.4 m wide), and there
+where it was open before [m]. Where no wall is it is what somebody who walked was seen along."""
 FEWEST = 4
 """Fewest places of a pane."""
 THICK = 0.12
@@ -35,7 +36,7 @@ def extend_line(
     driven: FloatArray,
     widest: float,
     farthest: float,
-) -> tuple[FloatArray, bool]:
+) -> tuple[FloatArray, int]:
     """Let a pane go on up to the solid wall in its line, where nothing speaks against it.
 
     Args:
@@ -50,7 +51,7 @@ def extend_line(
         farthest: How far it goes on at most, all in all [m].
 
     Returns:
-        Its ends, shape (2, 2) [m], and whether there is a solid wall at both of them.
+        Its ends, shape (2, 2) [m], and at how many of them there is a solid wall.
     """
     along = line[1] - line[0]
     along = along / np.hypot(*along)
@@ -78,7 +79,7 @@ def extend_line(
                 solid = t
         ends.append(end + (solid + MARGIN) * direction)
         walls += wall
-    return np.array(ends), walls == 2
+    return np.array(ends), walls
 
 
 def _within(distance: float, places: FloatArray, others: FloatArray) -> BoolArray:

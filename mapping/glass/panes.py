@@ -16,6 +16,7 @@ from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.glass.before_glass import before_glass
 from closedrooms.mapping.glass.met_surfaces import Glimpse, MetSurfaces
 from closedrooms.mapping.glass.pane_lines import (
+    ALONE,
     FARTHEST,
     FRAME,
     LENGTH,
@@ -182,10 +183,11 @@ class Panes:
         opened = self._open_along(lines, keyframes) if last else [places[no_pane]] * len(lines)
         segments = []
         for line, against in zip(lines, opened, strict=True):
-            long = math.dist(*line) >= LENGTH
+            length = math.dist(*line)
+            long = length >= LENGTH
             gap, reach = (WIDE if last else FRAME, FARTHEST) if long else (FRAME, FRAME)
-            segment, bounded = extend_line(line, grid, may_be, before, against, self._driven, gap, reach)
-            if long or (bounded and self._was_open(line)):
+            segment, walls = extend_line(line, grid, may_be, before, against, self._driven, gap, reach)
+            if (walls and length >= ALONE) or (walls == 2 and (long or self._was_open(line))):
                 segments.append(segment)
         return without_covered(np.array(segments).reshape(-1, 2, 2))
 

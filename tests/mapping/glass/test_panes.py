@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -194,6 +195,38 @@ def test_somebody_who_stood_there_and_left_is_no_pane() -> None:
         mapper.grid()
     start = Pose2(1.0, 1.5, math.pi / 2).inverse()
     assert occupied_share(mapper.grid(), start, (3.9, 3.2, 4.1, 3.2)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("start", "step", "walks"),
+    [
+        ((3.0, 4.0), (0.02, 0.0), (10, 40)),
+        ((4.0, 2.6), (0.02, 0.01), (20, 60)),
+        ((2.0, 3.5), (0.05, 0.0), (10, 40)),
+    ],
+)
+def test_somebody_who_walks_beside_the_robot_leaves_no_pane_behind(
+    start: tuple[float, float], step: tuple[float, float], walks: tuple[int, int]
+) -> None:
+    world = SegmentWorld([*HALL, PANE])
+    route = [(1.0, 1.5), (7.0, 1.5), (7.0, 4.5), (1.0, 4.5)]
+    drive = world.drive(route, beams=720)
+    mapper, world_T_start = Mapper(), Pose2(1.0, 1.5, 0.0)
+    for number, (scan, odometry, truth) in enumerate(zip(drive.scans, drive.odometry, drive.truth, strict=True)):
+        if number < walks[1] + 20:
+            steps = min(max(number - walks[0], 0), walks[1] - walks[0])
+            x, y = start[0] + step[0] * steps, start[1] + step[1] * steps
+            corners = [(x - 0.2, y - 0.15), (x + 0.2, y - 0.15), (x + 0.2, y + 0.15), (x - 0.2, y + 0.15)]
+            body = SegmentWorld([(*a, *b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)])
+            angles = scan.angle_min + scan.angle_increment * np.arange(scan.ranges.size)
+            before = body.ranges(world_T_start @ Pose2(*truth), angles)
+            scan = replace(scan, ranges=np.minimum(scan.ranges, before))  # noqa: PLW2901
+        mapper.process(scan, Pose2(*odometry))
+        if number % 5 == 0:
+            mapper.grid()
+    mapper.finish()
+    mapper.grid()
+    assert len(mapper.panes) == 0
 
 
 def test_somebody_who_stood_in_a_doorway_is_no_pane() -> None:
