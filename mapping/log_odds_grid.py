@@ -71,8 +71,7 @@ class EvidenceGrid:
         self._hits = np.zeros(shape, dtype=np.int32)
         # Whole numbers, exact up to 2^24: OpenCV adds a mask to floats five times as quickly as to integers.
         self._misses = np.zeros(shape, dtype=np.float32)
-        # The misses of scans that met nothing nearby, and the number of the others.
-        self._through = np.zeros(shape, dtype=np.float32)
+        # Of the misses, those of scans that met something nearby.
         self._beside = np.zeros(shape, dtype=np.int16)
         # Sums of the directions (rows, columns) from which each cell was hit, and missed by scans that met something
         # nearby, to eighths of a turn.
@@ -159,12 +158,10 @@ class EvidenceGrid:
         beside = np.divmod(np.flatnonzero(near), window[3])
         self._beside[rows, cols][beside] += sign
         _count_sides(self._beside_from, (rows, cols), beside, viewpoint, sign)
-        through = cv2.subtract(mask, near)
-        for counts, crossed in ((self._misses[rows, cols], mask), (self._through[rows, cols], through)):
-            if sign > 0:
-                cv2.accumulate(crossed, counts)
-            else:
-                cv2.subtract(counts, crossed, counts, dtype=cv2.CV_32F)
+        if sign > 0:
+            cv2.accumulate(mask, self._misses[rows, cols])
+        else:
+            cv2.subtract(self._misses[rows, cols], mask, self._misses[rows, cols], dtype=cv2.CV_32F)
         self._dirty = window if self._dirty is None else _union(self._dirty, window)
 
     def _crossed(self, outline: FloatArray, window: LatticeWindow) -> Mask:
@@ -185,7 +182,6 @@ class EvidenceGrid:
             return
         self._hits = grown(self._hits, padding)
         self._misses = grown(self._misses, padding)
-        self._through = grown(self._through, padding)
         self._beside = grown(self._beside, padding)
         self._hit_from = [grown(sums, padding) for sums in self._hit_from]
         self._beside_from = [grown(sums, padding) for sums in self._beside_from]
@@ -273,7 +269,7 @@ class EvidenceGrid:
             [sums[cells] for sums in both] for both in (self._hit_from, self._beside_from)
         )
         same_side = np.multiply(hit_row, row, dtype=np.int32) + np.multiply(hit_col, col, dtype=np.int32) > 0
-        through = self._through[cells] + np.where(same_side, self._beside[cells], np.int16(0))
+        through = self._misses[cells] - np.where(same_side, np.int16(0), self._beside[cells])
         span = (2 * self._noise + 1, 2 * self._noise + 1)
         most = cv2.dilate(np.where(hits > 0.0, through, np.float32(0.0)), np.ones(span, dtype=np.uint8))
         again = cv2.boxFilter(np.minimum(hits, through), -1, span, normalize=False)
