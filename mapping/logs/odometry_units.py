@@ -19,9 +19,9 @@ NEAR = 0.15
 """Distance [m] at which a point counts 0.6 for lying on what the other scan saw: noise, and what odometry drifts in so
 short a motion."""
 MARGIN = 0.15
-"""By how much two scans have to fit better with one motion than with another, in half of the pairs. Of 130 logs of real
-and made robots the recorded odometry fits from 0.52 better to 0.06 worse than a motion that is wrong; in another unit it
-fits 0.2 to 0.7 worse."""
+"""By how much two scans have to fit better with one motion than with another, in half of the pairs. In 130 logs of real
+and made robots the recorded odometry fits from 0.52 better to 0.06 worse than a wrong one; in another unit it fits 0.2
+to 0.7 worse."""
 DRIVING, TURNING = (1.0, 0.0), (0.0, 1.0)
 """How much a metre and a radian count as motion: a laser whose scans are mirrored contradicts where the robot turns."""
 OTHERS = ((0.0, 0.0, 0.0), (1.0, -1.0, -1.0), (-1.0, -1.0, 1.0))
