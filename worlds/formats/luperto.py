@@ -186,13 +186,18 @@ def _portals(
         places = _segment_places(space, metres)
         for order, portal in enumerate(children(child(space, "portals"), "portal")):
             targets = {text(target).strip() for target in children(child(portal, "target"), "id")}
-            place = places.get(text(child(portal, "linesegment")).strip())
+            targets.discard(attribute(space, "id") or "")
+            drawn = places.get(text(child(portal, "linesegment")).strip(), [])
+            place = drawn[0] if drawn else None
             named = [[n for n in index[target] if n != number] for target in sorted(targets & index.keys())]
             others = sorted({_nearest(numbers, place, rooms) for numbers in named if numbers})
             name = f"portal {order} of r{number:02d} ({_label(space)})"
             if len(others) != 1 or place is None:
                 remarks.append(_useless(name, place, len(others), bool(targets & gone)))
                 continue
+            # Of several lines of one id, the one that the other room touches.
+            other = rooms[others[0]][1]
+            place = min(drawn, key=lambda at, other=other: other.distance(shapely.Point(at)))  # type: ignore[misc]
             pair = (min(number, others[0]), max(number, others[0]))
             explicit = text(child(portal, "type")).strip().upper() != "IMPLICIT"
             found.append((number, Portal(place, pair, explicit, name=name)))
@@ -223,13 +228,13 @@ def _useless(name: str, place: Point | None, others: int, to_dropped_room: bool)
     return Remark(action="dropped", what="doors", why=why, names=(name,), loss=True)
 
 
-def _segment_places(space: Any, metres: float) -> dict[str, Point]:
-    """Find the middle of each line segment of a space, by its id."""
-    places = {}
+def _segment_places(space: Any, metres: float) -> dict[str, list[Point]]:
+    """Find the middles of the line segments of a space, by their ids."""
+    places: dict[str, list[Point]] = {}
     for segment in children(child(space, "space_representation"), "linesegment"):
         points = [_point(point, metres) for point in children(segment, "point")]
         usable = [point for point in points if point is not None]
         if usable:
             x, y = (sum(values) / len(usable) for values in zip(*usable, strict=True))
-            places[(attribute(segment, "id") or "").strip()] = (x, y)
+            places.setdefault((attribute(segment, "id") or "").strip(), []).append((x, y))
     return places

@@ -181,3 +181,11 @@ def test_a_portal_to_an_id_that_is_used_twice_leads_to_the_nearest_room(tmp_path
     areas = {room.id: room.polygon.bounds[0] for room in plan.rooms}
     assert max(areas[room] for room in door.rooms if room is not None) < 1.0
     assert ("guessed", "ids of rooms", ("b",)) in [(r.action, r.what, r.names) for r in plan.remarks]
+
+
+def test_of_lines_with_one_id_the_one_at_the_other_room_is_the_door(tmp_path: Path) -> None:
+    lines = segment("s", point(30, 0), point(40, 0)) + segment("s", point(30, 40), point(40, 40))
+    plan = read(tmp_path, space("a", box(0, 0, 80, 40), segments=lines, portals=portal("s", "a", "b")), B)
+    (door,) = plan.doors
+    assert door.midpoint == pytest.approx((3.5, -4.0), abs=0.05)
+    assert [remark for remark in plan.remarks if remark.what == "doors"] == []
