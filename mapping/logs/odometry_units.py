@@ -20,7 +20,7 @@ NEAR = 0.15
 short a motion."""
 MARGIN = 0.15
 """By how much two scans have to fit better with one motion than with another, in half of the pairs. In 130 logs of real
-and made robots the recorded odometry fits from 0.52 better to 0.06 worse than a wrong one; in another unit it fits 0.2
+and made robots the recorded odometry fits from 0.46 better to 0.07 worse than a wrong one; in another unit it fits 0.2
 to 0.7 worse."""
 DRIVING, TURNING = (1.0, 0.0), (0.0, 1.0)
 """How much a metre and a radian count as motion: a laser whose scans are mirrored contradicts where the robot turns."""
