@@ -6,12 +6,14 @@ the page.
 """
 
 import base64
+import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from closedrooms.core.files.incoming import read_bytes
 from closedrooms.core.files.outgoing import write_bytes
@@ -87,7 +89,7 @@ class Section:
     Attributes:
         heading: Its heading.
         text: A paragraph.
-        picture: A PNG to put into the page.
+        picture: A PNG beside the page to put into it; a click opens it at its full size.
         tables: Its tables; one without a row below its head is left out.
         files: Names of the files beside the page that hold its figures.
     """
@@ -136,7 +138,8 @@ def _section(section: Section) -> Iterator[str]:
         yield f"<p>{_text(section.text)}</p>"
     if section.picture is not None:
         data = base64.b64encode(read_bytes(section.picture, what="a picture")).decode()
-        yield f'<img alt="{_text(section.heading)}" src="data:image/png;base64,{data}">'
+        image = f'<img alt="{_text(section.heading)}" src="data:image/png;base64,{data}">'
+        yield f'<a href="{quote(os.fsencode(section.picture.name))}">{image}</a>'
     for table in section.tables:
         yield from _table(table)
     if section.files:
