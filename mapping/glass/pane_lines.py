@@ -66,7 +66,8 @@ def extend_line(
         places = end + steps[:, None] * direction
         against = _within(step, places, no_pane) | _within(BODY, places, driven)
         on_pane, as_before = _within(step, places, may_be), _within(step, places, before)
-        at_wall = _solid(grid, places[:, None] + np.array([-step, 0.0, step])[:, None] * across).any(axis=1)
+        beside = places[:, None] + np.array([-step, 0.0, step])[:, None] * across
+        at_wall = np.asarray(_solid(grid, beside).any(axis=1))
         solid, wall = 0.0, False
         for number, t in enumerate(steps.tolist()):
             if t - solid > widest or against[number]:
