@@ -314,3 +314,19 @@ def test_empty_geometries_are_skipped_as_null_ones_are(tmp_path: Path, empty: di
 def test_doors_of_rooms_are_read_from_tables_without_lists(tmp_path: Path, given: Any, doors: tuple[str, ...]) -> None:
     room = multi("Polygon", [[[0, 0], [1, 0], [1, 1], [0, 0]]], doors=given)
     assert read_rooms(collection(tmp_path / "r", room))[0].doors == doors
+
+
+def test_a_door_with_a_bend_and_one_on_another_are_told(tmp_path: Path) -> None:
+    def line(*points: list[float], **properties: Any) -> dict[str, Any]:
+        return {"type": "Feature", "properties": properties, "geometry": {"type": "LineString", "coordinates": points}}
+
+    path = collection(
+        tmp_path / "d",
+        line([0.0, 0.0], [1.0, 0.0], [1.0, 1.0], id="bent"),
+        line([3.0, 0.0], [3.4, 0.0], [4.0, 0.0], id="straight"),
+        point(7, 7, id="a"),
+        point(7, 7, id="b"),
+    )
+    remarks: list[Remark] = []
+    assert [door.id for door in read_doors(path, remarks=remarks)] == ["bent", "straight", "a", "b"]
+    assert [(remark.action, remark.names) for remark in remarks] == [("guessed", ("bent",)), ("guessed", ("b",))]
