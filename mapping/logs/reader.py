@@ -9,6 +9,7 @@ import numpy as np
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import is_file, is_folder, read_head, reading
 from closedrooms.core.remarks import Remark
+from closedrooms.mapping.logs.bags.bag_files import METADATA, is_bag_folder
 from closedrooms.mapping.logs.bags.bag_options import BagOptions
 from closedrooms.mapping.logs.recorded_odometry import bridge_jumps, jump_remarks
 from closedrooms.mapping.logs.recorded_run import RecordedRun
@@ -24,8 +25,6 @@ PACKED = {
     b"\x04\x22\x4d\x18": "lz4",
 }
 """What files begin with that other programs have packed whole; a folder of rosbag 2 says itself how its files are."""
-STORED = (".mcap", ".db3")
-"""Names of the files in a rosbag 2 folder."""
 SAME_POSE = 1e-6
 """Odometry that never leaves its first pose by more [m and rad] was not measured."""
 
@@ -53,7 +52,7 @@ def read_run(
     options = BagOptions(scan_topic=scan_topic, odometry_topic=odometry_topic, mount=mount, upside_down=upside_down)
     with reading(path, "a recorded run"):
         try:
-            run = _read(_bag_file(path), options)
+            run = _read(path.parent if path.name == METADATA and is_file(path) else path, options)
         except InvalidInputError as error:
             # Scans and poses check themselves, and do not know their file.
             raise error if str(path) in str(error) else InvalidInputError(str(error), where=path) from error
@@ -96,21 +95,10 @@ def _refuse_options(options: BagOptions, path: Path) -> None:
         raise InvalidInputError(f"--{', --'.join(given)} for a log that is no bag", expected="a rosbag", where=path)
 
 
-def _bag_file(path: Path) -> Path:
-    """Find the bag where a folder without ``metadata.yaml`` holds just one or its ``metadata.yaml`` was named."""
-    if path.name == "metadata.yaml" and is_file(path):
-        return path.parent
-    if is_folder(path) and not is_file(path / "metadata.yaml"):
-        stored = [entry for entry in sorted(path.iterdir()) if entry.suffix in STORED]
-        if len(stored) == 1:
-            return stored[0]
-    return path
-
-
 def _head(path: Path) -> bytes:
     """Read what tells the kind of file."""
     if is_folder(path):
-        return SQLITE if is_file(path / "metadata.yaml") else b""
+        return SQLITE if is_bag_folder(path) else b""
     return read_head(path, what="a recorded run", size=24)
 
 

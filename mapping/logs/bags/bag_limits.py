@@ -10,26 +10,19 @@ from typing import Any
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.archives import MAX_UNPACKED
-from closedrooms.core.files.incoming import is_file, is_folder
-from closedrooms.core.files.yaml_text import parse_yaml
 
 WHAT = "a rosbag"
 MAX_CHUNK = 200_000_000
 """Most that one chunk or message unpacks to [bytes]: recorders begin a new chunk after 0.75 to 10 MB."""
-MAX_METADATA = 300_000
-"""Longest ``metadata.yaml`` [bytes]: some hundred for every topic and file; rosbags reads 50 kB a second of it."""
-METADATA = "metadata.yaml"
 
 
 @contextlib.contextmanager
 def limited(path: Path) -> Iterator[None]:
-    """Open a bag inside: its metadata looked through before, chunks bounded, copies of whole files bounded.
+    """Open a bag inside: chunks bounded, copies of whole files bounded.
 
     Raises:
-        InvalidInputError: Metadata that is no YAML, too long or nested too deeply; a chunk that unpacks to too much.
+        InvalidInputError: A chunk that unpacks to too much.
     """
-    if is_folder(path) and is_file(path / METADATA):
-        parse_yaml(path / METADATA, what="the metadata of a rosbag 2", max_bytes=MAX_METADATA)
     _limit_chunks(path)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     soft = MAX_UNPACKED if before[0] == resource.RLIM_INFINITY else min(MAX_UNPACKED, before[0])

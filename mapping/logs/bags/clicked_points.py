@@ -35,8 +35,9 @@ def read_clicked_points(path: Path, *, remarks: list[Remark] | None = None) -> l
     from closedrooms.mapping.logs.bags.rosbag import opened_bag
 
     places: list[tuple[float, float]] = []
+    told: list[Remark] = []
     broken = 0
-    with opened_bag(path) as reader:
+    with opened_bag(path, told) as reader:
         topics = {connection.topic for connection in reader.connections if connection.msgtype == POINT}
         topic = "/clicked_point" if "/clicked_point" in topics else next(iter(topics), None)
         if topic is None or (len(topics) > 1 and topic != "/clicked_point"):
@@ -56,7 +57,9 @@ def read_clicked_points(path: Path, *, remarks: list[Remark] | None = None) -> l
                 raise InvalidInputError(f"more than {MOST} points", expected="a point a door", where=path)
             else:
                 places.append((x, y))
-    if broken and remarks is not None:
+    if broken:
         why = "no finite coordinates"
-        remarks.append(Remark(action="dropped", what="points", why=why, count=broken, loss=True))
+        told.append(Remark(action="dropped", what="points", why=why, count=broken, loss=True))
+    if remarks is not None:
+        remarks.extend(told)
     return [ClosedDoor(f"d{number:02d}", place) for number, place in enumerate(places)]

@@ -2,7 +2,6 @@
 
 import contextlib
 import math
-import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,9 +12,10 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.incoming import check_regular, is_file, is_folder, read_head, reading
+from closedrooms.core.files.incoming import check_regular, is_folder, reading
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
+from closedrooms.mapping.logs.bags.bag_files import bag_paths
 from closedrooms.mapping.logs.bags.bag_limits import limited
 from closedrooms.mapping.logs.bags.bag_messages import (
     MAX_SCANS,
@@ -38,8 +38,6 @@ from closedrooms.mapping.logs.clocks import Times, forward, scan_and_odometry_ti
 from closedrooms.mapping.logs.recorded_odometry import bridge_jumps, jump_remarks, odometry_at
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 
-SUFFIXES = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite": ".db3"}
-"""What the files of a bag begin with, and how their names should end."""
 LONGEST_SWEEP = 1.1
 """Time from the first beam of a sweep to its last against that from one sweep to the next: more cannot be."""
 
@@ -58,16 +56,21 @@ def read_bag(path: Path, options: BagOptions) -> RecordedRun:
         InvalidInputError: ``rosbags`` is not installed, a broken bag, a topic missing or ambiguous, a mounting that is
             unknown or not level.
     """
-    with opened_bag(path) as reader:
-        wanted, remarks = choose_connections(reader.connections, options)
+    remarks: list[Remark] = []
+    with opened_bag(path, remarks) as reader:
+        wanted, chosen = choose_connections(reader.connections, options)
         messages = read_messages(reader, wanted)
     with reading(path, "a rosbag"):
-        return _resolved(messages, options, remarks)
+        return _resolved(messages, options, [*remarks, *chosen])
 
 
 @contextlib.contextmanager
-def opened_bag(path: Path) -> Iterator[Any]:
+def opened_bag(path: Path, remarks: list[Remark]) -> Iterator[Any]:
     """Open a bag of any kind.
+
+    Args:
+        path: As of :func:`read_bag`.
+        remarks: Told which of its files were left out or read although nothing names them.
 
     Raises:
         InvalidInputError: ``rosbags`` is not installed, or a broken bag.
@@ -84,27 +87,11 @@ def opened_bag(path: Path) -> Iterator[Any]:
     with (
         reading(path, "a rosbag"),
         limited(path),
-        _named(path) as named,
+        bag_paths(path, remarks) as paths,
         # Bags of ROS 2 before Iron do not carry the definitions of their messages.
-        AnyReader([named], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader,
+        AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader,
     ):
         yield reader
-
-
-@contextlib.contextmanager
-def _named(path: Path) -> Iterator[Path]:
-    """Link to the bag by a name that ends as rosbags expects it: it tells the kinds by their names."""
-    suffix = path.suffix
-    if is_file(path):
-        start = read_head(path, what="a rosbag", size=8)
-        suffix = next((suffix for magic, suffix in SUFFIXES.items() if start.startswith(magic)), suffix)
-    if suffix == path.suffix:
-        yield path
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        named = Path(folder) / f"bag{suffix}"
-        named.symlink_to(path.absolute())
-        yield named
 
 
 def _resolved(messages: BagMessages, options: BagOptions, remarks: list[Remark]) -> RecordedRun:

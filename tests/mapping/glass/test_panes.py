@@ -175,6 +175,15 @@ def test_a_pane_before_which_a_robot_turned_for_long_is_one() -> None:
     assert occupied_share(grid, map_T_world, PANE) > 0.95
 
 
+@pytest.mark.parametrize("start", [(2.4, 4.4), (3.2, 4.6)])
+def test_a_pane_that_nearly_all_scans_met_is_one(start: tuple[float, float]) -> None:
+    # The robot drives to and fro in front of it: next to no scan goes through.
+    pane, turns = (3.5, 6.0, 4.5, 6.0), [(4.0, 5.4), (4.0, 4.4)] * 4
+    grid, map_T_world = mapped(GlassWorld(walls_beside(pane), pane), [start, (4.0, start[1]), *turns])
+    assert known_share(grid, map_T_world, ROOM_BEHIND) < 0.01
+    assert occupied_share(grid, map_T_world, pane) > 0.95
+
+
 def test_a_pane_is_found_from_close_by() -> None:
     # Half a metre away, beams to either side of what is met askew meet the pane near its normal.
     pane, beside = (3.5, 6.0, 4.5, 6.0), [(0.0, 6.0, 3.5, 6.0), (4.5, 6.0, 8.0, 6.0)]

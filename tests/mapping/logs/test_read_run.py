@@ -13,7 +13,7 @@ from closedrooms.core.numbers import FARTHEST
 from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.logs import RecordedRun, read_run
 from closedrooms.mapping.logs.npz import read_scans, write_scans
-from closedrooms.mapping.logs.reader import _bag_file, _bridged, _without_frozen_odometry
+from closedrooms.mapping.logs.reader import _bridged, _without_frozen_odometry
 
 MOUNT = (0.1, -0.2, 0.3)
 
@@ -192,19 +192,3 @@ def test_options_of_bags_are_named_where_there_is_none(tmp_path: Path) -> None:
     ):
         with pytest.raises(InvalidInputError, match=said):
             read_run(path, **options)  # type: ignore[arg-type]
-
-
-def test_the_bag_in_a_folder(tmp_path: Path) -> None:
-    assert _bag_file(tmp_path) == tmp_path
-    (tmp_path / "a.mcap").touch()
-    (tmp_path / "notes.txt").touch()
-    assert _bag_file(tmp_path) == tmp_path / "a.mcap"
-    (tmp_path / "b.db3").touch()
-    assert _bag_file(tmp_path) == tmp_path
-    with pytest.raises(InvalidInputError, match="a folder; expected a log file"):
-        read_run(tmp_path)
-    (tmp_path / "b.db3").unlink()
-    (tmp_path / "metadata.yaml").touch()
-    assert _bag_file(tmp_path) == tmp_path
-    assert _bag_file(tmp_path / "metadata.yaml") == tmp_path
-    assert _bag_file(tmp_path / "a.mcap") == tmp_path / "a.mcap"
