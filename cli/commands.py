@@ -24,9 +24,9 @@ from closedrooms.core.runtime.stopping import (
     SIGNALS,
     Stop,
     Terminated,
+    end,
     end_in_time,
     leave_at_once,
-    leave_if_stuck,
     stopping,
 )
 
@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _complain(f"{reason(error)}; -v shows where")
         status = BAD_INPUT
     if arguments is None:
-        leave_if_stuck(status)
+        end(status)
     return status
 
 

@@ -186,7 +186,7 @@ class Panes:
         opened = self._open_along(lines, keyframes) if last else [places[no_pane]] * len(lines)
         segments = []
         for line, against in zip(lines, opened, strict=True):
-            length = math.dist(*line)
+            length = math.dist(*line) + self._resolution  # from middle to middle of whole cells
             long = length >= LENGTH
             gap, reach = (WIDE if last else FRAME, FARTHEST) if long else (FRAME, FRAME)
             turned = turn_into_walls(line, grid, reach)

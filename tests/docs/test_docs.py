@@ -10,6 +10,7 @@ from types import ModuleType
 
 import pytest
 
+from closedrooms.cli.options import option_names, options_class
 from closedrooms.cli.table import COMMANDS
 
 ROOT = Path(__file__).parents[2]
@@ -98,6 +99,19 @@ def test_commands_of_readme_are_commands() -> None:
     named = set(re.findall(r"^    closedrooms (\w+)", text, re.M))
     assert named <= {command.name.split()[0] for command in COMMANDS}
     assert {"run", "predict", "doors", "edit", "cover"} <= named
+
+
+def test_options_that_pages_and_figures_name_are_options() -> None:
+    commands = {command.name: command for command in COMMANDS}
+    named: set[tuple[str, str]] = set()
+    for path in (*results.pages(), *results.RESULTS.glob("*.csv")):
+        lines = re.findall(r"closedrooms ((?:worlds )?[a-z]+)( [^`\n;&(]*)", path.read_text())
+        named |= {(name, words) for name, words in lines if name in commands and "--" in words}
+    for name, words in sorted(named):
+        given = re.findall(r"(?<!\S)\[?--(?:no-)?([a-z][\w.-]*)", words)
+        options = options_class(commands[name], [] if "[" in words else words.split())
+        assert {*given} <= {*option_names(options), "help"}, f"closedrooms {name}{words}"
+    assert len(named) > 40
 
 
 @pytest.mark.parametrize(
