@@ -18,6 +18,9 @@ from closedrooms.mapping.scan_odometry import ScanOdometry
 from closedrooms.mapping.scan_preparation import prepare_scans
 from closedrooms.mapping.trajectory import ate
 
+MOST_NOT_HELD = 0.05
+"""Share of the scans of a run without odometry that may fit as well elsewhere before it is said."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BuiltMap:
@@ -101,7 +104,7 @@ def build_map(
         seconds,
         errors,
         (
-            *(() if follower is None else _lost_remarks(follower.lost)),
+            *(() if follower is None else _lost_remarks(follower.lost, follower.not_held, len(run.scans))),
             *mapper.events,
             *(() if grid.occupied.any() else _empty_remarks(run, config)),
         ),
@@ -116,9 +119,13 @@ def _empty_remarks(run: RecordedRun, config: MapperConfig) -> tuple[Remark, ...]
     return (Remark(action="dropped", what="walls", why=why, loss=True),)
 
 
-def _lost_remarks(count: int) -> tuple[Remark, ...]:
-    """Say that scans of a robot without odometry fit nowhere."""
-    if not count:
-        return ()
-    why = "they fit nowhere, and there is no odometry; taken to go on as before"
-    return (Remark(action="guessed", what="scans' poses", why=why, count=count, loss=True),)
+def _lost_remarks(lost: int, not_held: int, scans: int) -> tuple[Remark, ...]:
+    """Say that scans of a robot without odometry fit nowhere, or as well further along a hall."""
+    remarks = []
+    if lost:
+        why = "they fit nowhere, and there is no odometry; taken to go on as before"
+        remarks.append(Remark(action="guessed", what="scans' poses", why=why, count=lost, loss=True))
+    if not_held > MOST_NOT_HELD * scans:
+        why = "they fit as well further along a hall, and there is no odometry: it may be metres too short or too long"
+        remarks.append(Remark(action="guessed", what="scans' poses", why=why, count=not_held, loss=True))
+    return tuple(remarks)

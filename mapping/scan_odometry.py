@@ -37,6 +37,14 @@ SURROUNDINGS, STALE = 40, 20
 drifted, and putting it together is the mapper's task."""
 
 
+FURTHER = (0.3, 0.6, 0.9, 1.2, 1.5)
+"""Distances [m] at which a scan is tried again, in all directions: a hall shows the same there."""
+HELD = 0.9
+"""Share of its score that a scan may have there. Where no hall is, 98 to 100 % of the scans stay below (three logs of
+real robots and a simulated one); in a plain hall and in one of niches 10 and 22 %."""
+DIRECTIONS = 16
+
+
 class ScanOdometry:
     """Odometry by matching each scan with the last ones (correlative search, then refinement).
 
@@ -53,6 +61,8 @@ class ScanOdometry:
         self._recent = self._usual = 0.0
         self.lost = 0
         """Scans that fitted nowhere."""
+        self.not_held = 0
+        """Scans that fit as well further along a wall."""
 
     def follow(self, points: FloatArray, stamp: float) -> Pose2:
         """Take in one scan.
@@ -106,7 +116,20 @@ class ScanOdometry:
             self.lost += 1
             return guess
         self._usual += MEMORY * (best_score - self._usual) if self._usual else best_score
+        self.not_held += not self._is_held(best.transform(points))
         return best
+
+    def _is_held(self, points: FloatArray) -> bool:
+        """Check that a scan's points, start frame, fit worse wherever the robot might be else, its heading kept."""
+        angles = 2.0 * np.pi / DIRECTIONS * np.arange(DIRECTIONS)
+        shifts = np.outer(FURTHER, np.exp(1j * angles)).ravel()
+        shifts = np.column_stack((np.r_[0.0, shifts.real], np.r_[0.0, shifts.imag]))
+        lattice, values = self._field.lattice, self._field.values
+        cells = np.floor((points[None] + shifts[:, None]) / lattice.resolution).astype(np.int64)
+        rows, cols = cells[..., 1] - lattice.row0, cells[..., 0] - lattice.col0
+        inside = (rows >= 0) & (cols >= 0) & (rows < values.shape[0]) & (cols < values.shape[1])
+        here, *there = np.where(inside, values[np.where(inside, rows, 0), np.where(inside, cols, 0)], 0.0).mean(axis=1)
+        return bool(max(there) <= HELD * here)
 
     def _refined(self, points: FloatArray, start: Pose2, distance: float, angle: float) -> tuple[float, Pose2]:
         """Score and pose; along a featureless corridor the search, and with it the prediction, decides."""

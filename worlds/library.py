@@ -180,7 +180,7 @@ def importers() -> list[Importer]:
     return [
         Importer("picture", "a picture of a map (PNG or PGM)", _is_picture, lambda path, _: read_raster(path)),
         Importer("kth", "KTH XML", _is_kth, lambda path, _: read_kth(path)),
-        Importer("luperto", "Luperto XML", _is_luperto, lambda path, _: read_luperto(path)),
+        Importer("luperto", "Luperto XML", _is_luperto, read_luperto, levels=True),
         Importer("houseexpo", "HouseExpo JSON", _is_houseexpo, lambda path, _: read_houseexpo(path)),
         Importer("json", "closedrooms JSON", _is_json, lambda path, _: read_plan(path)),
         Importer("rmf", "RMF building.yaml", _has_keys("levels"), read_rmf, levels=True),

@@ -1,7 +1,6 @@
 """CARMEN logs of real robots (FLASER, ROBOTLASER, RAWLASER, ODOM), plain or gzipped."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,9 +12,17 @@ from closedrooms.core.files.archives import TruncatedError, log_lines
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.logs.carmen_lines import WITH_POSES, CarmenLog, FieldOfView, ScanLine, flaser_field_of_view
+from closedrooms.mapping.logs.carmen_lines import (
+    LARGEST_ANGLE,
+    WITH_POSES,
+    CarmenLog,
+    FieldOfView,
+    ScanLine,
+    flaser_field_of_view,
+)
 from closedrooms.mapping.logs.carmen_odometry import LocatedScans, motion_of
 from closedrooms.mapping.logs.clocks import forward
+from closedrooms.mapping.logs.odometry_units import UNITS, contradicts, find_unit, unit_remark
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 
 MAX_LINE = 1_000_000
@@ -38,7 +45,8 @@ def read_carmen(path: Path, *, gzipped: bool) -> RecordedRun:
     """Read the scans of a CARMEN log in file order, with the raw odometry at each.
 
     Scans of one laser are taken, of those that carry poses if there are any. What counts as their odometry,
-    :func:`motion_of` says.
+    :func:`motion_of` says. Where it contradicts the scans and is written in centimetres, millimetres or degrees, it is
+    read once more in these units.
 
     Args:
         path: The log.
@@ -47,9 +55,33 @@ def read_carmen(path: Path, *, gzipped: bool) -> RecordedRun:
     Raises:
         InvalidInputError: Unreadable, not text, or unpacking to too much (``core.archives``).
     """
-    log = CarmenLog()
-    for line in _lines(path, gzipped, log):
-        log.take(line)
+    log = _lines(path, gzipped, CarmenLog())
+    run = _mapped(log)
+    if not run.has_odometry or not contradicts(run.scans, run.odometry):
+        return run
+    # No heading in radians is as large as those of writers who put degrees.
+    for angle in (1.0, math.radians(1.0)) if log.widest > LARGEST_ANGLE else (1.0,):
+        turned = run if angle == 1.0 else _mapped(_lines(path, gzipped, CarmenLog(angle=angle)))
+        length = find_unit(turned.scans, turned.odometry)
+        if length is not None and (length, angle) != (1.0, 1.0):
+            again = _mapped(_lines(path, gzipped, CarmenLog(length=length, angle=angle)))
+            units = ([UNITS[length]] if length != 1.0 else []) + (["degrees"] if angle != 1.0 else [])
+            return replace(again, remarks=(*again.remarks, unit_remark(" and ".join(units))))
+    return run
+
+
+def _lines(path: Path, gzipped: bool, log: CarmenLog) -> CarmenLog:
+    """Take in the lines of a log; an archive that ends early ends them and is noted."""
+    try:
+        for line in log_lines(path, gzipped=gzipped, what="a CARMEN log", longest=MAX_LINE):
+            log.take(line.decode("ascii", errors="replace"))
+    except TruncatedError:
+        log.truncated = True
+    return log
+
+
+def _mapped(log: CarmenLog) -> RecordedRun:
+    """Make a run of the laser that is mapped."""
     remarks = _reading_remarks(log)
     kind = _kind(log)
     if kind is None:
@@ -62,15 +94,6 @@ def read_carmen(path: Path, *, gzipped: bool) -> RecordedRun:
     scans, guesses = _with_sector(log.scans[kind], log.settings)
     motion = motion_of(scans, log.moves, log.settings, rear=kind == "RAWLASER2")
     return _run(motion, log.settings, [*remarks, *guesses])
-
-
-def _lines(path: Path, gzipped: bool, log: CarmenLog) -> Iterator[str]:
-    """Read the lines of a log; an archive that ends early ends them and is noted."""
-    try:
-        for line in log_lines(path, gzipped=gzipped, what="a CARMEN log", longest=MAX_LINE):
-            yield line.decode("ascii", errors="replace")
-    except TruncatedError:
-        log.truncated = True
 
 
 def _kind(log: CarmenLog) -> str | None:

@@ -67,6 +67,9 @@ class CarmenLog:
         malformed: Lines that could not be read, by the word they begin with.
         repaired: Scans whose geometry was mended, by how.
         truncated: The archive ends early.
+        length: Unit of all positions [m].
+        angle: Unit of all headings [rad].
+        widest: Largest heading, as written.
     """
 
     scans: dict[str, list[ScanLine]] = field(default_factory=dict)
@@ -75,6 +78,9 @@ class CarmenLog:
     malformed: Counter[str] = field(default_factory=Counter)
     repaired: Counter[str] = field(default_factory=Counter)
     truncated: bool = False
+    length: float = 1.0
+    angle: float = 1.0
+    widest: float = 0.0
 
     def take(self, line: str) -> None:
         """Read one line; what is none of ours is ignored, what is broken is counted."""
@@ -87,7 +93,7 @@ class CarmenLog:
             if laser:
                 self._add(kind, self._laser(words, robot=kind.startswith("ROBOT")))
             elif kind == "ODOM":
-                self.moves.append(OdometryLine(_pose(words[1:4]), float(words[7])))
+                self.moves.append(OdometryLine(self._pose(words[1:4]), float(words[7])))
             elif kind == "PARAM":
                 self.settings[words[1]] = float(words[2])
             else:
@@ -95,6 +101,18 @@ class CarmenLog:
         except (ValueError, IndexError, ArithmeticError):
             if kind != "PARAM":
                 self.malformed[kind] += 1
+
+    def _pose(self, words: list[str]) -> Pose2:
+        """Read three words as x, y and heading, in the units of the log.
+
+        Raises:
+            ValueError: They are no finite numbers.
+        """
+        x, y, theta = map(float, words)
+        if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(theta)):
+            raise ValueError("a pose that is not finite")
+        self.widest = max(self.widest, abs(theta))
+        return Pose2(self.length * x, self.length * y, self.angle * theta)
 
     def _add(self, kind: str, scan: ScanLine) -> None:
         self.scans.setdefault(kind, []).append(scan)
@@ -105,7 +123,7 @@ class CarmenLog:
         ranges = _numbers(words[2 : 2 + n], n)
         tail = words[2 + n :]
         stamp = _stamp(tail[6], tail[-1])
-        return ScanLine(ranges, None, 0.0, None, _pose(tail[0:3]), _pose(tail[3:6]), stamp, len(self.moves))
+        return ScanLine(ranges, None, 0.0, None, self._pose(tail[0:3]), self._pose(tail[3:6]), stamp, len(self.moves))
 
     def _laser(self, words: list[str], *, robot: bool) -> ScanLine:
         """Read ``KIND type start fov step max accuracy mode n r1..rn m e1..em [laser robot ...] clock host clock``."""
@@ -114,7 +132,7 @@ class CarmenLog:
         ranges = _numbers(words[9 : 9 + n], n)
         tail = words[10 + n + int(words[9 + n]) :]
         fov = resolve_field_of_view(start, view, step, n)
-        laser_pose, robot_pose = (_pose(tail[0:3]), _pose(tail[3:6])) if robot else (None, None)
+        laser_pose, robot_pose = (self._pose(tail[0:3]), self._pose(tail[3:6])) if robot else (None, None)
         stamp = _stamp(tail[-3], tail[-1])
         if fov.repair:
             self.repaired[fov.repair] += 1
@@ -221,18 +239,6 @@ def _even_step(view: float, beams: int, *, hint: float = 0.0) -> float:
     """
     gaps = beams - 1 if beams % 2 or hint == beams - 1 else beams
     return view / max(gaps, 1)
-
-
-def _pose(words: list[str]) -> Pose2:
-    """Read three words as x, y [m] and heading [rad].
-
-    Raises:
-        ValueError: They are no finite numbers.
-    """
-    x, y, theta = map(float, words)
-    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(theta)):
-        raise ValueError("a pose that is not finite")
-    return Pose2(x, y, theta)
 
 
 def _numbers(words: list[str], count: int) -> FloatArray:

@@ -11,6 +11,7 @@ from closedrooms.core.files.incoming import is_file, is_folder, read_head, readi
 from closedrooms.core.remarks import Remark
 from closedrooms.mapping.logs.bags.bag_files import METADATA, is_bag_folder
 from closedrooms.mapping.logs.bags.bag_options import BagOptions
+from closedrooms.mapping.logs.odometry_units import UNITS, contradicts, find_unit, unit_remark
 from closedrooms.mapping.logs.recorded_odometry import bridge_jumps, jump_remarks
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 
@@ -59,7 +60,7 @@ def read_run(
     if not run.scans:
         found = "".join(f"; {remark}" for remark in run.remarks)
         raise InvalidInputError(f"no scan that can be used{found}", expected="laser scans", where=path)
-    return _without_frozen_odometry(run)
+    return _fitting(_without_frozen_odometry(run))
 
 
 def _read(path: Path, options: BagOptions) -> RecordedRun:
@@ -117,4 +118,21 @@ def _without_frozen_odometry(run: RecordedRun) -> RecordedRun:
     if float(np.abs(run.odometry - run.odometry[0]).max()) > SAME_POSE:
         return run
     remark = Remark(action="guessed", what="motion", why="the odometry never changes; found from the scans alone")
+    return _by_scans_alone(run, remark)
+
+
+def _fitting(run: RecordedRun) -> RecordedRun:
+    """Read an odometry that contradicts the scans in the unit that fits them; take it away where none does."""
+    if not run.has_odometry or not contradicts(run.scans, run.odometry):
+        return run
+    unit = find_unit(run.scans, run.odometry)
+    scaled = run.odometry * np.array([unit or 1.0, unit or 1.0, 1.0])
+    if unit is None or contradicts(run.scans, scaled):
+        why = "the odometry contradicts the scans (a wrong mounting or field of view?); found from the scans alone"
+        return _by_scans_alone(run, Remark(action="guessed", what="motion", why=why, loss=True))
+    return replace(run, odometry=scaled, remarks=(*run.remarks, unit_remark(UNITS[unit])))
+
+
+def _by_scans_alone(run: RecordedRun, remark: Remark) -> RecordedRun:
+    """Take the odometry away."""
     return replace(run, odometry=np.zeros((len(run.scans), 3)), has_odometry=False, remarks=(*run.remarks, remark))

@@ -29,8 +29,8 @@ def test_a_map_without_walls_says_how_far_the_echoes_were() -> None:
 
 
 def test_scans_that_fit_nowhere_are_counted() -> None:
-    assert _lost_remarks(0) == ()
-    (remark,) = _lost_remarks(3)
+    assert _lost_remarks(0, 5, 100) == ()
+    (remark,) = _lost_remarks(3, 0, 100)
     assert (remark.action, remark.what, remark.count, remark.loss) == ("guessed", "scans' poses", 3, True)
 
 

@@ -6,6 +6,8 @@ import pytest
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MapperConfig
+from closedrooms.mapping.logs import RecordedRun
+from closedrooms.mapping.map_builder import build_map
 from closedrooms.mapping.scan_odometry import STALE, SURROUNDINGS, ScanOdometry
 from closedrooms.mapping.scan_preparation import prepare_scans
 from closedrooms.mapping.trajectory import ate
@@ -124,3 +126,18 @@ def test_a_step_of_a_metre_is_found_where_scans_are_seconds_apart(office: Any) -
     pose = followed_at(odometry, office, Pose2(3.0, 1.0, 0.2), 2.0)
     assert pose.as_tuple() == pytest.approx((1.0, 0.0, 0.2), abs=0.06)
     assert odometry.lost == 0
+
+
+def test_scans_that_a_hall_does_not_hold_are_told(segment_world: Any, office: Any) -> None:
+    """A hall of niches that are all alike; an office has ends."""
+    niches = [(x, y, x, y + d) for x in np.arange(-40.0, 60.0, 1.5) for y, d in ((0.0, 0.2), (2.0, -0.2))]
+    hall = segment_world([(-50.0, 0.0, 70.0, 0.0), (-50.0, 2.0, 70.0, 2.0), *niches])
+    held = {}
+    for name, world, tour in (("hall", hall, [(0.0, 1.0), (4.0, 1.0)]), ("office", office, TOUR)):
+        drive = world.drive(tour, noise=0.01, step=0.2)
+        run = RecordedRun(tuple(drive.scans), np.zeros((len(drive.scans), 3)), has_odometry=False)
+        held[name] = [remark for remark in build_map(run).remarks if "along a hall" in remark.why]
+    assert held["office"] == []
+    (remark,) = held["hall"]
+    assert remark.loss
+    assert remark.count > 10

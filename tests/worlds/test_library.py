@@ -90,7 +90,7 @@ def test_each_format_is_known_by_how_it_begins(tmp_path: Path, name: str, head: 
     path.write_bytes(head)
     found = importer_of(path)
     assert found.name == name
-    assert found.levels == (name == "rmf")
+    assert found.levels == (name in {"rmf", "luperto"})
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Floor plans of schools and offices as XML after Luperto and Amigoni."""
 
+import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +11,7 @@ from shapely.geometry import Polygon
 
 from closedrooms.core.door import Point
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.names import shown
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.formats.portals import Portal, pair_portals, plan_of_portals
 from closedrooms.worlds.formats.room_outlines import GAP, clean_outlines, hull_areas, outline_lines, repaired
@@ -26,19 +28,21 @@ UNITS = {
 }  # fmt: skip
 
 
-def read_luperto(path: str | Path) -> FloorPlan:
-    """Read one floor.
+def read_luperto(path: str | Path, level: str | None = None) -> FloorPlan:
+    """Read one floor; what was dropped, repaired or guessed stands in its ``remarks``.
 
-    What was dropped, repaired or guessed stands in its ``remarks``.
+    Args:
+        path: The file.
+        level: Name of the floor, else its id, else its number from 0, for files that hold several.
 
     Raises:
-        InvalidInputError: Missing file, broken XML, no scale, no room with an outline.
+        InvalidInputError: Missing file, broken XML, no such floor, no scale, no room with an outline.
     """
     path = Path(path)
     root = parse_xml(path, what=WHAT)
     metres = _scale(root, path)
     remarks: list[Remark] = []
-    spaces = _spaces(root, path)
+    name, spaces = _floor(root, level, path)
     names = [f"space {number} ({_label(space)})" for number, space in enumerate(spaces)]
     outlines = [_outline(space, name, metres, remarks) for space, name in zip(spaces, names, strict=True)]
     polygons = clean_outlines(outlines, remarks, names=names)
@@ -49,10 +53,11 @@ def read_luperto(path: str | Path) -> FloorPlan:
         raise no_rooms("spaces with an outline", hull_areas(corners), remarks, path)
     rooms = tuple(PlanRoom(f"r{i:02d}", _label(space), polygon) for i, (space, polygon) in enumerate(kept))
     gone = {attribute(space, "id") for space in spaces} - {attribute(space, "id") for space, _ in kept}
-    portals = _portals([space for space, _ in kept], gone, metres, remarks)
+    portals = _portals(kept, gone, metres, remarks)
     dropped = sum(remark.count for remark in remarks if remark.action == "dropped" and remark.what == "doors")
     plan = plan_of_portals(rooms, portals, remarks)
-    plan = replace(plan, name=path.stem, meta={"source": path.name, "format": "luperto"})
+    meta: dict[str, object] = {"source": path.name, "format": "luperto", **({"level": name} if name else {})}
+    plan = replace(plan, name=f"{path.stem}-{name}" if name else path.stem, meta=meta)
     walls = outline_lines(outlines, polygons)
     return settle(plan, remarks, Source(rooms=len(spaces), doors=len(portals) + dropped, walls=walls, within=GAP), path)
 
@@ -78,13 +83,42 @@ def _scale(root: Any, path: Path) -> float:
     return value
 
 
-def _spaces(root: Any, path: Path) -> list[Any]:
-    """List the spaces of all floors."""
-    floors = children(root, "floor")
-    spaces = [space for floor in floors for space in children(child(floor, "spaces"), "space")]
+def _floor(root: Any, level: str | None, path: Path) -> tuple[str, list[Any]]:
+    """Find the floor that is wanted: its name, empty where none is, and its spaces.
+
+    Floors that are drawn beside each other are one plan; those above each other have to be named.
+    """
+    floors = [children(child(floor, "spaces"), "space") for floor in children(root, "floor")]
+    names = [
+        (text(child(floor, "name")) or attribute(floor, "name") or attribute(floor, "id") or str(number)).strip()
+        for number, floor in enumerate(children(root, "floor"))
+    ]
+    used = [number for number, spaces in enumerate(floors) if spaces]
+    if level is None and not _overlap([floors[number] for number in used]):
+        name, spaces = "", [space for number in used for space in floors[number]]
+    else:
+        told = ", ".join(shown(names[number], longest=40) for number in used[:10])
+        if level is None:
+            raise InvalidInputError(
+                f"a building with the floors {told}", expected="FILE:LEVEL with one of them", where=path
+            )
+        wanted = [number for number in used if names[number] == level]
+        if len(wanted) != 1:
+            what = f"no floor {level!r}" if not wanted else f"{len(wanted)} floors {level!r}"
+            raise InvalidInputError(what, expected=f"one of {told}", where=path)
+        name, spaces = level, floors[wanted[0]]
     if len(spaces) > MAX_SPACES:
         raise InvalidInputError(f"{len(spaces)} spaces", expected=f"at most {MAX_SPACES}", where=path)
-    return spaces
+    return name, spaces
+
+
+def _overlap(floors: list[list[Any]]) -> bool:
+    """Check whether the drawings of floors lie on each other."""
+    frames = []
+    for spaces in floors:
+        read = [_point(p, 1.0) for space in spaces for p in children(child(space, "bounding_polygon"), "point")]
+        frames.append(shapely.MultiPoint([point for point in read if point is not None]).envelope)
+    return any(a.intersection(b).area > 0.0 for a, b in itertools.combinations(frames, 2))
 
 
 def _label(space: Any) -> str:
@@ -133,31 +167,51 @@ def _from_segments(space: Any, metres: float) -> Polygon | None:
     return max(faces, key=lambda face: face.area, default=None)
 
 
-def _portals(spaces: list[Any], gone: set[str | None], metres: float, remarks: list[Remark]) -> list[Portal]:
+def _portals(
+    rooms: list[tuple[Any, Polygon]], gone: set[str | None], metres: float, remarks: list[Remark]
+) -> list[Portal]:
     """Read the passages, each once although both of its rooms list it.
 
     Args:
-        spaces: That became rooms.
+        rooms: Spaces that became rooms, with their outlines.
         gone: Ids of the others.
         metres: Per pixel.
-        remarks: Portals without a place, or to no single other room, are added here.
+        remarks: Portals without a place, or to no single other room, are added here, and ids that are used twice.
     """
-    index = {attribute(space, "id"): number for number, space in enumerate(spaces)}
+    index: dict[str, list[int]] = {}
+    for number, (space, _) in enumerate(rooms):
+        index.setdefault(attribute(space, "id") or "", []).append(number)
     found: list[tuple[int, Portal]] = []
-    for number, space in enumerate(spaces):
+    for number, (space, _) in enumerate(rooms):
         places = _segment_places(space, metres)
         for order, portal in enumerate(children(child(space, "portals"), "portal")):
             targets = {text(target).strip() for target in children(child(portal, "target"), "id")}
-            others = sorted(index[t] for t in targets if t in index and index[t] != number)
-            place = places.get(text(child(portal, "linesegment")).strip())
+            targets.discard(attribute(space, "id") or "")
+            drawn = places.get(text(child(portal, "linesegment")).strip(), [])
+            place = drawn[0] if drawn else None
+            named = [[n for n in index[target] if n != number] for target in sorted(targets & index.keys())]
+            others = sorted({_nearest(numbers, place, rooms) for numbers in named if numbers})
             name = f"portal {order} of r{number:02d} ({_label(space)})"
             if len(others) != 1 or place is None:
                 remarks.append(_useless(name, place, len(others), bool(targets & gone)))
                 continue
+            # Of several lines of one id, the one that the other room touches.
+            other = rooms[others[0]][1]
+            place = min(drawn, key=lambda at, other=other: other.distance(shapely.Point(at)))  # type: ignore[misc]
             pair = (min(number, others[0]), max(number, others[0]))
             explicit = text(child(portal, "type")).strip().upper() != "IMPLICIT"
             found.append((number, Portal(place, pair, explicit, name=name)))
+    twice = tuple(name or "none" for name, numbers in index.items() if len(numbers) > 1)
+    if twice:
+        why = "several rooms have them; a portal leads to the nearest of these"
+        remarks.append(Remark(action="guessed", what="ids of rooms", why=why, names=twice, count=len(twice)))
     return pair_portals(found)
+
+
+def _nearest(numbers: list[int], place: Point | None, rooms: list[tuple[Any, Polygon]]) -> int:
+    """Choose the room next to a place among several."""
+    point = shapely.Point(place or (0.0, 0.0))
+    return min(numbers, key=lambda number: (rooms[number][1].distance(point), number))
 
 
 def _useless(name: str, place: Point | None, others: int, to_dropped_room: bool) -> Remark:
@@ -174,13 +228,13 @@ def _useless(name: str, place: Point | None, others: int, to_dropped_room: bool)
     return Remark(action="dropped", what="doors", why=why, names=(name,), loss=True)
 
 
-def _segment_places(space: Any, metres: float) -> dict[str, Point]:
-    """Find the middle of each line segment of a space, by its id."""
-    places = {}
+def _segment_places(space: Any, metres: float) -> dict[str, list[Point]]:
+    """Find the middles of the line segments of a space, by their ids."""
+    places: dict[str, list[Point]] = {}
     for segment in children(child(space, "space_representation"), "linesegment"):
         points = [_point(point, metres) for point in children(segment, "point")]
         usable = [point for point in points if point is not None]
         if usable:
             x, y = (sum(values) / len(usable) for values in zip(*usable, strict=True))
-            places[(attribute(segment, "id") or "").strip()] = (x, y)
+            places.setdefault((attribute(segment, "id") or "").strip(), []).append((x, y))
     return places

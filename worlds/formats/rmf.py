@@ -29,6 +29,8 @@ LOOSE_END = 0.5
 SMALLEST, NARROWEST = 1.0, 0.35
 # What is drawn on a line lies this near to it [m].
 ON_LINE = 0.06
+# What is drawn on a wall misses its middle by no more than this [m]: vertices are rounded.
+ON_WALL = 0.01
 # On each side of a door its room is looked for this far away [m].
 PROBE = 0.3
 
@@ -46,7 +48,7 @@ def read_rmf(path: str | Path, level: str | None = None) -> FloorPlan:
     """
     path = Path(path)
     remarks: list[Remark] = []
-    read = read_level(path, level, remarks)
+    read = _doors_on_walls(read_level(path, level, remarks), remarks)
     name = read.name
     if not read.walls:
         lost = "".join(f"; {remark}" for remark in remarks if remark.what in ("vertices", "walls"))
@@ -75,6 +77,32 @@ def read_rmf(path: str | Path, level: str | None = None) -> FloorPlan:
         door_widths=[math.dist(*door.segment) for door in read.doors],
     )
     return settle(plan, remarks, source, path)
+
+
+def _doors_on_walls(level: RmfLevel, remarks: list[Remark]) -> RmfLevel:
+    """Move doors that are drawn beside a whole wall, no further than it is thick, onto it.
+
+    A door whose both ends meet walls stands in a gap of its own and stays.
+    """
+    lines = [LineString(wall) for wall in level.walls]
+    tree = STRtree(lines)
+    doors, moved = [], []
+    for door in level.doors:
+        ends = [shapely.Point(end) for end in door.segment]
+        near = tree.query(ends, predicate="dwithin", distance=WALL + ON_WALL)
+        touched = {int(end) for end, wall in near.T if lines[wall].distance(ends[end]) <= ON_WALL}
+        both = sorted({*near[1][near[0] == 0].tolist()} & {*near[1][near[0] == 1].tolist()})
+        feet = [tuple(lines[wall].interpolate(lines[wall].project(end)) for end in ends) for wall in both]
+        feet = [(a, b) for a, b in feet if a.distance(b) > 0.95 * math.dist(*door.segment)]
+        if feet and len(touched) < 2:
+            a, b = min(feet, key=lambda pair: sum(foot.distance(end) for foot, end in zip(pair, ends, strict=True)))
+            door = replace(door, segment=((round(a.x, 4), round(a.y, 4)), (round(b.x, 4), round(b.y, 4))))  # noqa: PLW2901
+            moved.append(door.name)
+        doors.append(door)
+    if moved:
+        why = "drawn beside a wall; moved onto it"
+        remarks.append(Remark(action="repaired", what="doors", why=why, names=tuple(moved), count=len(moved)))
+    return replace(level, doors=tuple(doors))
 
 
 def _closers(level: RmfLevel, remarks: list[Remark]) -> list[Segment]:

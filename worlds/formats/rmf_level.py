@@ -1,5 +1,6 @@
 """One level of an Open-RMF building: its vertices, walls, doors and floor in metres, and where its names stand."""
 
+import itertools
 import math
 import statistics
 from collections.abc import Sequence
@@ -27,6 +28,7 @@ KINDS: dict[str, DoorKind] = {
     "double_telescope": "sliding", "single_telescope": "sliding", "telescope": "sliding",
 }  # fmt: skip
 MAX_ELEMENTS = 200_000
+MOST_FIDUCIALS = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,15 +179,31 @@ def _scale(data: dict[str, Any], fields: dict[str, Any], path: Path, remarks: li
         usable = [value for value in values if value is not None]
         if not usable:
             continue
+        shared = 1.0 if level is fields else _by_fiducials(fields, level, path)
         if level is not fields:
-            why = f"the level has no measurements, those of level {str(name)[:40]} are taken"
+            by = "those" if shared is None else "the fiducials that it shares with those"
+            why = f"the level has no measurements, {by} of level {str(name)[:40]} are taken"
             remarks.append(Remark(action="guessed", what="scale", why=why))
+            usable = [(shared or 1.0) * value for value in usable]
         if max(usable) > (1.0 + DISAGREE) * min(usable):
             why = f"measurements say {min(usable):.4g} to {max(usable):.4g} m a pixel, their median is taken"
             remarks.append(Remark(action="guessed", what="scale", why=why))
             return statistics.median(usable)
         return sum(usable) / len(usable)
     raise InvalidInputError("a building without measurements", expected="a measured distance for scale", where=path)
+
+
+def _by_fiducials(level: dict[str, Any], other: dict[str, Any], path: Path) -> float | None:
+    """Compute how many pixels of another level one of this level is, by marks that both drawings show."""
+    places: list[dict[str, tuple[float, float]]] = []
+    for fields in (level, other):
+        rows = [row for row in _rows(fields, "fiducials", path) if isinstance(row, list) and len(row) > 2]
+        found = {str(row[2]).strip(): _vertex(row, (1.0, 1.0)) for row in rows}
+        places.append({name: place for name, place in found.items() if place is not None})
+    here, there = places
+    pairs = itertools.combinations(sorted((here.keys() & there.keys()) - {""})[:MOST_FIDUCIALS], 2)
+    ratios = [math.dist(there[a], there[b]) / math.dist(here[a], here[b]) for a, b in pairs if here[a] != here[b]]
+    return statistics.median(ratios) if ratios and min(ratios) > 0.0 else None
 
 
 def _measured(row: Any, vertices: list[Any]) -> float | None:

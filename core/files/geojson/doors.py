@@ -22,6 +22,8 @@ OPEN = ("open", "opened", "false", "0")
 CLOSED = ("closed", "shut", "locked", "true", "1")
 # Doors wider than this are no doors, but are often in centimetres [m].
 ODD_WIDTH = 10.0
+# A line that is longer by this share than the distance of its ends has a bend.
+BEND = 0.05
 # Several doors that all lie within this are in degrees, or all in one place by mistake; so is a leaf as short [m].
 ONE_PLACE = 0.05
 
@@ -73,6 +75,7 @@ def read_doors(path: Path, *, remarks: list[Remark] | None = None) -> list[Close
         told.append(
             Remark(action="dropped", what=noun, why="the file says open", names=tuple(opened), count=len(opened))
         )
+    told += _bent(features, names)
     told += _unknown_states(doors)
     told += _odd_sizes(doors, path)
     if remarks is not None:
@@ -86,6 +89,15 @@ def _is_open(properties: dict[str, Any]) -> bool:
     return words[0] in OPEN or words[1] in {"true", "1", "yes"} or words[2] in {"false", "0", "no"}
 
 
+def _bent(features: Sequence[GeoFeature], names: Sequence[str]) -> list[Remark]:
+    """Say which doors are lines with a bend, and taken straight from their first point to their last."""
+    lines = {name: line for name, (line, _) in zip(names, features, strict=True) if isinstance(line, LineString)}
+    straight = {name: math.dist(line.coords[0], line.coords[-1]) for name, line in lines.items()}
+    bent = tuple(name for name, line in lines.items() if line.length - straight[name] > BEND * line.length)
+    why = "drawn with a bend; taken straight from their first point to their last"
+    return [Remark(action="guessed", what="doors", why=why, names=bent, count=len(bent))] if bent else []
+
+
 def _unknown_states(doors: Sequence[ClosedDoor]) -> list[Remark]:
     """Say which doors are in a state of another name, and taken to be closed."""
     others = tuple(door.id for door in doors if door.state.strip().lower() not in CLOSED)
@@ -97,7 +109,7 @@ def _unknown_states(doors: Sequence[ClosedDoor]) -> list[Remark]:
 
 
 def _odd_sizes(doors: Sequence[ClosedDoor], path: Path) -> list[Remark]:
-    """Warn of doors that are too wide for metres.
+    """Warn of doors that are too wide for metres, or lie on another.
 
     Raises:
         InvalidInputError: Doors that all lie in one place, but not on one point.
@@ -108,9 +120,17 @@ def _odd_sizes(doors: Sequence[ClosedDoor], path: Path) -> list[Remark]:
         raise InvalidInputError(
             f"{len(doors)} doors within {spread:.2g} m (degrees?)", expected="metres in the map frame", where=path
         )
+    told = []
+    first: dict[tuple[float, ...], str] = {}
+    twice = tuple(door.id for door in doors if first.setdefault(door.midpoint, door.id) != door.id)
+    if twice:
+        why = "they lie exactly on another door; taken to be doors of their own"
+        told.append(Remark(action="guessed", what="doors", why=why, names=twice, count=len(twice)))
     wide = tuple(door.id for door in doors if door.width is not None and door.width > ODD_WIDTH)
     why = f"above {ODD_WIDTH:g}; taken as metres (they look like centimetres)"
-    return [Remark(action="guessed", what="widths", why=why, names=wide, count=len(wide))] if wide else []
+    if wide:
+        told.append(Remark(action="guessed", what="widths", why=why, names=wide, count=len(wide)))
+    return told
 
 
 def _door_names(features: Sequence[GeoFeature], path: Path, remarks: list[Remark]) -> list[str]:

@@ -15,6 +15,8 @@ LARGEST_VIEW = 2.0 * math.pi + 0.1
 """No sweep looks further around [rad], one beam and rounding more than a turn."""
 SAME_VIEW = 0.02
 """Share by which last angle less first may miss the beams' steps: headers are rounded."""
+MARKS = 3
+"""Different ranges beyond the longest that a sensor may write for "nothing" and errors."""
 SCAN, ECHOES = "sensor_msgs/msg/LaserScan", "sensor_msgs/msg/MultiEchoLaserScan"
 
 
@@ -33,6 +35,12 @@ def _first_echo(echoes: FloatArray, shortest: float) -> float:
     if measured.size:
         return float(measured.min())
     return math.inf if (echoes == math.inf).any() else math.nan
+
+
+def count_beyond(ranges: FloatArray, range_max: float) -> int:
+    """Count the ranges [m] of a sweep that are longer than ``range_max``; marks for "nothing" are few values."""
+    far = ranges[np.isfinite(ranges) & (ranges > range_max)]
+    return int(far.size) if np.unique(np.round(far, 1)).size > MARKS else 0
 
 
 def sector_of(message: Any, beams: int) -> tuple[float, float, str]:

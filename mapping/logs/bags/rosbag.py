@@ -25,7 +25,7 @@ from closedrooms.mapping.logs.bags.bag_messages import (
     stamp_of,
 )
 from closedrooms.mapping.logs.bags.bag_options import BagOptions
-from closedrooms.mapping.logs.bags.bag_scans import ranges_of, scan_of, sector_of, sweep_of
+from closedrooms.mapping.logs.bags.bag_scans import count_beyond, ranges_of, scan_of, sector_of, sweep_of
 from closedrooms.mapping.logs.bags.transform_tree import (
     CORRECTED_FRAMES,
     LEVEL,
@@ -40,6 +40,9 @@ from closedrooms.mapping.logs.recorded_run import RecordedRun
 
 LONGEST_SWEEP = 1.1
 """Time from the first beam of a sweep to its last against that from one sweep to the next: more cannot be."""
+
+MOST_BEYOND = 0.1
+"""Share of the ranges that may lie beyond what the scans state as the longest."""
 
 
 def read_bag(path: Path, options: BagOptions) -> RecordedRun:
@@ -156,7 +159,7 @@ def _run(
     has_odometry: bool,
 ) -> RecordedRun:
     """Put the scans that have odometry together."""
-    scans, rows, broken, echoes = [], [], 0, 0
+    scans, rows, broken, echoes, measured, beyond = [], [], 0, 0, 0, 0
     mended: Counter[str] = Counter()
     for row, i in enumerate(np.flatnonzero(known).tolist()):
         message = messages.scans[i][0]
@@ -168,6 +171,8 @@ def _run(
             broken += 1
             continue
         echoes += dropped
+        measured += int(np.isfinite(ranges).sum())
+        beyond += count_beyond(ranges, scan.range_max)
         mended.update([repair] if repair else [])
         scans.append(scan)
         rows.append(row)
@@ -179,6 +184,9 @@ def _run(
     ]
     if echoes:
         remarks.append(Remark(action="dropped", what="echoes", why="the first of each beam is mapped", count=echoes))
+    if beyond > MOST_BEYOND * measured:
+        why = "beyond the range_max that the scans state, though they differ: a wrong header"
+        remarks.append(Remark(action="dropped", what="ranges", why=why, count=beyond, loss=True))
     forwards, backwards = forward(stamps[np.flatnonzero(known)[rows]] if rows else np.zeros(0))
     swept = tuple(replace(scan, stamp=float(stamp)) for scan, stamp in zip(scans, forwards, strict=True))
     return RecordedRun(swept, poses[rows].reshape(-1, 3), None, (*remarks, *backwards), has_odometry)

@@ -186,7 +186,7 @@ def test_a_room_with_wrong_properties_is_one_clear_line(tmp_path: Path, wrong: d
 
 def test_a_room_is_read_with_its_confidence_and_alternatives(tmp_path: Path) -> None:
     others = (Alternative(box(0, 0, 3, 3), 0.25), Alternative(box(0, 0, 5, 3), 0.125))
-    room = Room(box(0, 0, 4, 3), ("d",), "border", 1.5, confidence=0.75, alternatives=others)
+    room = Room(box(0, 0, 4, 3), ("d",), "border", 1.5, confidence=0.75, alternatives=others, outside=0.125)
     write_rooms(tmp_path / "rooms.geojson", [room])
     (read,) = read_rooms(tmp_path / "rooms.geojson")
     assert read == room
@@ -197,6 +197,7 @@ def test_a_room_is_read_with_its_confidence_and_alternatives(tmp_path: Path) -> 
     [
         ("confidence", 1.5, "confidence"),
         ("confidence", "high", "confidence"),
+        ("outside", -0.1, "outside"),
         ("alternatives", {"probability": 1}, "alternatives"),
         ("alternatives", [3], "alternatives"),
         ("alternatives", [{"probability": 0.5}], "geometry"),
@@ -314,3 +315,19 @@ def test_empty_geometries_are_skipped_as_null_ones_are(tmp_path: Path, empty: di
 def test_doors_of_rooms_are_read_from_tables_without_lists(tmp_path: Path, given: Any, doors: tuple[str, ...]) -> None:
     room = multi("Polygon", [[[0, 0], [1, 0], [1, 1], [0, 0]]], doors=given)
     assert read_rooms(collection(tmp_path / "r", room))[0].doors == doors
+
+
+def test_a_door_with_a_bend_and_one_on_another_are_told(tmp_path: Path) -> None:
+    def line(*points: list[float], **properties: Any) -> dict[str, Any]:
+        return {"type": "Feature", "properties": properties, "geometry": {"type": "LineString", "coordinates": points}}
+
+    path = collection(
+        tmp_path / "d",
+        line([0.0, 0.0], [1.0, 0.0], [1.0, 1.0], id="bent"),
+        line([3.0, 0.0], [3.4, 0.0], [4.0, 0.0], id="straight"),
+        point(7, 7, id="a"),
+        point(7, 7, id="b"),
+    )
+    remarks: list[Remark] = []
+    assert [door.id for door in read_doors(path, remarks=remarks)] == ["bent", "straight", "a", "b"]
+    assert [(remark.action, remark.names) for remark in remarks] == [("guessed", ("bent",)), ("guessed", ("b",))]

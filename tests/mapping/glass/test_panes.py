@@ -175,6 +175,24 @@ def test_a_pane_before_which_a_robot_turned_for_long_is_one() -> None:
     assert occupied_share(grid, map_T_world, PANE) > 0.95
 
 
+@pytest.mark.parametrize("start", [(2.4, 4.4), (3.2, 4.6)])
+def test_a_pane_that_nearly_all_scans_met_is_one(start: tuple[float, float]) -> None:
+    # The robot drives to and fro in front of it: next to no scan goes through.
+    pane, turns = (3.5, 6.0, 4.5, 6.0), [(4.0, 5.4), (4.0, 4.4)] * 4
+    grid, map_T_world = mapped(GlassWorld(walls_beside(pane), pane), [start, (4.0, start[1]), *turns])
+    assert known_share(grid, map_T_world, ROOM_BEHIND) < 0.01
+    assert occupied_share(grid, map_T_world, pane) > 0.95
+
+
+def test_a_pane_of_which_half_a_metre_is_in_view_beside_something_is_one() -> None:
+    # An open door's leaf hides the rest of it, and the wall beyond.
+    pane, leaf = (3.0, 6.0, 4.5, 6.0), (3.5, 5.7, 4.6, 5.7)
+    route = [(1.0, 3.0), (1.0, 4.9), (3.2, 5.2), (3.2, 3.0), (5.0, 3.0)]
+    grid, map_T_world = mapped(GlassWorld([*walls_beside(pane), leaf], pane), route)
+    assert known_share(grid, map_T_world, ROOM_BEHIND) < 0.05
+    assert occupied_share(grid, map_T_world, (3.0, 6.0, 3.5, 6.0)) > 0.95
+
+
 def test_a_pane_is_found_from_close_by() -> None:
     # Half a metre away, beams to either side of what is met askew meet the pane near its normal.
     pane, beside = (3.5, 6.0, 4.5, 6.0), [(0.0, 6.0, 3.5, 6.0), (4.5, 6.0, 8.0, 6.0)]

@@ -8,6 +8,7 @@ import shapely
 from shapely.geometry import box
 
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
+from closedrooms.predictor import absurd_rooms
 from closedrooms.predictor.config import PaperConfig
 from closedrooms.predictor.disjoint_rooms import NO_ROOM
 from closedrooms.predictor.paper.expansion import Growth
@@ -88,7 +89,9 @@ def test_border_rooms_take_what_others_leave_the_shallowest_first(faces):
     assert _differs(rooms[1], 4, 6, 8, 10) < 1e-6
 
 
-def test_a_border_room_that_another_room_fills_has_none_and_says_so(faces):
+def test_a_border_room_that_another_room_fills_has_none_and_says_so(faces, monkeypatch):
+    # The other one fills half of a map that shows no floor.
+    monkeypatch.setattr(absurd_rooms, "HALL", 400.0)
     start, growth = _start(faces, [A, ("p", (2.0, 10.0), (2.0, 5.0))])
     growth.owner[
         [i for i, face in enumerate(start.arrangement.faces) if face.centroid.y > 6.0 and face.centroid.x > 0]

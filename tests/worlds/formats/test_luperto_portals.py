@@ -8,6 +8,7 @@ import pytest
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.worlds.formats import luperto
 from closedrooms.worlds.formats.luperto import read_luperto
+from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan
 
 
@@ -155,3 +156,36 @@ def test_spaces_of_all_floors_are_read_and_no_more_than_so_many(
     monkeypatch.setattr(luperto, "MAX_SPACES", 1)
     with pytest.raises(InvalidInputError, match="2 spaces; expected at most 1"):
         read_luperto(path)
+
+
+def test_floors_that_lie_above_each_other_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "school.xml"
+    ground = f"<floor><name>ground</name><spaces>{A}{B}</spaces></floor>"
+    first = f'<floor id="first"><spaces>{space("c", box(10, 10, 60, 50))}</spaces></floor>'
+    path.write_text(f"<building>{scale()}{ground}{first}</building>")
+    with pytest.raises(InvalidInputError, match="the floors ground, first; expected FILE:LEVEL"):
+        read_luperto(path)
+    with pytest.raises(InvalidInputError, match="no floor 'attic'; expected one of ground, first"):
+        read_luperto(path, "attic")
+    assert len(load_world(f"{path}:ground").rooms) == 2
+    upper = read_luperto(path, "first")
+    assert [room.polygon.area for room in upper.rooms] == pytest.approx([20.0], abs=0.1)
+    assert (upper.name, upper.meta["level"]) == ("school-first", "first")
+
+
+@pytest.mark.parametrize("far_first", [True, False])
+def test_a_portal_to_an_id_that_is_used_twice_leads_to_the_nearest_room(tmp_path: Path, far_first: bool) -> None:
+    far = space("b", box(200, 40, 280, 80))
+    plan = read(tmp_path, *([A, far, B] if far_first else [A, B, far]))
+    (door,) = plan.doors
+    areas = {room.id: room.polygon.bounds[0] for room in plan.rooms}
+    assert max(areas[room] for room in door.rooms if room is not None) < 1.0
+    assert ("guessed", "ids of rooms", ("b",)) in [(r.action, r.what, r.names) for r in plan.remarks]
+
+
+def test_of_lines_with_one_id_the_one_at_the_other_room_is_the_door(tmp_path: Path) -> None:
+    lines = segment("s", point(30, 0), point(40, 0)) + segment("s", point(30, 40), point(40, 40))
+    plan = read(tmp_path, space("a", box(0, 0, 80, 40), segments=lines, portals=portal("s", "a", "b")), B)
+    (door,) = plan.doors
+    assert door.midpoint == pytest.approx((3.5, -4.0), abs=0.05)
+    assert [remark for remark in plan.remarks if remark.what == "doors"] == []

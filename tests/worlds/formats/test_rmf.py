@@ -181,3 +181,38 @@ def test_rooms_that_no_door_leads_to_are_named(tmp_path: Path) -> None:
     data["levels"]["L1"]["doors"] = []
     (remark,) = read(tmp_path, data).remarks
     assert (remark.action, remark.what, remark.names) == ("dropped", "ways into rooms", ("r00",))
+
+
+@pytest.mark.parametrize(("aside", "doors"), [(0.1, 1), (0.05, 1), (-0.08, 1), (0.3, 0)])
+def test_a_door_drawn_beside_a_whole_wall_stands_in_it(tmp_path: Path, aside: float, doors: int) -> None:
+    data = building()
+    level = data["levels"]["L1"]
+    level["walls"] = [row for row in level["walls"] if row[:2] not in ([3, 6], [7, 2])] + [[3, 2, {}]]
+    for vertex in (6, 7):
+        level["vertices"][vertex][1] += aside
+    plan = read(tmp_path, data)
+    assert len(plan.doors) == doors
+    if doors:
+        assert plan.doors[0].midpoint == pytest.approx((4.5, 3.0), abs=0.01)
+        assert ("repaired", "doors", ("main",)) in [(r.action, r.what, r.names) for r in plan.remarks]
+
+
+def test_a_door_in_a_gap_of_its_own_wall_stays_there(tmp_path: Path) -> None:
+    """Beside another wall, as between two houses."""
+    data = building()
+    level = data["levels"]["L1"]
+    level["vertices"] += [[3.0, 3.1, 0.0, ""], [6.0, 3.1, 0.0, ""]]
+    level["walls"].append([10, 11, {}])
+    assert not [remark for remark in read(tmp_path, data).remarks if "beside a wall" in remark.why]
+
+
+def test_a_level_without_measurements_is_scaled_by_the_fiducials_it_shares(tmp_path: Path) -> None:
+    data = building(coordinate_system="reference_image")
+    upper = {key: value for key, value in building()["levels"]["L1"].items() if key != "measurements"}
+    upper["vertices"] = [[2.0 * x + 7.0, 2.0 * y, *rest] for x, y, *rest in upper["vertices"]]
+    data["levels"]["L1"]["fiducials"] = [[0, 0, "a"], [10, 0, "b"], [0, 8, "c"]]
+    upper["fiducials"] = [[7, 0, "a"], [27, 0, "b"], [7, 16, "c"], [3, 3, "only here"]]
+    data["levels"]["L2"] = upper
+    plan = read(tmp_path, data, "L2")
+    assert sorted(round(room.polygon.area) for room in plan.rooms) == [30, 50]
+    assert ["fiducials" in remark.why for remark in plan.remarks if remark.what == "scale"] == [True]

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
+from closedrooms.mapping.logs import read_run
 from closedrooms.mapping.logs.bags.bag_scans import ECHOES, SCAN, ranges_of, scan_of, sector_of, sweep_of
 from closedrooms.mapping.logs.bags.transform_tree import Mount
 
@@ -158,3 +159,14 @@ def test_of_several_echoes_the_nearest_that_can_be_measured_counts() -> None:
     assert same.tolist() == plain.ranges.tolist()
     assert same is not plain.ranges
     assert none == 0
+
+
+@pytest.mark.parametrize(("far", "lost"), [(np.linspace(3.0, 9.0, 90), True), (np.full(90, 65.5), False)])
+def test_ranges_beyond_a_wrong_range_max_are_a_loss(new_bag: Any, far: Any, lost: bool) -> None:
+    pytest.importorskip("rosbags", reason="the optional extra 'bags' is not installed")
+    bag = new_bag().transform("base_link", "laser")
+    for i in range(5):
+        ranges = np.concatenate((np.full(90, 1.5), far))
+        bag.odometry(100.0 + 0.1 * i, 0.05 * i).scan(100.0 + 0.1 * i, ranges, limits=(0.1, 2.0))
+    told = [(remark.what, remark.count) for remark in read_run(bag.write()).remarks if remark.loss]
+    assert told == ([("ranges", 5 * 90)] if lost else [])
