@@ -94,6 +94,12 @@ def test_scripts_that_pages_and_figures_name_exist() -> None:
             assert (ROOT / script).is_file(), f"{path.name} names {script}"
 
 
+def test_every_benchmark_stands_in_their_list() -> None:
+    listed = (ROOT / "benchmarks" / "README.md").read_text()
+    for path in (ROOT / "benchmarks").rglob("*.py"):
+        assert f"`{path.relative_to(ROOT / 'benchmarks')}`" in listed, path.name
+
+
 def test_commands_of_readme_are_commands() -> None:
     text = (ROOT / "README.md").read_text()
     named = set(re.findall(r"^    closedrooms (\w+)", text, re.M))
