@@ -28,6 +28,12 @@ FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
 PIXEL_FREE, PIXEL_UNKNOWN, PIXEL_OCCUPIED = 254, 205, 0
 # Greys of a JPEG that are as far from the usual unknown still mean it: of plans saved at quality 50 and above.
 SPREAD = 24
+# Half the thickness of a thick wall [m], and share of the cells of one kind further inside it from which they are none.
+HALF_WALL, MOST_WIDE = 0.2, 0.1
+# Less floor is no room [square metres].
+SMALLEST_ROOM = 2.0
+# No yaw in radians is larger, but one in degrees is.
+LARGEST_YAW = 2.0 * math.pi + 0.1
 WHAT = "a ROS map (image, resolution, origin)"
 MAX_YAML = 1_000_000
 """Longest description of a map that is read [bytes]."""
@@ -189,7 +195,24 @@ def read_ros_map(path: Path, *, allow_outside: bool = False) -> RosMap:
     table = _raw() if mode == "raw" else _meanings(fields, mode, path, spread=SPREAD if lossy else 1)
     # A turned grid keeps its own axes, with its corner as their origin.
     corner, map_T_grid = ((x, y), IDENTITY) if yaw == 0.0 else ((0.0, 0.0), Pose2(x, y, yaw))
-    return RosMap(_grid(image, table, resolution, *corner), map_T_grid, tuple(remarks))
+    grid = _grid(image, table, resolution, *corner)
+    if _looks_inverted(grid):
+        why = "what is free is as thin as walls, what is occupied is wide: an inverted picture (negate)?"
+        remarks.append(Remark(action="guessed", what="cells", why=why))
+    return RosMap(grid, map_T_grid, tuple(remarks))
+
+
+def _looks_inverted(grid: OccupancyGrid) -> bool:
+    """Check whether a map shows free walls around occupied rooms."""
+    import cv2
+
+    if int(grid.occupied.sum()) <= int(grid.free.sum()):
+        return False
+    around = 2 * max(round(HALF_WALL / grid.frame.resolution), 1) + 1
+    inside = np.ones((around, around), dtype=np.uint8)
+    free, occupied = (int(cv2.erode(cells.astype(np.uint8), inside).sum()) for cells in (grid.free, grid.occupied))
+    rooms = occupied * grid.frame.resolution**2 >= SMALLEST_ROOM and occupied > 0.5 * grid.occupied.sum()
+    return bool(rooms and grid.free.any() and free < MOST_WIDE * grid.free.sum())
 
 
 def read_bare_picture(path: Path, *, resolution: float) -> OccupancyGrid:
@@ -261,8 +284,12 @@ def _origin(value: Any, path: Path, remarks: list[Remark]) -> tuple[float, float
     if math.isnan(yaw):
         remarks.append(Remark(action="guessed", what="yaw of the map", why="no number in the file, 0 was taken"))
         return x, y, 0.0
-    yaw = wrap_angle(bounded(yaw, -1e6, 1e6, name="map origin yaw", unit="rad", where=path))
-    return x, y, yaw if abs(yaw) > SAME_YAW else 0.0
+    turned = wrap_angle(bounded(yaw, -1e6, 1e6, name="map origin yaw", unit="rad", where=path))
+    turned = turned if abs(turned) > SAME_YAW else 0.0
+    if abs(yaw) > LARGEST_YAW and turned:
+        why = f"{yaw:g} is more than a turn (degrees?); read as radians, as map_server does"
+        remarks.append(Remark(action="guessed", what="yaw of the map", why=why))
+    return x, y, turned
 
 
 def _raw() -> CellArray:

@@ -1,5 +1,6 @@
 """CARMEN logs of real robots (FLASER, ROBOTLASER, RAWLASER, ODOM), plain or gzipped."""
 
+import codecs
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -74,7 +75,7 @@ def _lines(path: Path, gzipped: bool, log: CarmenLog) -> CarmenLog:
     """Take in the lines of a log; an archive that ends early ends them and is noted."""
     try:
         for line in log_lines(path, gzipped=gzipped, what="a CARMEN log", longest=MAX_LINE):
-            log.take(line.decode("ascii", errors="replace"))
+            log.take(line.removeprefix(codecs.BOM_UTF8).decode("ascii", errors="replace"))
     except TruncatedError:
         log.truncated = True
     return log

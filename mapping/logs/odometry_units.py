@@ -41,8 +41,8 @@ def contradicts(scans: Sequence[LaserScan], odometry: FloatArray) -> bool:
         scans: In the order they were taken.
         odometry: ``odom_T_robot`` at each as written, shape (n, 3).
     """
-    for weights in (DRIVING, TURNING):
-        pairs = _pairs(odometry, weights, farthest=np.inf)
+    for weights, farthest in ((DRIVING, np.inf), (TURNING, MOST_MOTION)):
+        pairs = _pairs(odometry, weights, farthest=farthest)
         # No lidar measures the same twice: one that hangs says nothing about the motion.
         pairs = [(i, j) for i, j in pairs if not np.array_equal(scans[i].ranges, scans[j].ranges, equal_nan=True)]
         if len(pairs) < LEAST_PAIRS:
@@ -89,11 +89,15 @@ def _pairs(odometry: FloatArray, weights: tuple[float, float], *, farthest: floa
         farthest: Longest way between the two [m].
     """
     x, y, theta = np.diff(odometry, axis=0).T
-    turns = np.abs((theta + np.pi) % (2.0 * np.pi) - np.pi)
-    path = np.concatenate(([0.0], np.cumsum(weights[0] * np.hypot(x, y) + weights[1] * turns)))
+    steps, turns = np.hypot(x, y), np.abs((theta + np.pi) % (2.0 * np.pi) - np.pi)
+    path = np.concatenate(([0.0], np.cumsum(weights[0] * steps + weights[1] * turns)))
+    way = np.concatenate(([0.0], np.cumsum(steps)))
     behind = np.searchsorted(path, path + LEAST_MOTION)
     first = np.flatnonzero(behind < len(path))
-    first = first[path[behind[first]] - path[first] <= farthest]
+    dx, dy, turn = (odometry[behind[first]] - odometry[first]).T
+    net = weights[0] * np.hypot(dx, dy) + weights[1] * np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi)
+    # Noise of a robot that stands or goes straight adds up to a way, but leads nowhere.
+    first = first[(net >= 0.8 * LEAST_MOTION) & (way[behind[first]] - way[first] <= farthest)]
     if not first.size:
         return []
     chosen = first[np.unique(np.linspace(0, len(first) - 1, PAIRS).round().astype(int))]

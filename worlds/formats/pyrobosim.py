@@ -30,6 +30,9 @@ WORLD = "world"
 # Lengths and coordinates beyond this are mistakes [m].
 LARGEST = 10_000.0
 MAX_ELEMENTS = 5000
+# What the pose of an entity may hold; and no yaw in radians is larger.
+POSE_KEYS = {"position", "rotation_eul", "rotation_quat", "relative_to"}
+LARGEST_YAW = 2.0 * math.pi + 0.1
 
 
 def read_pyrobosim(path: str | Path) -> FloorPlan:
@@ -170,19 +173,25 @@ def read_pose(value: Any, what: str, path: Path) -> Pose2:
     ``rotation_quat`` (w, x, y, z).
 
     Raises:
-        InvalidInputError: Another form, or a value that is no number.
+        InvalidInputError: Another form, a value that is no number, or a yaw of more than a turn: it is in degrees.
     """
 
     def number(given: Any) -> float:
         return _number(given, what, path, above=-LARGEST)
 
+    def radians(yaw: float) -> float:
+        if abs(yaw) > LARGEST_YAW:
+            expected = "radians, or a mapping with angle_units: degrees"
+            raise InvalidInputError(f"{what} with a yaw of {yaw:g}, more than a turn", expected=expected, where=path)
+        return yaw
+
     if value is None:
         return Pose2()
     if isinstance(value, list) and len(value) in (2, 3, 4, 6, 7):
         x, y, _, *turn = [number(v) for v in value] + [0.0] * (len(value) == 2)
-        yaw = _yaw(*turn, what=what, path=path) if len(turn) == 4 else turn[-1] if turn else 0.0
+        yaw = _yaw(*turn, what=what, path=path) if len(turn) == 4 else radians(turn[-1]) if turn else 0.0
         return Pose2(x, y, yaw)
-    if isinstance(value, dict):
+    if isinstance(value, dict) and value.keys() <= POSE_KEYS:
         place, euler, quaternion = (value.get(key) or {} for key in ("position", "rotation_eul", "rotation_quat"))
         if all(isinstance(part, dict) for part in (place, euler, quaternion)):
             x, y = (number(place.get(key, 0.0)) for key in "xy")
@@ -193,7 +202,7 @@ def read_pose(value: Any, what: str, path: Path) -> Pose2:
             if units not in {"radians", "degrees"}:
                 raise InvalidInputError(f"{what} in {units!r}", expected="radians or degrees", where=path)
             yaw = number(euler.get("yaw", 0.0))
-            return Pose2(x, y, math.radians(yaw) if units == "degrees" else yaw)
+            return Pose2(x, y, math.radians(yaw) if units == "degrees" else radians(yaw))
     raise InvalidInputError(
         f"{what} {str(value)[:60]!r}",
         expected="[x, y], [x, y, z], [x, y, z, yaw] or position with rotation_eul or rotation_quat",

@@ -8,7 +8,7 @@ from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.incoming import is_file, is_folder, read_head
+from closedrooms.core.files.incoming import is_file, is_folder, opened, read_head
 from closedrooms.core.files.yaml_text import parse_yaml
 from closedrooms.core.names import shown
 from closedrooms.core.remarks import Remark
@@ -20,6 +20,8 @@ STORED = re.compile(r"(?P<stem>.+?)(?:_(?P<piece>\d+))?(?P<kind>\.(?:mcap|db3|ba
 """Names of the files of a bag; recorders that split it number the pieces."""
 SUFFIXES = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite": ".db3"}
 """What the files of a bag begin with, and how their names should end."""
+MCAP_MAGIC = b"\x89MCAP0\r\n"
+"""What an MCAP file begins and ends with."""
 NOT_IN_ADDRESSES = set("?#%")
 """What rosbags, which opens files by an address, cannot have in their names."""
 
@@ -43,7 +45,7 @@ def bag_paths(path: Path, remarks: list[Remark]) -> Iterator[list[Path]]:
     Raises:
         InvalidInputError: Broken metadata, or none of the files that they name.
     """
-    files = _whole_bag(path, remarks) if is_folder(path) else [path]
+    files = _ended(_whole_bag(path, remarks), remarks) if is_folder(path) else [path]
     remarks += _unwritten(files)
     with tempfile.TemporaryDirectory() as folder:
         yield [_named(file, Path(folder) / f"bag{number}") for number, file in enumerate(files)]
@@ -137,6 +139,25 @@ def _unwritten(files: Sequence[Path]) -> list[Remark]:
     names = [log.name for log in logs if is_file(log) and log.stat().st_size > 0]
     why = "it holds messages that are not yet in the bag; sqlite3's VACUUM puts them in"
     return [_about("dropped", "pieces of the bag", why, names)] if names else []
+
+
+def _ended(files: list[Path], remarks: list[Remark]) -> list[Path]:
+    """Leave out the piece that a recorder which was killed did not finish: MCAP has its index at the end."""
+    pieces = [file for file in files if file.suffix == ".mcap"] if len(files) > 1 else []
+    unfinished = [file for file in pieces if not _has_end(file)]
+    if not unfinished or len(unfinished) == len(files):
+        return files
+    why = "they end without an index (a recorder that was killed?); 'mcap recover' makes one"
+    remarks.append(_about("dropped", "pieces of the bag", why, [file.name for file in unfinished]))
+    return [file for file in files if file not in unfinished]
+
+
+def _has_end(file: Path) -> bool:
+    with opened(file, "a rosbag") as content:
+        if content.seek(0, 2) < len(MCAP_MAGIC):
+            return False
+        content.seek(-len(MCAP_MAGIC), 2)
+        return content.read() == MCAP_MAGIC
 
 
 def _named(path: Path, link: Path) -> Path:

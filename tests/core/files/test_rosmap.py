@@ -359,3 +359,23 @@ def test_a_jpeg_may_be_as_large_as_any_map(tmp_path: Path, monkeypatch: pytest.M
     (tmp_path / "map.yaml").write_text("image: map.jpg\nresolution: 0.05\norigin: [0, 0, 0]\n")
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)  # Pillow's own bound is below ours
     assert read_ros_map(tmp_path / "map.yaml").grid.free.all()
+
+
+def test_a_yaw_in_degrees_and_an_inverted_picture_are_told(tmp_path: Path) -> None:
+    cells = np.full((60, 80), FREE, dtype=np.int8)
+    cells[[0, 1, -1, -2]] = cells[:, [0, 1, -1, -2]] = OCCUPIED
+    write_map(tmp_path / "m", OccupancyGrid(GridFrame(0.05, 0.0, 0.0, 60, 80), cells))
+    text = (tmp_path / "m.yaml").read_text()
+
+    def told(*changes: tuple[str, str]) -> list[tuple[str, str]]:
+        changed = text
+        for old, new in changes:
+            assert old in changed
+            changed = changed.replace(old, new)
+        (tmp_path / "n.yaml").write_text(changed)
+        return [(remark.action, remark.what) for remark in read_ros_map(tmp_path / "n.yaml").remarks]
+
+    assert told() == []
+    assert told(("0.0, 0.0, 0.0", "0.0, 0.0, 90.0")) == [("guessed", "yaw of the map")]
+    assert told(("0.0, 0.0, 0.0", "0.0, 0.0, 6.283185307179586")) == []
+    assert told(("negate: 0", "negate: 1")) == [("guessed", "cells")]

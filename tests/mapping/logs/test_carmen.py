@@ -437,3 +437,9 @@ def test_a_log_that_another_program_packed_is_named(tmp_path: Path, pack: Callab
     path.write_bytes(pack(b"FLASER 1 1.0"))
     with pytest.raises(InvalidInputError, match=r"a file packed by (bzip2|xz); expected the file unpacked"):
         read_run(path)
+
+
+def test_a_mark_of_the_encoding_costs_no_line(tmp_path: Path) -> None:
+    path = tmp_path / "run.log"
+    path.write_text("\n".join([flaser(0.0), flaser(0.1)]), encoding="utf-8-sig")
+    assert len(read_run(path).scans) == 2

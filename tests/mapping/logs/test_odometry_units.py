@@ -65,6 +65,16 @@ def test_a_straight_hall_says_nothing_about_the_motion_along_it(segment_world: A
     assert not contradicts(drive.scans, scaled(drive.truth, 2.0))
 
 
+def test_a_hall_of_niches_keeps_its_odometry_however_noisy(segment_world: Any) -> None:
+    """Noise of the heading adds up to a turn on the way through a hall that looks the same everywhere."""
+    niches = [(x, y, x, y + d) for x in np.arange(-20.0, 50.0, 5.0) for y, d in ((0.0, -0.1), (2.4, 0.1))]
+    hall = segment_world([(-30.0, 0.0, 60.0, 0.0), (-30.0, 2.4, 60.0, 2.4), *niches])
+    drive = hall.drive([(0.0, 1.2), (18.0, 1.2)], noise=0.02, distance_noise=0.03, turn_noise=0.03, beams=181, seed=1)
+    turned = np.abs(np.diff(drive.odometry[:, 2])).sum()
+    assert turned > 1.0
+    assert not contradicts(drive.scans, drive.odometry)
+
+
 @pytest.mark.parametrize(("length", "angle", "units"), [
     (1.0, 1.0, None), (100.0, 1.0, "centimetres"), (1.0, 180.0 / math.pi, "degrees"),
     (1000.0, 180.0 / math.pi, "millimetres and degrees"),

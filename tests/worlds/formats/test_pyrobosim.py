@@ -71,6 +71,7 @@ def test_a_pose_may_be_relative_to_another_room(tmp_path: Path) -> None:
     "pose",
     [[1], [1, 2, 3, 4, 5], ["x", 2], 3, "here", {"position": [1, 2]}, {"position": {"x": "a"}}, [1e300, 0],
      {"rotation_quat": {"w": 0.0, "x": 0, "y": 0, "z": 1e-9}}, {"rotation_eul": {"yaw": 1, "angle_units": "turns"}},
+     [1, 2, 0, 90], {"rotation_eul": {"yaw": 90}}, {"x": 1, "y": 2, "yaw": 0.0},
      {"relative_to": "a"}, {"relative_to": "moon"}, [float("nan"), 0]],
 )  # fmt: skip
 def test_another_form_is_refused_with_the_name_of_the_room(tmp_path: Path, pose: object) -> None:

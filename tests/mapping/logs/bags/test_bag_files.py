@@ -76,6 +76,18 @@ def test_pieces_that_are_missing_are_a_loss(split: Any) -> None:
         assert ("dropped", "pieces of the bag", (names[1],), True) in told(run)
 
 
+@pytest.mark.parametrize("left", [0.0, 0.6])
+def test_a_last_piece_that_was_not_finished_costs_itself(split: Any, left: float) -> None:
+    folder, names = split([])
+    if not names[0].endswith(".mcap"):
+        pytest.skip("MCAP has its index at the end")
+    last = folder / names[2]
+    last.write_bytes(last.read_bytes()[: int(left * last.stat().st_size)])
+    run = read_run(folder)
+    assert len(run.scans) == 8
+    assert ("dropped", "pieces of the bag", (names[2],), True) in told(run)
+
+
 def test_whole_pieces_say_nothing(split: Any) -> None:
     folder, names = split([0, 1, 2])
     if not names[0].endswith(".bag"):
