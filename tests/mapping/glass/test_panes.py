@@ -136,6 +136,22 @@ def test_a_pane_that_was_seen_from_the_front_in_part_goes_on_to_the_wall() -> No
     assert occupied_share(grid, map_T_world, PANE) > 0.95
 
 
+def test_the_last_look_may_come_before_the_end_and_moves_no_pose() -> None:
+    drive = GlassWorld(HALL).drive([(7.0, 3.0), (3.4, 3.0), (3.4, 5.2), (3.4, 3.0)], noise=0.01, beams=720)
+    mapper = Mapper()
+    for scan, odometry in zip(drive.scans, drive.odometry, strict=True):
+        mapper.process(scan, Pose2(*odometry))
+    pose = mapper.pose
+    mapper.look_for_glass()
+    assert known_share(mapper.grid(), Pose2(7.0, 3.0, math.pi).inverse(), ROOM_BEHIND) < 0.01
+    assert len(mapper.panes) == 1
+    assert mapper.pose == pose
+    found = mapper.panes
+    mapper.look_for_glass()
+    mapper.grid()
+    assert np.array_equal(mapper.panes, found)
+
+
 @pytest.mark.parametrize("short", [False, True])
 def test_a_pane_that_was_found_when_all_was_seen_stays_as_it_is_while_the_robot_goes_on(short: bool) -> None:
     # Of the long one only the left end was met.
