@@ -39,11 +39,11 @@ def leave_absurd(rooms: Sequence[Room], grid: OccupancyGrid) -> tuple[list[Room]
 def _find_flaw(shape: Shape, floor: float) -> str | None:
     """Say why a shape is no room where the map shows so much floor [m2]; ``None`` for a room."""
     if shape.buffer(-NARROWEST / 2).is_empty:
-        return f"no room predicted: it would be less than {NARROWEST:g} m wide"
+        return f"its room would be less than {NARROWEST:g} m wide"
     corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(shape))
     width, length = sorted(float(np.hypot(*side)) for side in np.diff(corners[:3], axis=0))
     if length > LONGEST and length > STRIP * width:
-        return f"no room predicted: it would be a strip of {length:.0f} x {width:.1f} m"
+        return f"its room would be a strip of {length:.0f} x {width:.1f} m"
     if shape.area > max(floor, HALL):
-        return f"no room predicted: its {shape.area:.0f} m2 would be more than all floor of the map"
+        return f"its room of {shape.area:.0f} m2 would be larger than all floor of the map"
     return None

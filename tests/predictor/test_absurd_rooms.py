@@ -20,7 +20,7 @@ FLOOR = OccupancyGrid(GridFrame(0.5, 0.0, 0.0, 20, 40), np.full((20, 40), FREE, 
         (3.0, LONGEST - 1.0, None),
         (6.0, LONGEST + 1.0, None),
         (14.0, 14.2, None),
-        (14.2, 14.2, "more than all floor"),
+        (14.2, 14.2, "larger than all floor"),
     ],
 )
 @pytest.mark.parametrize("angle", [0.0, 33.0])
