@@ -11,8 +11,8 @@ from closedrooms.core.shapes import Shape
 
 # A door's leaf passes no narrower place [m].
 NARROWEST = 0.6
-# Of 3,154 true rooms of ``fit`` and ``choose`` two are longer than this [m] and more than so many times as long as wide,
-# and one is narrower than the last. Of 18 such rooms that ``paper`` predicted there none had an IoU above 0.26.
+# Of 3,154 true rooms of ``fit`` and ``choose`` two are longer than this [m] and more than so many times as long as
+# wide, and one is narrower than the last. Of 18 such rooms that ``paper`` predicted there none had an IoU above 0.26.
 LONGEST, STRIP, NARROW_STRIP = 15.0, 4.0, 8.0
 # A hall may be larger than all that was explored so far, up to this [m2].
 HALL = 100.0
