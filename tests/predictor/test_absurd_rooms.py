@@ -18,9 +18,11 @@ FLOOR = OccupancyGrid(GridFrame(0.5, 0.0, 0.0, 20, 40), np.full((20, 40), FREE, 
         (NARROWEST + 0.02, 3.0, None),
         (3.0, LONGEST + 1.0, "a strip of 16 x 3.0 m"),
         (3.0, LONGEST - 1.0, None),
+        (1.3, 10.6, "a strip of 11 x 1.3 m"),
+        (1.3, 10.2, None),
         (6.0, LONGEST + 1.0, None),
         (14.0, 14.2, None),
-        (14.2, 14.2, "more than all floor"),
+        (14.2, 14.2, "larger than all floor"),
     ],
 )
 @pytest.mark.parametrize("angle", [0.0, 33.0])

@@ -135,3 +135,13 @@ def test_a_trace_draws_lines_from_side_to_side_and_those_with_a_span_from_line_t
     assert (trace.segments is start.structure.segments, trace.clusters is start.structure.clusters) == (True, True)
     assert [level.k for level in trace.levels] == [0]
     assert unite(growth, 0).equals(shapely.union_all([start.arrangement.faces[f] for f in growth.layout(0)]))
+
+
+def test_a_layout_narrower_than_a_door_is_no_room_and_takes_nothing_from_others(faces):
+    start, growth = _start(
+        faces, [("a", (2.0, 0.2), (2.0, -1.0)), ("b", (-2.0, 0.2), (-2.0, -1.0))], slanted=[Line(0.0, 0.5)]
+    )
+    growth.owner[faces.at(start.arrangement, -2.0, 1.0)] = 1
+    rooms, failures = finish_rooms(start, growth, BARE)
+    assert [room.doors for room in rooms] == [("b",)]
+    assert failures == {"a": "its room would be less than 0.6 m wide"}
