@@ -6,12 +6,14 @@ the page.
 """
 
 import base64
+import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from closedrooms.core.files.incoming import read_bytes
 from closedrooms.core.files.outgoing import write_bytes
@@ -27,8 +29,8 @@ table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabula
 caption { text-align: left; font-weight: 600; padding: 3px 0; white-space: nowrap; }
 th, td { padding: 3px 9px; text-align: left; border-bottom: 1px solid #ddd; vertical-align: top; }
 th { vertical-align: bottom; cursor: pointer; }
-th::after { content: "\\2009\\2195"; color: #bbb; } th.up::after { content: "\\2009\\2191"; color: #222; }
-th.down::after { content: "\\2009\\2193"; color: #222; }
+th::after { content: "\\202f\\2195"; color: #bbb; } th.up::after { content: "\\202f\\2191"; color: #222; }
+th.down::after { content: "\\202f\\2193"; color: #222; }
 td { max-width: 30em; overflow-wrap: break-word; } td.number { white-space: pre; }
 th.number, td.number { text-align: right; }
 th:first-child, td:first-child { position: sticky; left: 0; background: #fff; }
@@ -63,6 +65,8 @@ document.querySelectorAll("th").forEach(head => head.addEventListener("click", (
 MOST_COLUMNS = 5
 # A point and a digit that nothing is seen of, of the same widths: they keep shorter numbers in line.
 NO_POINT, NO_DIGIT = "\u2008", "\u2007"
+# How parts of a column's name read in its title.
+WORDS = {"iou": "IoU", "ate": "ATE", "auroc": "AUROC", "brier": "Brier", "spearman": "Spearman", "m": "[m]"}
 
 
 @dataclass(slots=True, eq=False)
@@ -85,7 +89,7 @@ class Section:
     Attributes:
         heading: Its heading.
         text: A paragraph.
-        picture: A PNG to put into the page.
+        picture: A PNG beside the page to put into it; a click opens it at its full size.
         tables: Its tables; one without a row below its head is left out.
         files: Names of the files beside the page that hold its figures.
     """
@@ -95,6 +99,13 @@ class Section:
     picture: Path | None = None
     tables: Sequence[Table] = ()
     files: Sequence[str] = field(default=())
+
+
+def table_of(rows: Sequence[Mapping[str, Any]], caption: str = "") -> Table:
+    """Build the table of rows with the same keys, which become its titles: ``free_iou`` reads "free IoU"."""
+    head = list(rows[0]) if rows else []
+    titles = [" ".join(WORDS.get(word, word) for word in name.split("_")) for name in head]
+    return Table([titles, *([row.get(name) for name in head] for row in rows)], caption)
 
 
 def write_page(path: Path, title: str, sections: Sequence[Section]) -> None:
@@ -127,7 +138,8 @@ def _section(section: Section) -> Iterator[str]:
         yield f"<p>{_text(section.text)}</p>"
     if section.picture is not None:
         data = base64.b64encode(read_bytes(section.picture, what="a picture")).decode()
-        yield f'<img alt="{_text(section.heading)}" src="data:image/png;base64,{data}">'
+        image = f'<img alt="{_text(section.heading)}" src="data:image/png;base64,{data}">'
+        yield f'<a href="{quote(os.fsencode(section.picture.name))}">{image}</a>'
     for table in section.tables:
         yield from _table(table)
     if section.files:

@@ -228,7 +228,12 @@ class EvidenceGrid:
         return low * self._lattice.resolution, high * self._lattice.resolution
 
     def crossed(
-        self, apart: float, *, share: float = CROSSED_SHARE, within: tuple[FloatArray, FloatArray] | None = None
+        self,
+        apart: float,
+        *,
+        least: int = CROSSED,
+        share: float = CROSSED_SHARE,
+        within: tuple[FloatArray, FloatArray] | None = None,
     ) -> tuple[int, int, BoolArray]:
         """Mark the cells that scans went through, whether or not a surface was seen there.
 
@@ -237,7 +242,8 @@ class EvidenceGrid:
 
         Args:
             apart: Reach of the noise of a surface [m].
-            share: Scans that went through a cell, beside ``CROSSED``, for each that saw a surface there.
+            least: Scans that went through a cell.
+            share: How many more for each that saw a surface there.
             within: Lower left and upper right corner of what is looked at, map frame, ``(x, y)`` [m]; all without it.
 
         Returns:
@@ -249,7 +255,7 @@ class EvidenceGrid:
             (row, last_row), (col, last_col) = (cells.tolist() for cells in lattice.cells(np.stack(within)))
             n_rows, n_cols = last_row + 1 - row, last_col + 1 - col
         hits, misses = (a[row : row + n_rows, col : col + n_cols] for a in (self._hits, self._misses))
-        through = misses >= CROSSED + hits * np.float32(share)
+        through = misses >= least + hits * np.float32(share)
         span = 2 * math.ceil(apart / lattice.resolution) + 1
         solid = ((hits > 0) & ~through).astype(np.uint8)
         through &= cv2.dilate(solid, np.ones((span, span), dtype=np.uint8)) == 0

@@ -402,14 +402,19 @@ class Mapper:
         """Run the final pose-graph optimisation, over all keyframes, and look for glass in all that they saw."""
         if self._graph.optimise():
             self._poses_moved()
-        if self._config.glass:
-            self._finished = True
-            self._looked = 0
-            self._panes.start_again()
-            for keyframe in self.keyframes:
-                if keyframe.shown is not keyframe.beams:  # what no pane has cut need not be drawn anew
-                    keyframe.shown = None
-            self._drawn = 0
+        self.look_for_glass()
+
+    def look_for_glass(self) -> None:
+        """Look for glass in all that was seen, as if nothing came after, when the map is drawn next."""
+        if not self._config.glass:
+            return
+        self._finished = True
+        self._looked = 0
+        self._panes.start_again()
+        for keyframe in self.keyframes:
+            if keyframe.shown is not keyframe.beams:  # what no pane has cut need not be drawn anew
+                keyframe.shown = None
+        self._drawn = 0
 
 
 def _outdated(keyframe: Keyframe) -> bool:

@@ -119,6 +119,7 @@ def run_loop(
     *,
     on_step: Callable[[Step], None] | None = None,
     stop: Callable[[Step], EarlyEnd | None] | None = None,
+    again: Callable[[], bool] | None = None,
     spent: float = 0.0,
 ) -> LoopLog:
     """Sense, map, decide and move until the decider has done what it wanted, or a limit is met.
@@ -130,6 +131,7 @@ def run_loop(
         config: Limits of simulated time, processor time and the map's size.
         on_step: Told of every step.
         stop: Asked after every step whether the run ends.
+        again: Asked when the decider has done what it wanted, whether it goes on all the same.
         spent: Processor time that runs before it have taken [s]: ``config.cpu_limit`` counts it.
 
     Returns:
@@ -151,6 +153,8 @@ def run_loop(
         if on_step is not None:
             on_step(step)
         clock.lap("observe")
+        if decider.status == "complete" and again is not None and again():
+            decider.status = None
         if decider.status is not None:
             return _log(decider.status, REASONS[decider.status], stamps, poses, clock, limits.cpu_seconds)
         stopped = limits.check(step) or (None if stop is None else stop(step))

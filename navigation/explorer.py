@@ -24,6 +24,8 @@ SAME_PLACE = 0.5
 HELD_UP = 3
 # So often the robot tries again, at the end, what something kept it from.
 CHANCES = 2
+# Before that it waits so long for who stands in its way to walk on [s].
+WAIT = 10.0
 # A robot that faces its goal waits this long for the map to take in what it sees [s].
 SETTLE = 0.4
 
@@ -50,6 +52,7 @@ class Explorer(Decider):
         self._replanned_at = -math.inf
         self._facing_since: float | None = None
         self._chances = CHANCES
+        self._waits_until = -math.inf
 
     @property
     def frontiers(self) -> FloatArray:
@@ -63,6 +66,8 @@ class Explorer(Decider):
 
     def _has_goal(self, now: Situation) -> bool:
         """Check the goal every so often, and search the nearest frontier where there is none."""
+        if now.stamp < self._waits_until:
+            return False
         if self.goal is not None and now.stamp - self._checked_at >= self.config.check_interval - 1e-9:
             self._check(now.pose, now.grid(), now.stamp)
         return self.goal is not None or self._choose(now.pose, now.grid(), now.stamp)
@@ -83,7 +88,7 @@ class Explorer(Decider):
             self._search.map.add_obstacles(barrier(now.pose, self._driver.ahead(SAME_PLACE), self.config))
         self.goal = None
         if self._driver.recoveries > self.config.max_recoveries:
-            self._second_chance()
+            self._second_chance(now.stamp)
 
     def _check(self, pose: Pose2, grid: OccupancyGrid, now: float) -> None:
         """Drop a goal that has become known; plan anew where the path is blocked or something nearer has turned up."""
@@ -116,9 +121,8 @@ class Explorer(Decider):
         while True:
             goal = self._search.find(pose, grid)
             if goal is None:
-                if self._second_chance():
-                    continue
-                self.status = "stuck" if self._search.enclosed else "complete"
+                if not self._second_chance(now):
+                    self.status = "stuck" if self._search.enclosed else "complete"
                 return False
             if self._count(goal.place) <= self.config.max_attempts:
                 break
@@ -127,11 +131,12 @@ class Explorer(Decider):
         self._take(goal, now)
         return True
 
-    def _second_chance(self) -> bool:
-        """Try once more what something kept the robot from that may have walked on; whether there is anything."""
+    def _second_chance(self, now: float) -> bool:
+        """Wait, to try once more what something kept the robot from that may walk on; whether there is anything."""
         if self._chances == 0 or not self._search.try_again():
             return False
         self._chances -= 1
+        self._waits_until = now + WAIT
         self._chosen.clear()
         self._driver.recoveries = 0
         return True

@@ -79,17 +79,10 @@ def predict_map(
             observer.prediction(grid, doors, prediction)
         with watch.stage("write"):
             progress.stage("write")
-            observed = grid.on(prediction.grid.frame)
             rooms = tuple(read.rooms_on_map(prediction.rooms))
-            write_map(folder / "map", observed, map_T_grid=read.map_T_grid)
-            write_map(folder / "predicted", prediction.grid, map_T_grid=read.map_T_grid)
             write_doors(folder / "doors.geojson", given)
             write_rooms(folder / "rooms.geojson", rooms)
-            probability = free_probability(prediction, grid)
-            write_raw_map(folder / "probability", probability, map_T_grid=read.map_T_grid)
-            from closedrooms.visualization.summary import draw_summary
-
-            draw_summary(folder / "summary.png", observed, prediction, doors)
+            _write_maps(folder, read, prediction, doors)
             manifest |= beside(folder, read, prediction) if beside is not None else {}
         manifest["doors"] = {"given": [door.id for door in doors], "failures": prediction.failures}
         manifest["remarks"] = [remark.as_json() for remark in remarks]
@@ -102,6 +95,17 @@ def predict_map(
         remarks=remarks,
         figures={"rooms": [_figures(room) for room in rooms]},
     )
+
+
+def _write_maps(folder: Path, read: RosMap, prediction: Prediction, doors: Sequence[ClosedDoor]) -> None:
+    """Write map, completed map and probability on one frame, and the picture of them; ``doors`` are in the grid's."""
+    from closedrooms.visualization.summary import draw_summary
+
+    observed = read.grid.on(prediction.grid.frame)
+    write_map(folder / "map", observed, map_T_grid=read.map_T_grid)
+    write_map(folder / "predicted", prediction.grid, map_T_grid=read.map_T_grid)
+    write_raw_map(folder / "probability", free_probability(prediction, read.grid), map_T_grid=read.map_T_grid)
+    draw_summary(folder / "summary.png", observed, prediction, doors)
 
 
 def _rows(prediction: Prediction, least: float, seconds: float) -> list[tuple[str, str, str]]:

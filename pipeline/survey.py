@@ -1,6 +1,6 @@
 """What a robot brings home from an unknown building, and the truth that it is held against."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -88,6 +88,7 @@ def survey_building(
         log, mapper, explorer, config,
         on_step=ExplorationRecording(recorder, log, mapper, explorer, interim),
         stop=lambda _: outline.check(log.sim.world_T_robot),
+        again=_last_look(mapper),
     )  # fmt: skip
     end = float(exploration.stamps[-1])
     went = f"{exploration.status} after {exploration.seconds:.1f} s and {exploration.distance:.1f} m"
@@ -108,6 +109,19 @@ def survey_building(
         for remark in mapper.events:
             recorder.note(str(remark))
     return Survey(grid, doors, exploration, explorer.searches, stamps, poses, log.true_poses)
+
+
+def _last_look(mapper: Mapper) -> Callable[[], bool]:
+    """Look for glass in all that was seen, once: what was only seen through the panes found then is left to explore."""
+    looks = iter([True])
+
+    def look() -> bool:
+        if not len(mapper.panes) or not next(looks, False):
+            return False
+        mapper.look_for_glass()
+        return True
+
+    return look
 
 
 def true_building(plan: FloorPlan, closed: Sequence[str], frame: GridFrame, map_T_world: Pose2) -> Truth:

@@ -77,9 +77,8 @@ def find_recording(folder: Path) -> Path:
             check_schema(about, folder / MANIFEST)
         return folder / RECORDING
     below = sorted(path.parent.name for path in folder.glob(f"*/{RECORDING}"))[:MOST_NAMED]
-    hint = (
-        f"; there are some in {', '.join(below)}" if below else " (closedrooms predict and map write it with --record)"
-    )
+    written = " (run and map write it unless --no-record, predict with --record)"
+    hint = f"; there are some in {', '.join(below)}" if below else written
     raise InvalidInputError("no recording", expected=f"{RECORDING} in the folder{hint}", where=folder)
 
 

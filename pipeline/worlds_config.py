@@ -74,8 +74,8 @@ class ConvertWorld:
     destination: tyro.conf.Positional[Path]
     """File to write."""
 
-    to: str
-    """Format to write: json, obj, rosmap, sdf, stage or urdf."""
+    to: Literal["json", "obj", "rosmap", "sdf", "stage", "urdf"]
+    """Format to write."""
 
     level: str | None = None
     """Which level of a file with several."""

@@ -79,8 +79,9 @@ def _each(
             failures[entrance.door.id] = "nothing unknown is in sight of the door within the bounds of the map"
         else:
             rooms.append(Room(shape, (entrance.door.id,)))
-    completed = complete_map(grid, start.grid, rooms, [entrance.facing for entrance in start.entrances], config)
-    return Prediction(completed, tuple(rooms), failures)
+    facing = tuple(entrance.facing for entrance in start.entrances)
+    completed = complete_map(grid, start.grid, rooms, facing, config)
+    return Prediction(completed, tuple(rooms), failures, facing=facing)
 
 
 def _seen(start: InitialFaces, room: int) -> Shape:

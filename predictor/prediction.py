@@ -11,6 +11,7 @@ from closedrooms.core.grid import UNKNOWN, GridFrame, OccupancyGrid, is_known
 from closedrooms.core.room import Room
 from closedrooms.core.shapes import Shape
 from closedrooms.predictor.confidence.belief import Belief
+from closedrooms.predictor.structure.doorways import FacingDoor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,6 +111,7 @@ class Prediction:
             where nothing tells.
         beliefs: What the method itself thinks of each room, empty where it gives one shape alone or ``judge`` has used
             it.
+        facing: Doors and the ways that they look, where the method says it: what tells which lead outside.
     """
 
     grid: OccupancyGrid
@@ -118,6 +120,7 @@ class Prediction:
     trace: PredictionTrace | WeighedTrace | None = None
     probability: OccupancyGrid | None = None
     beliefs: tuple[Belief, ...] = ()
+    facing: tuple[FacingDoor, ...] = ()
 
 
 def free_probability(prediction: Prediction, grid: OccupancyGrid) -> OccupancyGrid:

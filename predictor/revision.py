@@ -90,7 +90,7 @@ def update(
             rooms[index] = replace(room, polygon=shape)
             if observed[index].any():
                 # What was seen is no guess any more.
-                rooms[index] = replace(rooms[index], confidence=None, alternatives=())
+                rooms[index] = replace(rooms[index], confidence=None, alternatives=(), outside=None)
         elif index < len(prediction.rooms):
             failures |= dict.fromkeys(room.doors, "there is no room where one was predicted")
     looked_into = {index for index in rooms if observed[index].any()}

@@ -13,7 +13,9 @@ looked at.
     python benchmarks/fitting/drawn_maps.py PLANS --use fit --maps 10 --generated 80 --bundled --out DRAWN
     python benchmarks/fitting/drawn_maps.py PLANS --use fit --maps 3 --generated 0 --out FLOORS
     closedrooms dataset PLAN ... --repetitions 2 --max-closed 8 --out RUNS
-    python benchmarks/fitting/fit_confidence.py DRAWN RUNS --methods learned --every 6 2 --held-out MODEL
+    python benchmarks/fitting/drawn_maps.py PLANS --use fit --maps 3 --generated 80 --bundled --out SOME
+    closedrooms dataset PLAN ... --repetitions 1 --max-closed 8 --out ONCE
+    python benchmarks/fitting/fit_confidence.py SOME ONCE --methods learned --held-out MODEL
     python benchmarks/fitting/fit_confidence.py DRAWN --methods best --every 10
     python benchmarks/fitting/fit_confidence.py FLOORS RUNS --methods paper geometric line-of-sight --every 1 4
 """

@@ -58,7 +58,8 @@ def main() -> None:
         write_table(sys.stdout, rows)
         return
     with options.csv.open("w", newline="") as file:
-        write_table(file, sorted(rows, key=lambda cells: (list(CONDITIONS).index(cells[0]), cells[1])))
+        by_condition = sorted(rows, key=lambda cells: (list(CONDITIONS).index(cells[0]), cells[1]))
+        write_table(file, [*by_condition, *mean_rows(by_condition)])
 
 
 def made(condition: str, name: str, options: argparse.Namespace) -> Path:
@@ -113,6 +114,17 @@ def ghosts(name: str, told: dict[str, Any], folder: Path) -> float:
         places = shapely.points(sim.world_T_map.transform(points))
     shapely.prepare(standing)
     return float(np.mean(~shapely.dwithin(standing, places, GHOST)))
+
+
+def mean_rows(rows: list[list[str]]) -> list[list[str]]:
+    """Make a row a condition with the means of its figures, to as many digits as they have."""
+    means = []
+    for condition in dict.fromkeys(cells[0] for cells in rows):
+        columns = list(zip(*(cells for cells in rows if cells[0] == condition), strict=True))[3:]
+        digits = [len(column[0].partition(".")[2]) for column in columns]
+        figures = [f"{np.mean([*map(float, col)]):.{count}f}" for col, count in zip(columns, digits, strict=True)]
+        means.append([condition, "mean", "", *figures])
+    return means
 
 
 def write_table(file: TextIO, rows: Iterator[list[str]] | list[list[str]]) -> None:

@@ -20,13 +20,13 @@ import time
 from pathlib import Path
 from typing import Any
 
-from closedrooms.experiments.dataset import sharded
+from closedrooms.experiments.dataset import sharded_dataset
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.dataset import dataset
 from closedrooms.experiments.dataset.packing import as_bytes, sample_schema
 from closedrooms.experiments.dataset.sample import Task, TaskResult
 from closedrooms.experiments.dataset.shard import part_name
-from closedrooms.experiments.dataset.shards import Filling, Part, fill_shard
+from closedrooms.experiments.dataset.shard_jobs import Filling, Part, fill_shard
 from closedrooms.experiments.stores import open_store, write_file
 
 WORLD, CLOSED = "office-03", 10
@@ -58,7 +58,7 @@ def make_nothing(job: Task | Part | Filling) -> TaskResult:
 
 def measure(samples: int, workers: int) -> dict[str, Any]:
     """Make one dataset in this process."""
-    sharded.work = make_nothing
+    sharded_dataset.work = make_nothing
     with tempfile.TemporaryDirectory() as scratch:
         config = DatasetConfig(
             worlds=(WORLD,), out=Path(scratch) / "d", format="shards", shard_mb=1.0, maps="simulated", workers=workers,

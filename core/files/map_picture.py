@@ -4,7 +4,7 @@ import os
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 from urllib.parse import unquote
 
 import numpy as np
@@ -24,8 +24,8 @@ MAX_CELLS = 400_000_000
 # 1000 times (8000 at one bit a pixel), maps of buildings 20 to 300 times.
 UNSUSPICIOUS_CELLS, MAX_CELLS_A_BYTE = 30_000_000, 1000
 FORMATS = ("PNG", "PPM", "BMP", "TIFF", "JPEG", "GIF", "WEBP")
-# What such a file begins with.
-JPEG = b"\xff\xd8\xff"
+# What such files begin with.
+JPEG, PNG = b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"
 # Rows that are converted at once.
 STRIP = 256
 SCHEME = re.compile(r"(?i)(file|package|model|https?)://")
@@ -121,14 +121,27 @@ def read_picture(path: Path) -> tuple[npt.NDArray[np.uint8], BoolArray | None]:
     Image.MAX_IMAGE_PIXELS = None
     with opened(path, WHAT) as file, reading(path, WHAT):
         try:
-            # The other formats that Pillow knows start other programs (EPS) or hold no maps.
-            with Image.open(file, formats=FORMATS) as image:
+            with _opened_picture(file) as image:
                 _check_size(image.size, os.fstat(file.fileno()).st_size, path)
                 if image.mode == "F":
                     raise InvalidInputError("a picture of floating-point greys", expected=GREYS, where=path)
                 return _greys(image, path)
         except (OSError, SyntaxError, EOFError) as error:
             raise InvalidInputError("a picture that cannot be read", expected=WHAT, where=path) from error
+
+
+def _opened_picture(file: BinaryIO) -> Any:
+    """Open a picture of a kind that maps come in."""
+    from PIL import Image
+    from PIL.PngImagePlugin import PngImageFile
+
+    begin = file.read(len(PNG))
+    file.seek(0)
+    # Most are PNG; for the others Pillow loads five kinds first.
+    if begin == PNG:
+        return PngImageFile(file)
+    # The other formats that Pillow knows start other programs (EPS) or hold no maps.
+    return Image.open(file, formats=FORMATS)
 
 
 def _check_size(size: tuple[int, int], file_bytes: int, path: Path) -> None:

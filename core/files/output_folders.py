@@ -33,26 +33,49 @@ MAX_MANIFEST = 50_000_000
 
 
 def _find_foreign_file(folder: Path, command: object) -> str:
-    """Find something in a folder that the same command did not write, or was changed since; empty for nothing."""
+    """Find something in a folder that the same command did not write, or was changed since; empty for nothing.
+
+    Raises:
+        OutputError: A newer version of the same command wrote it.
+    """
+    manifest = _read_own_manifest(folder)
+    if manifest is None:
+        return f"no {MANIFEST} of ours"
+    if manifest.get("command") != command:
+        return MANIFEST
+    try:
+        check_schema(manifest, folder / MANIFEST)
+    except InvalidInputError as error:
+        raise OutputError(str(error)) from error
+    try:
+        return _find_changed_file(folder, manifest)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return f"no {MANIFEST} of ours"
+
+
+def _find_changed_file(folder: Path, manifest: dict[str, Any]) -> str:
+    """Find a file that a manifest does not list or whose checksum is another one; empty for none."""
+    sums = dict(manifest.get(SUMS) or manifest["checksums"])
+    listed = {MANIFEST, *sums, *manifest["files"]}
+    for path in _walk(folder):
+        name = path.relative_to(folder).as_posix()
+        if name not in listed or not stat.S_ISREG(path.lstat().st_mode):
+            return name
+        # A file without a checksum is a recording of a sample: its bytes differ from run to run.
+        if name in sums and sums[name] != (_own_sum(manifest) if name == MANIFEST else _digest(path)):
+            return name
+        if name == MANIFEST and path.read_bytes() != json_text(manifest).encode():
+            return name
+    return ""
+
+
+def _read_own_manifest(folder: Path) -> dict[str, Any] | None:
+    """Read the manifest of a folder that a command of ours wrote, ``None`` of any other."""
     try:
         manifest = read_json(folder / MANIFEST, what="a manifest", max_bytes=MAX_MANIFEST)
-        if manifest["program"] != PROGRAM or manifest.get("command") != command:
-            return MANIFEST
-        check_schema(manifest, folder / MANIFEST)
-        sums = dict(manifest.get(SUMS) or manifest["checksums"])
-        listed = {MANIFEST, *sums, *manifest["files"]}
-        for path in _walk(folder):
-            name = path.relative_to(folder).as_posix()
-            if name not in listed or not stat.S_ISREG(path.lstat().st_mode):
-                return name
-            # A file without a checksum is a recording of a sample: its bytes differ from run to run.
-            if name in sums and sums[name] != (_own_sum(manifest) if name == MANIFEST else _digest(path)):
-                return name
-            if name == MANIFEST and path.read_bytes() != json_text(manifest).encode():
-                return name
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, InvalidInputError):
-        return f"no {MANIFEST} of ours"
-    return ""
+    except (OSError, ValueError, InvalidInputError):
+        return None
+    return manifest if isinstance(manifest, dict) and manifest.get("program") == PROGRAM else None
 
 
 def _walk(folder: Path) -> Iterator[Path]:
@@ -85,7 +108,7 @@ def check_output_folder(folder: Path, command: object = None, *, sources: Iterab
 
     Raises:
         OutputError: It is a file, holds anything that the same command did not write or that was changed since, or a
-            source; its parent cannot be written, or another process writes it.
+            source; a newer version wrote it; its parent cannot be written, or another process writes it.
     """
     for source in sources:
         if source is not None and _holds(folder, source):

@@ -60,5 +60,6 @@ def missing_package(error: ModuleNotFoundError, *, by: str) -> MissingPackageErr
 def _message(missing: list[str], by: str, instead: str) -> str:
     """Say which packages are missing, who needs them, and how to install them."""
     brought = dict.fromkeys(BROUGHT_BY[name] for name in missing)
-    text = f"{by} needs {', '.join(missing)}, which is not installed here: pip install {' '.join(brought)}"
+    are = "is" if len(missing) == 1 else "are"
+    text = f"{by} needs {', '.join(missing)}, which {are} not installed here: pip install {' '.join(brought)}"
     return f"{text} (or {instead})" if instead else text

@@ -30,7 +30,7 @@ from closedrooms.experiments.dataset.layout import (
     write_sums,
 )
 from closedrooms.experiments.dataset.sample import Task, TaskResult, make
-from closedrooms.experiments.dataset.sharded import finish, make_shards, shard_counts
+from closedrooms.experiments.dataset.sharded_dataset import finish, make_shards, shard_counts
 from closedrooms.experiments.dataset.variants import (
     SPLITS,
     Split,

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 
 from closedrooms.experiments.dataset.config import DatasetConfig
 from closedrooms.experiments.dataset.shard import Shard
-from closedrooms.experiments.dataset.shards import Filling
+from closedrooms.experiments.dataset.shard_jobs import Filling
 from closedrooms.experiments.dataset.variants import Split
 
 MB = 1_000_000

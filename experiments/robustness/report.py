@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from closedrooms.experiments.html_page import Section, Table, write_page
+from closedrooms.experiments.html_page import Section, Table, table_of, write_page
 from closedrooms.experiments.robustness.config import RobustnessConfig
 from closedrooms.experiments.robustness.figures import draw_curves, draw_maps
 from closedrooms.experiments.robustness.levels import UNITS, cases
@@ -13,10 +13,10 @@ from closedrooms.experiments.tables import Row, write_table
 METHOD = (
     "Every level is held against the first of its factor on the same buildings and closed doors. The prediction "
     "suffers from the first level on whose mean difference of the IoU lies below zero with 97.5 % (bootstrap, "
-    "buildings drawn, then sets of closed doors) and is at least 0.01. The loss of a stage is the IoU that comes back "
-    "when it gets right what it hands on: mapping the poses of the scans, doors their places, structure the walls; "
-    "what does not come back is the prediction's own. The first to give way is the one with the largest loss at that "
-    "level."
+    "buildings drawn, then sets of closed doors) and is a loss of at least 0.01; the cell is empty where no level "
+    "does that. The loss of a stage is the IoU that comes back when it gets right what it hands on: mapping the poses "
+    "of the scans, doors their places, structure the walls; what does not come back is the prediction's own. The "
+    "first to give way is the one with the largest loss at that level. Errors of the coverage cost in percent."
 )
 
 
@@ -41,14 +41,16 @@ def write_report(config: RobustnessConfig, rows: Sequence[Row], failures: Mappin
     draw_curves(folder / "curves.png", results, found)
     worlds = list(dict.fromkeys(row["world"] for row in rows))
     sections = [
-        Section("Where the prediction starts to suffer", METHOD, tables=[_cells(table)], files=["onsets.csv"]),
+        Section("Where the prediction starts to suffer", METHOD, tables=[table_of(table)], files=["onsets.csv"]),
         Section(
             "Against each level",
             "Lines: means. Bars: 95 % interval of the difference to the first level. Dotted: first to suffer.",
             folder / "curves.png",
             files=["levels.csv"],
         ),
-        Section("Levels", tables=[_cells([_short(result) for result in results])], files=["levels.csv", "trials.csv"]),
+        Section(
+            "Levels", tables=[table_of([_short(result) for result in results])], files=["levels.csv", "trials.csv"]
+        ),
     ]
     for world in worlds[:2]:
         picture = folder / f"maps-{world}.png"
@@ -102,8 +104,3 @@ def _onset_row(onset: Onset) -> Row:
         "loss_high": None if share is None else share.high,
         "coverage_suffers_from": onset.coverage_level,
     }
-
-
-def _cells(rows: Sequence[Row]) -> Table:
-    head = list(rows[0])
-    return Table([[name.replace("_", " ") for name in head], *([row[name] for name in head] for row in rows)])

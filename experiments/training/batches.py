@@ -8,9 +8,8 @@ import numpy.typing as npt
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.core.random import stream
-from closedrooms.experiments.training.examples import WHOLE, Bytes, Examples, unpack_patches
+from closedrooms.experiments.training.examples import AHEAD_CELLS, ASIDE_CELLS, WHOLE, Bytes, Examples, unpack_patches
 from closedrooms.predictor.learned.patches import BEHIND, CELL, SIZE
-from closedrooms.predictor.learned.sides import AHEAD_CELLS, ASIDE_CELLS
 
 Floats = npt.NDArray[np.float32]
 # A side is taken to be where it is with this standard deviation [m]: a cell of the patch.

@@ -18,13 +18,15 @@ from closedrooms.experiments.evaluation.samples.sample_reader import Sample, rea
 from closedrooms.experiments.training.buildings import group_of, may_train
 from closedrooms.predictor.best.scene import prepare
 from closedrooms.predictor.config import BestConfig
-from closedrooms.predictor.learned.patches import ASIDE, BEHIND, CELL, FINE, SIZE, Patch, cut_patches
+from closedrooms.predictor.learned.patches import AHEAD, ASIDE, BEHIND, CELL, FINE, SIZE, Patch, cut_patches
 
 Bytes = npt.NDArray[np.uint8]
 # Cells of the map in one of a patch: shares are kept as whole numbers of them.
 WHOLE = FINE * FINE
 # Bits of the third channel that is kept.
 DOOR, OTHER_DOORS = 1, 2
+# Distances that are told apart, from the door to either side and back: one a cell.
+ASIDE_CELLS, AHEAD_CELLS, DOOR_ROW = round(ASIDE / CELL), round(AHEAD / CELL), round(BEHIND / CELL)
 # Steps of a cell in which sides of rooms are measured: a patch has some 100,000 then.
 STEPS = 2
 # Rounds of the search for the rectangle of a room, which stops after 2 to 4.

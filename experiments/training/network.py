@@ -7,8 +7,9 @@ import torch
 from torch import Tensor, nn
 
 from closedrooms.predictor.learned.patches import CHANNELS
-from closedrooms.predictor.learned.sides import PARTS
 
+# Columns and rows are told in groups of so many.
+PARTS = 4
 # Channels at a quarter of the resolution of a patch, an eighth, a sixteenth.
 WIDTHS = (32, 64, 128)
 

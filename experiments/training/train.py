@@ -134,11 +134,7 @@ def hold_out_buildings(examples: Examples, config: TrainConfig) -> tuple[IntArra
 def _fingerprint(examples: Examples, config: TrainConfig) -> str:
     """Digest the options, the data, the versions of libraries and the code."""
     root = Path(__file__).parents[2]
-    files: Sequence[Path] = [
-        *Path(__file__).parent.glob("*.py"),
-        root / "predictor" / "learned" / "patches.py",
-        root / "predictor" / "learned" / "sides.py",
-    ]
+    files: Sequence[Path] = [*Path(__file__).parent.glob("*.py"), root / "predictor" / "learned" / "patches.py"]
     content = json.dumps(resolved(config, leave_out=("datasets", "out", "patience")))
     parts = [content, json.dumps(versions()), code_digest(list(files)), examples.digest()]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()

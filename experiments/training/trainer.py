@@ -18,9 +18,8 @@ from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.random import stream
 from closedrooms.experiments.training.batches import Batch, draw_batches, still_batches
 from closedrooms.experiments.training.config import TrainConfig
-from closedrooms.experiments.training.examples import Examples
+from closedrooms.experiments.training.examples import ASIDE_CELLS, DOOR_ROW, Examples
 from closedrooms.experiments.training.network import RoomNetwork
-from closedrooms.predictor.learned.sides import ASIDE_CELLS, DOOR_ROW
 
 # What the cells count beside the sides in the loss: about as much.
 CELLS = 20.0
@@ -204,7 +203,7 @@ def has_bfloat16() -> bool:
 
 
 def read_sides(columns: Tensor, rows: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """Split logits into left, right and back by cell, as ``predictor.learned.sides`` reads them."""
+    """Split logits into left, right and back by cell, from the door outward."""
     across, ahead = (part.transpose(1, 2).flatten(1) for part in (columns, rows))
     return across[:, :ASIDE_CELLS].flip(1), across[:, ASIDE_CELLS:], ahead[:, DOOR_ROW:]
 

@@ -1,6 +1,7 @@
 """Lines of panes: places side by side that may be glass, joined, and let go on up to the wall that they stand in."""
 
 import math
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
@@ -25,6 +26,8 @@ BODY = 0.1
 """Distance from where the robot was up to which nothing stands [m]: no robot is narrower."""
 FARTHEST = 2.0
 """How far beyond what was hit a pane goes on at most, all in all [m]; a short one only up to the next wall."""
+MOST_TURNED = math.radians(10.0)
+"""How far a pane may be turned into the line of the walls beside it [rad]: normals are known to some 8 degrees."""
 
 
 def extend_line(
@@ -63,10 +66,8 @@ def extend_line(
         places = end + steps[:, None] * direction
         against = _within(step, places, no_pane) | _within(BODY, places, driven)
         on_pane, as_before = _within(step, places, may_be), _within(step, places, before)
-        cells = grid.frame.to_cells(places[:, None] + np.array([-step, 0.0, step])[:, None] * across)
-        inside = grid.frame.contains(cells)
-        cells[~inside] = 0
-        at_wall = np.asarray((inside & is_occupied(grid.cells[cells[..., 0], cells[..., 1]])).any(axis=1))
+        beside = places[:, None] + np.array([-step, 0.0, step])[:, None] * across
+        at_wall = np.asarray(_solid(grid, beside).any(axis=1))
         solid, wall = 0.0, False
         for number, t in enumerate(steps.tolist()):
             if t - solid > widest or against[number]:
@@ -80,6 +81,42 @@ def extend_line(
         ends.append(end + (solid + MARGIN) * direction)
         walls += wall
     return np.array(ends), walls
+
+
+def turn_into_walls(line: FloatArray, grid: OccupancyGrid, reach: float) -> FloatArray:
+    """Turn a pane about its middle so that most of what lies beyond its ends is solid wall.
+
+    It stands in one, and places within half a metre do not tell its direction to a cell two metres on.
+
+    Args:
+        line: Its ends as they were hit, shape (2, 2) [m].
+        grid: The map.
+        reach: How far beyond its ends is looked at [m].
+
+    Returns:
+        Its ends, shape (2, 2) [m], a cell from where they were at most: as they were where no turn is better.
+    """
+    step = grid.frame.resolution
+    middle, half = line.mean(axis=0), math.dist(*line) / 2.0
+    most = min(math.atan2(step, half), MOST_TURNED)
+    count = math.ceil(most * (half + reach) / step)
+    turns = most * np.arange(-count, count + 1) / max(count, 1)
+    turns = turns[np.argsort(np.abs(turns), kind="stable")]
+    along = (line[1] - line[0]) / (2.0 * half)
+    across = np.array([-along[1], along[0]])
+    directions = np.cos(turns)[:, None] * along + np.sin(turns)[:, None] * across
+    beyond = half + np.arange(step, reach + step / 2.0, step)
+    solid = _solid(grid, middle + np.concatenate((-beyond, beyond))[:, None] * directions[:, None])
+    best = directions[np.argmax(solid.sum(axis=1))]
+    return np.asarray(middle + np.outer([-half, half], best))
+
+
+def _solid(grid: OccupancyGrid, places: FloatArray) -> BoolArray:
+    """Mark the places, shape (..., 2) [m], whose cell is occupied."""
+    cells = grid.frame.to_cells(places)
+    inside = grid.frame.contains(cells)
+    cells[~inside] = 0
+    return np.asarray(inside & is_occupied(grid.cells[cells[..., 0], cells[..., 1]]))
 
 
 def _within(distance: float, places: FloatArray, others: FloatArray) -> BoolArray:
@@ -153,6 +190,48 @@ def draw_lines(places: FloatArray, normals: FloatArray, resolution: float) -> li
             if line is not None:
                 lines.append(line)
     return lines
+
+
+def join_lines(lines: Sequence[FloatArray], grid: OccupancyGrid) -> list[FloatArray]:
+    """Join lines that go on in each other where something solid stands between them: a wall behind a pane parts it.
+
+    Args:
+        lines: Their ends, shape (2, 2) each [m].
+        grid: The map.
+    """
+    joined: list[FloatArray] = []
+    for one in lines:
+        line, number = one, 0
+        while number < len(joined):
+            both = _joint(line, joined[number], grid)
+            if both is None:
+                number += 1
+            else:
+                del joined[number]
+                line, number = both, 0
+        joined.append(line)
+    return joined
+
+
+def _joint(a: FloatArray, b: FloatArray, grid: OccupancyGrid) -> FloatArray | None:
+    """Draw one line through two with something solid between them, ``None`` where they are not in line or none is."""
+    way = b.mean(axis=0) - a.mean(axis=0)
+    far = math.hypot(*way)
+    if far > (math.dist(*a) + math.dist(*b)) / 2.0 + FRAME + THICK:
+        return None
+    along = way / max(far, 1e-9)
+    across = np.array([-along[1], along[0]])
+    ends = np.concatenate((a, b))
+    t = (ends - a.mean(axis=0)) @ along
+    begin, end = t[:2].max(), t[2:].min()
+    if not 0.0 < end - begin < FRAME or np.abs((ends - a.mean(axis=0)) @ across).max() > THICK:
+        return None
+    step = grid.frame.resolution
+    between = a.mean(axis=0) + np.arange(begin, end, step)[:, None] * along
+    beside = np.arange(-round(THICK / step), round(THICK / step) + 1) * step
+    if not _solid(grid, between[:, None] + beside[:, None] * across).any():
+        return None
+    return np.asarray(ends[[np.argmin(t), np.argmax(t)]])
 
 
 def _groups(places: FloatArray, resolution: float) -> IntArray:

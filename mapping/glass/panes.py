@@ -24,7 +24,9 @@ from closedrooms.mapping.glass.pane_lines import (
     draw_lines,
     extend_line,
     find_candidates,
+    join_lines,
     sample,
+    turn_into_walls,
     without_covered,
 )
 from closedrooms.mapping.glass.testimony import (
@@ -39,8 +41,9 @@ from closedrooms.mapping.glass.testimony import (
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.log_odds_grid import EvidenceGrid
 
-CROSSED_SHARE = 0.1
-"""Scans that went through a place, for each that saw a surface there, from which on it is asked about."""
+CROSSED = 1
+"""Scans that went through a place from which on it is asked about, however many met something there: who comes up to a
+pane from the front sees little else."""
 SEEN_THROUGH = 1
 """Fewest scans that went through it at an angle."""
 DOUBT = 0.34
@@ -105,7 +108,7 @@ class Panes:
         redrawn = evidence.take_redrawn()
         if last:
             redrawn = _corners(evidence.grid().frame)
-        asked = evidence.crossed(SOLID, share=CROSSED_SHARE, within=redrawn)
+        asked = evidence.crossed(SOLID, least=CROSSED, share=0.0, within=redrawn)
         places, normals = self._met.near_normal(*asked, OBLIQUE)
         if len(places):
             self._places = np.concatenate((self._places, places))
@@ -179,14 +182,15 @@ class Panes:
         glass = (past <= DOUBT * hit) & (through >= SEEN_THROUGH) & (askew <= DOUBT * through)
         no_pane = (past > 1) & (past > hit)
         may_be, before = places[~no_pane & (through >= SEEN_THROUGH)], sample(self.segments, self._resolution)
-        lines = draw_lines(places[glass], normals[glass], self._resolution)
+        lines = join_lines(draw_lines(places[glass], normals[glass], self._resolution), grid)
         opened = self._open_along(lines, keyframes) if last else [places[no_pane]] * len(lines)
         segments = []
         for line, against in zip(lines, opened, strict=True):
-            length = math.dist(*line)
+            length = math.dist(*line) + self._resolution  # from middle to middle of whole cells
             long = length >= LENGTH
             gap, reach = (WIDE if last else FRAME, FARTHEST) if long else (FRAME, FRAME)
-            segment, walls = extend_line(line, grid, may_be, before, against, self._driven, gap, reach)
+            turned = turn_into_walls(line, grid, reach)
+            segment, walls = extend_line(turned, grid, may_be, before, against, self._driven, gap, reach)
             if (walls and length >= ALONE) or (walls == 2 and (long or self._was_open(line))):
                 segments.append(segment)
         return without_covered(np.array(segments).reshape(-1, 2, 2))

@@ -135,13 +135,17 @@ def _propose_all(
     return found
 
 
-def _group_rows(rows: BoolArray) -> Iterator[tuple[BoolArray, BoolArray]]:
-    """Yield the distinct rows of a table, in order, and where each stands, shape (n,)."""
+def _group_rows(rows: BoolArray) -> Iterator[tuple[BoolArray, IntArray]]:
+    """Yield the distinct rows of a table, in order, and the numbers of the rows that are like it."""
     # As strings of bytes they are sorted ten times as quickly as row by row.
     packed = np.packbits(np.pad(rows, ((0, 0), (0, 1))), axis=1)
-    _, first, which = np.unique(packed.view(f"S{packed.shape[1]}").ravel(), return_index=True, return_inverse=True)
-    for number, row in enumerate(first):
-        yield rows[row], which == number
+    keys = packed.view(f"S{packed.shape[1]}").ravel()
+    # Not `np.unique`, which loads masked arrays: a twentieth of the time of a small prediction.
+    order = keys.argsort(kind="stable")
+    ordered = keys[order]
+    for group in np.split(order, np.flatnonzero(ordered[1:] != ordered[:-1]) + 1):
+        if group.size:
+            yield rows[group[0]], group
 
 
 def _share_windows(frame: DoorFrame, entries: dict[int, FramedDoor], largest: int) -> list[tuple[Window, list[int]]]:

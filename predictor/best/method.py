@@ -55,4 +55,4 @@ def predict_best(
     in_order = {door.id: failures[door.id] for door in doors if door.id in failures}
     beliefs = believe(scene, chosen, rooms, openings)
     trace = trace_of(scene, hypotheses, chosen, rooms) if config.keep_trace and scene.poses else None
-    return Prediction(completed, tuple(rooms), in_order, trace, beliefs=beliefs)
+    return Prediction(completed, tuple(rooms), in_order, trace, beliefs=beliefs, facing=tuple(facing))

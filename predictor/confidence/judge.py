@@ -1,4 +1,7 @@
-"""A prediction with how sure it is: confidence and alternatives of every room, and the probability of every cell."""
+"""A prediction with how sure it is: confidence and alternatives of every room, and the probability of every cell.
+
+That a door leads outside and there is no room is a hypothesis of its own, beside all shapes of the room.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -8,14 +11,20 @@ import numpy as np
 from closedrooms.core.arrays import FloatArray, handed_over
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import GridFrame, OccupancyGrid
+from closedrooms.core.room import Room
 from closedrooms.predictor.confidence.belief import Belief
 from closedrooms.predictor.confidence.calibration import Calibration, calibration_of
+from closedrooms.predictor.confidence.outside import find_outside
 from closedrooms.predictor.confidence.room_features import measure_rooms
 from closedrooms.predictor.confidence.shape_variants import believe_variants
+from closedrooms.predictor.inpainting import undraw
 from closedrooms.predictor.prediction import Prediction
 
 # What is less probable is not drawn.
 LEAST = 0.01
+# Behind a door that leads outside with more than this there is no room to predict: so say 0.6 and 0.5 % of the doors of
+# rooms of ``choose`` (drawn maps, runs), and 20 and 25 % of exits drawn there (``benchmarks/fitting/fit_outside.py``).
+OUTSIDE = 0.4
 
 
 def judge(
@@ -35,30 +44,55 @@ def judge(
         calibration: In place of the shipped one.
 
     Returns:
-        The prediction with ``confidence`` and ``alternatives`` of each room and ``probability``; one that has them is
-        returned as it is.
+        The prediction with ``confidence``, ``outside`` and ``alternatives`` of each room and ``probability``, without
+        the rooms behind doors that lead outside; one that has them is returned as it is.
     """
     if prediction.probability is not None:
         return prediction
     numbers = calibration or calibration_of(method)
     beliefs = form_beliefs(grid, doors, prediction, numbers)
     features = measure_rooms(grid, prediction.rooms, beliefs)
+    exits = find_outside(grid, prediction.facing)
+    outside = [_lead_outside(room, exits) for room in prediction.rooms]
     rooms = tuple(
         replace(
             room,
-            confidence=round(numbers.expect_iou(measured), 6),
+            confidence=round(numbers.expect_iou(measured) * (1.0 - (chance or 0.0)), 6),
             alternatives=tuple(
                 replace(other, probability=round(float(numbers.nearest.at(other.probability)), 6))
                 for other in belief.alternatives
             ),
+            outside=chance,
         )
-        for room, belief, measured in zip(prediction.rooms, beliefs, features, strict=True)
+        for room, belief, measured, chance in zip(prediction.rooms, beliefs, features, outside, strict=True)
     )
-    frame, joint = join_spreads(prediction.grid.frame, beliefs)
+    inside = [_thin_out(belief, chance or 0.0) for belief, chance in zip(beliefs, outside, strict=True)]
+    frame, joint = join_spreads(prediction.grid.frame, inside)
     percent = np.rint(100.0 * numbers.cells.at(joint)).astype(np.int8)
     percent[joint < LEAST] = 0
     percent[grid.on(frame).known] = -1
-    return replace(prediction, rooms=rooms, probability=OccupancyGrid(frame, handed_over(percent)), beliefs=())
+    probability = OccupancyGrid(frame, handed_over(percent))
+    judged = replace(prediction, rooms=rooms, probability=probability, beliefs=(), facing=())
+    return leave_outside(judged, grid, doors)
+
+
+def _lead_outside(room: Room, exits: Mapping[str, float]) -> float | None:
+    """Find how probable it is that a room is none: all of its doors lead outside."""
+    return min((exits[door] for door in room.doors if door in exits), default=None)
+
+
+def _thin_out(belief: Belief, outside: float) -> Belief:
+    """Take from where a room may be the probability that there is none."""
+    return replace(belief, spread=replace(belief.spread, share=belief.spread.share * (1.0 - outside)))
+
+
+def leave_outside(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedDoor]) -> Prediction:
+    """Drop the rooms behind doors that lead outside more probably than :data:`OUTSIDE`; ``failures`` says so."""
+    gone = [room for room in prediction.rooms if room.outside is not None and room.outside > OUTSIDE]
+    reasons = {door: f"leads outside ({room.outside:.2f}), no room predicted" for room in gone for door in room.doors}
+    failures = prediction.failures | reasons
+    drawn = undraw(prediction, grid, doors, gone)
+    return replace(drawn, rooms=tuple(room for room in prediction.rooms if room not in gone), failures=failures)
 
 
 def form_beliefs(

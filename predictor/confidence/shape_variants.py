@@ -26,6 +26,9 @@ SAME = int(np.flatnonzero((FACTORS == 1.0).all(axis=1))[0])
 CELL, MOST_CELLS = 0.2, 250
 # Around known free space a wall is expected of this thickness [m].
 WALL = 0.2
+# Other shapes are chosen for this power of the probabilities, which tell how often each was right and nothing of the
+# room at hand: with it the best of three of ``paper`` gains 0.004 on drawn maps of ``choose`` and 0.011 on runs.
+FLATTER = 0.5
 # Shapes smaller than this are no room [m2].
 SMALLEST = 0.5
 
@@ -109,7 +112,8 @@ class RoomVariants:
         """Form the belief that follows when the shapes have these probabilities, shape (variants,)."""
         weights = weights / weights.sum()
         overlap = self.overlaps()
-        chosen = choose_diverse(overlap, weights, SAME)
+        flat = weights**FLATTER
+        chosen = choose_diverse(overlap, flat / flat.sum(), SAME)
         shares = share_nearest(overlap, weights, chosen)
         others = []
         for at, share in zip(chosen[1:], shares[1:], strict=True):

@@ -10,14 +10,11 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.shapes import Shape
 from closedrooms.predictor.confidence.belief import Belief, Spread
 from closedrooms.predictor.learned.patches import CELL, Patch
-from closedrooms.predictor.learned.ratings import WORDS
-from closedrooms.predictor.learned.sides import SeenRoom
+from closedrooms.predictor.learned.seen_room import SeenRoom
 
 # What the mask counts beside the rectangles, whose sides are sharper: of 0 to 0.75 the best Brier and log score on both
 # kinds of maps of the use ``choose``.
 MASK = 0.3
-# Of the numbers that say how clear a choice is, that of how far areas are spread.
-SPREAD = 2
 
 
 def believe_cells(belief: Belief, shape: Shape, heard: Sequence[tuple[Patch, SeenRoom]]) -> Belief:
@@ -25,8 +22,8 @@ def believe_cells(belief: Belief, shape: Shape, heard: Sequence[tuple[Patch, See
 
     Args:
         belief: By the rectangles: cells that they never reach, and those that known space and its walls take, stay 0.
-            Of what was measured, how far areas are spread and what the network said stay: with more of it, confidence
-            tells right rooms from wrong ones less well on maps of another kind than those that it was fitted on.
+            Of what was measured, what the network said stays: with more of it, confidence tells right rooms from
+            wrong ones less well on maps of another kind than those that it was fitted on.
         shape: Of the room; its overlap (IoU) with the mask is evidence too.
         heard: What the network was shown and what it said, of each door of the room.
     """
@@ -36,8 +33,7 @@ def believe_cells(belief: Belief, shape: Shape, heard: Sequence[tuple[Patch, See
     inside = spread.inside(shape)
     overlap = float(masks[inside].sum() / max(inside.sum() + masks[~inside].sum(), 1.0))
     share = (1.0 - MASK) * spread.share + MASK * masks
-    said = (belief.evidence[SPREAD], *belief.evidence[-len(WORDS) :], overlap)
-    return replace(belief, spread=replace(spread, share=share), evidence=said)
+    return replace(belief, spread=replace(spread, share=share), evidence=(belief.evidence[-1], overlap))
 
 
 def _sample_mask(patch: Patch, seen: SeenRoom, spread: Spread) -> FloatArray:

@@ -1,8 +1,8 @@
 """The method ``learned``: the rectangles of ``best``, chosen by their evidence and by what a trained network says.
 
-The network looks at the map around each door (``patches``) and says how far the room reaches and which cells it fills
-(``sides``); the rectangles that ``best`` proposes are rated by both (``ratings``), and those of all doors are chosen
-together as ``best`` does, so that the rooms are disjoint and lie in unknown space.
+The network looks at the map around each door (``patches``) and says which cells the room fills (``seen_room``); the
+rectangles that ``best`` proposes are rated by that as well (``ratings``), and those of all doors are chosen together as
+``best`` does, so that the rooms are disjoint and lie in unknown space.
 """
 
 from collections.abc import Sequence

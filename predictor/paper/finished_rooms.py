@@ -5,6 +5,7 @@ from shapely.geometry import Polygon
 
 from closedrooms.core.room import Room, RoomKind
 from closedrooms.core.shapes import take_away
+from closedrooms.predictor.absurd_rooms import leave_absurd
 from closedrooms.predictor.config import PaperConfig
 from closedrooms.predictor.disjoint_rooms import NO_ROOM, SMALLEST, part_rooms
 from closedrooms.predictor.paper.arrangement import unite_faces
@@ -44,8 +45,11 @@ def finish_rooms(start: InitialFaces, growth: Growth, config: PaperConfig) -> tu
         kind: RoomKind = "border" if room in border else "dependent" if growth.touches(room) else "independent"
         score = None if room in border else round(growth.scores[room], 9)
         rooms.append(Room(shape, (entrance.door.id,), kind, score, growth.bounded[room]))
+    # Rooms that are none take nothing from others, and what others leave of a room may be none.
+    rooms, absurd = leave_absurd(rooms, start.grid)
     apart, without = part_rooms(rooms, {e.door.id: e.door.midpoint for e in start.entrances})
-    return apart, failures | without
+    apart, left_over = leave_absurd(apart, start.grid)
+    return apart, failures | absurd | without | left_over
 
 
 def _gather_shapes(start: InitialFaces, growth: Growth, border: dict[int, BorderRoom]) -> dict[int, Polygon]:

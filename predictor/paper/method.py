@@ -57,6 +57,7 @@ def predict_paper(
         report(config.max_level + 1)
     # 3.6, 3.7: rooms on the border, free interiors, and all of it drawn into the map.
     rooms, without = finish_rooms(start, growth, config)
-    completed = complete_map(grid, start.grid, rooms, [entrance.facing for entrance in start.entrances], config)
+    facing = tuple(entrance.facing for entrance in start.entrances)
+    completed = complete_map(grid, start.grid, rooms, facing, config)
     trace = trace_of(start, levels) if config.keep_trace else None
-    return Prediction(completed, tuple(rooms), failures | without, trace)
+    return Prediction(completed, tuple(rooms), failures | without, trace, facing=facing)

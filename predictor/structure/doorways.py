@@ -10,6 +10,7 @@ from shapely.geometry import Polygon
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.door import ClosedDoor
 from closedrooms.core.grid import OccupancyGrid, is_free, is_occupied
+from closedrooms.core.median import median
 
 # An opening that seems to go on further than this to either side of its mid-point is a leaf flush with its wall [m].
 WIDEST = 1.25
@@ -98,7 +99,7 @@ class Doorway:
         if 2 * begins.size <= sides.size:
             return room
         # One step into the room: the two share more than an edge.
-        whole = room.union(self.stretch(self.leaf, float(np.median(begins)) + step))
+        whole = room.union(self.stretch(self.leaf, median(begins) + step))
         whole = whole.buffer(SAME, join_style="mitre").buffer(-SAME, join_style="mitre")
         parts = [part for part in shapely.get_parts(whole).tolist() if isinstance(part, Polygon)]
         return max(parts, key=lambda part: part.area)
@@ -120,7 +121,7 @@ def find_doorways(grid: OccupancyGrid, doors: Sequence[FacingDoor], *, width: fl
     """
     found = [_find(grid, door) for door in doors]
     seen = [opening.right - opening.left for opening in found if opening is not None and opening.right > opening.left]
-    usual = float(np.median(seen)) if seen else width
+    usual = median(seen) if seen else width
     return [
         replace(opening, left=-(door.door.width or usual) / 2, right=(door.door.width or usual) / 2)
         if opening is not None and opening.right <= opening.left
@@ -141,7 +142,7 @@ def _find(grid: OccupancyGrid, door: FacingDoor) -> Doorway | None:
     known[inside] = is_free(values) | is_occupied(values)
     last = depths.size - 1 - known[:, ::-1].argmax(axis=1)
     ends = np.where(known.any(axis=1), depths[last], depths[0]) + step / 2
-    leaf = float(np.median(ends[np.abs(sides) < LEAF]))
+    leaf = median(ends[np.abs(sides) < LEAF])
     if leaf < depths[1]:
         return None
     wall = sides[_long(ends < leaf - SHALLOWER * grid.frame.resolution, round(CELLS / STEP))]
@@ -150,7 +151,7 @@ def _find(grid: OccupancyGrid, door: FacingDoor) -> Doorway | None:
     if left < -WIDEST or right > WIDEST or right - left < NARROWEST:
         return Doorway(door, 0.0, 0.0, leaf, leaf)
     beside = ends[((sides < left) & (sides > left - BESIDE)) | ((sides > right) & (sides < right + BESIDE))]
-    return Doorway(door, left, right, leaf, min(float(np.median(beside)), leaf))
+    return Doorway(door, left, right, leaf, min(median(beside), leaf))
 
 
 def _long(mask: BoolArray, least: int) -> BoolArray:

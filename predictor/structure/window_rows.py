@@ -13,6 +13,7 @@ import numpy as np
 
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import OccupancyGrid, is_free
+from closedrooms.core.median import median
 
 # So many alike make a row; where they are uneven, five.
 LEAST_IN_ROW = 3
@@ -61,7 +62,7 @@ def find_window_rows(grid: OccupancyGrid, niches: Sequence[Niche]) -> BoolArray:
             windows[row] = True
         for row in _runs(line, spacings, _lights_a_room):
             depths = [_depth_in_front(grid, niches[number]) for number in row]
-            windows[row] |= float(np.median(depths)) > WIDEST_CORRIDOR
+            windows[row] |= median(depths) > WIDEST_CORRIDOR
     return windows
 
 
@@ -132,4 +133,4 @@ def _depth_in_front(grid: OccupancyGrid, niche: Niche) -> float:
     free = np.zeros(inside.shape, dtype=np.bool_)
     free[inside] = is_free(grid.cells[cells[inside][:, 0], cells[inside][:, 1]])
     ends = np.where(free.all(axis=1), away[-1], away[np.argmin(free, axis=1)])
-    return float(np.median(ends))
+    return median(ends)

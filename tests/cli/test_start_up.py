@@ -12,7 +12,8 @@ CODE = """
 import json, sys
 from closedrooms.cli.commands import main
 status = main(sys.argv[1:])
-packages = {".".join(name.split(".")[:2]) if name.startswith(("scipy.", "skimage.")) else name.split(".")[0]
+PARTED = ("scipy.", "skimage.", "numpy.ma.")
+packages = {".".join(name.split(".")[:2]) if name.startswith(PARTED) else name.split(".")[0]
             for name in sys.modules}
 print(json.dumps([status, sorted(packages - set(sys.stdlib_module_names))]), file=sys.__stdout__)
 """
@@ -21,8 +22,10 @@ AROUND = {"_distutils_hack", "sitecustomize", "cython_runtime", "_virtualenv", "
 # Neither typeguard, which tyro loads for some types, nor rich, which only prints tables (`--quiet` here).
 LINE = {"closedrooms", "tyro", "docstring_parser", "typing_extensions"}
 MAPS = LINE | {"numpy", "shapely", "cv2", "yaml", "PIL"}
+# Masked arrays: np.unique loads them, and with it quantiles and sets of numbers.
+UNIQUE = {"numpy.ma"}
 # A compiled part that is loaded by its file stands under its package's name; the package is not loaded.
-TOURS = MAPS | {"networkx", "skimage.morphology"}
+TOURS = MAPS | UNIQUE | {"networkx", "skimage.morphology"}
 # What scikit-learn brings, some of it only where it is installed.
 LEARN = {
     "sklearn", "joblib", "threadpoolctl", "cloudpickle", "psutil", "narwhals", "lz4", "charset_normalizer", "rich",
@@ -53,11 +56,11 @@ def loaded(folder: Path, *words: str) -> set[str]:
     [
         (["worlds", "list"], LINE),
         (["predict", "map.yaml", "--doors", "doors.geojson", "--out", "p"], MAPS),
-        (["predict", "map.yaml", "--doors", "doors.geojson", "--out", "p", "--method", "paper"], MAPS | LEARN),
-        (["map", "robot.log", "--no-record", "--out", "m"], MAPS | {"charset_normalizer"}),
+        (["predict", "map.yaml", "--doors", "doors.geojson", "--out", "p", "--method", "paper"], MAPS | UNIQUE | LEARN),
+        (["map", "robot.log", "--no-record", "--out", "m"], MAPS | UNIQUE | {"charset_normalizer"}),
         (
             ["evaluate", ".", "--methods", "best", "--no-tours", "--workers", "1", "--out", "../e"],
-            MAPS | TABLES | {"networkx", "skimage.segmentation"},
+            MAPS | UNIQUE | TABLES | {"networkx", "skimage.segmentation"},
         ),
         (["predict", "map.yaml", "--doors", "doors.geojson", "--method", "learned", "--out", "l"], MAPS),
         (["cover", "map.yaml", "--doors", "doors.geojson", "--out", "c"], TOURS | {"ortools"}),
@@ -96,4 +99,4 @@ def test_a_dataset_loads_neither_tours_nor_scipy(tmp_path: Path) -> None:
     words = ["dataset", "office-01", "--repetitions", "1", "--max-closed", "1", "--workers", "1", "--out", "d"]
     # scipy solves the pose graph, where a loop closes; threads are limited by what joblib uses too.
     found = {name for name in loaded(tmp_path, *words) if name.split(".")[0] != "scipy"}
-    assert found <= SIMULATION - TOURS | MAPS | {"pyarrow", "cloudpickle", "threadpoolctl"}
+    assert found <= SIMULATION - TOURS | MAPS | UNIQUE | {"pyarrow", "cloudpickle", "threadpoolctl"}

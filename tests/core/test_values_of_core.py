@@ -19,7 +19,8 @@ from closedrooms.core.scan import LaserScan
 
 def test_a_room_of_which_little_is_said_is_a_true_one() -> None:
     room = Room(box(0, 0, 1, 1), ("d",))
-    assert (room.kind, room.score, room.bounded, room.confidence, room.alternatives) == (None, None, False, None, ())
+    assert (room.kind, room.score, room.bounded, room.confidence, room.outside) == (None, None, False, None, None)
+    assert room.alternatives == ()
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from types import ModuleType
 
 import pytest
 
+from closedrooms.cli.options import option_names, options_class
 from closedrooms.cli.table import COMMANDS
 
 ROOT = Path(__file__).parents[2]
@@ -93,11 +94,41 @@ def test_scripts_that_pages_and_figures_name_exist() -> None:
             assert (ROOT / script).is_file(), f"{path.name} names {script}"
 
 
+def test_the_python_of_readme_predicts_a_room_on_the_map_of_the_tutorial(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(DOCS / "tutorial" / "office", tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    (code,) = re.findall(r"^```python\n(.*?)^```", (ROOT / "README.md").read_text(), re.M | re.S)
+    exec(compile(code, "README.md", "exec"), {})
+    assert re.fullmatch(r"\('d1',\) [\d.]+ m2 0\.\d+\n", capsys.readouterr().out)
+    assert (tmp_path / "completed.yaml").is_file()
+
+
+def test_every_benchmark_stands_in_their_list() -> None:
+    listed = (ROOT / "benchmarks" / "README.md").read_text()
+    for path in (ROOT / "benchmarks").rglob("*.py"):
+        assert f"`{path.relative_to(ROOT / 'benchmarks')}`" in listed, path.name
+
+
 def test_commands_of_readme_are_commands() -> None:
     text = (ROOT / "README.md").read_text()
     named = set(re.findall(r"^    closedrooms (\w+)", text, re.M))
     assert named <= {command.name.split()[0] for command in COMMANDS}
     assert {"run", "predict", "doors", "edit", "cover"} <= named
+
+
+def test_options_that_pages_and_figures_name_are_options() -> None:
+    commands = {command.name: command for command in COMMANDS}
+    named: set[tuple[str, str]] = set()
+    for path in (*results.pages(), *results.RESULTS.glob("*.csv")):
+        lines = re.findall(r"closedrooms ((?:worlds )?[a-z]+)( [^`\n;&(]*)", path.read_text())
+        named |= {(name, words) for name, words in lines if name in commands and "--" in words}
+    for name, words in sorted(named):
+        given = re.findall(r"(?<!\S)\[?--(?:no-)?([a-z][\w.-]*)", words)
+        options = options_class(commands[name], [] if "[" in words else words.split())
+        assert {*given} <= {*option_names(options), "help"}, f"closedrooms {name}{words}"
+    assert len(named) > 40
 
 
 @pytest.mark.parametrize(

@@ -314,6 +314,10 @@ def test_a_surface_was_seen_through_where_more_scans_went_through_than_met_it(re
         assert part.shape == (round(1.0 / resolution) + 1, round(1.0 / resolution) + 1)
         strict = evidence.crossed(0.2, share=1.0, within=corners)[2]
         assert strict.sum() <= part.sum()
+        # However many met it.
+        for least in (through, through + 1):
+            row, col, asked = evidence.crossed(0.2, least=least, share=0.0)
+            assert asked[cells[:, 1], cells[:, 0]].all() == (least == through)
 
 
 def test_beside_a_surface_that_stands_nothing_counts_as_crossed() -> None:

@@ -13,7 +13,7 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.decider import Situation
 from closedrooms.navigation.driving.planner import PlannedPath
-from closedrooms.navigation.explorer import CHANCES, HELD_UP, SAME_PLACE, SETTLE, Explorer
+from closedrooms.navigation.explorer import CHANCES, HELD_UP, SAME_PLACE, SETTLE, WAIT, Explorer
 from closedrooms.navigation.goal_search import Goal
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
@@ -131,9 +131,12 @@ def test_before_it_ends_it_tries_again_what_kept_it_from_somewhere_a_few_times()
     search = Search(None, None, None, again=9)
     explorer, driver = exploring(search)
     driver.recoveries = 2
-    explorer.command(at(0.0))
+    for number in range(CHANCES + 1):
+        assert explorer.status is None
+        for stamp in (0.0, 0.5 * WAIT):
+            assert explorer.command(at(number * WAIT + stamp)) == (0.0, 0.0)
+        assert search.count == number + 1
     assert explorer.status == "complete"
-    assert search.count == CHANCES + 1
     assert driver.recoveries == 0
     # Where there is nothing to try again it ends at once.
     search = Search(None, None)

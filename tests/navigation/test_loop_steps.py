@@ -162,3 +162,19 @@ def test_a_clock_counts_laps_by_their_names(monkeypatch: pytest.MonkeyPatch) -> 
     for name in ("a", "b", "a"):
         clock.lap(name)
     assert clock.seconds == {"a": 0.75, "b": 1.5}
+
+
+@pytest.mark.parametrize(
+    ("status", "goes_on", "ended", "scans"),
+    [("complete", False, "complete", 3), ("complete", True, "limit", 5), ("stuck", True, "stuck", 3)],
+)
+def test_what_is_complete_may_go_on_all_the_same(status: str, goes_on: bool, ended: str, scans: int) -> None:
+    asked: list[bool] = []
+
+    def again() -> bool:
+        asked.append(goes_on)
+        return goes_on
+
+    log, _ = run(3, status=status, again=again, stop=lambda step: EarlyEnd("limit", "") if step.stamp >= 4.0 else None)
+    assert (log.status, log.scans) == (ended, scans)
+    assert len(asked) == (status == "complete")

@@ -7,7 +7,7 @@ from closedrooms.core.robot import RobotConfig
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.decider import Situation
-from closedrooms.navigation.explorer import CHANCES, Explorer
+from closedrooms.navigation.explorer import CHANCES, WAIT, Explorer
 
 
 def corridor() -> OccupancyGrid:
@@ -35,7 +35,11 @@ ACROSS = np.column_stack((np.full(21, 3.0), np.linspace(1.0, 2.0, 21)))
 
 def test_somebody_who_stood_in_the_way_does_not_shut_a_corridor_for_good(explorer: Explorer) -> None:
     explorer._search.map.add_obstacles(ACROSS)  # as the explorer does when the robot is held up
-    command(explorer, 0.0)
+    # It gives them time to walk on.
+    for stamp in (0.0, WAIT / 2.0):
+        assert command(explorer, stamp) == (0.0, 0.0)
+        assert (explorer.status, explorer.goal) == (None, None)
+    assert command(explorer, WAIT)[0] > 0.0
     assert explorer.status is None
     assert explorer.goal is not None
     assert explorer.goal.place[0] > 4.0
@@ -48,5 +52,5 @@ def test_what_stands_there_still_ends_the_search_after_a_few_more_tries(explorer
         explorer._forget()
         explorer._search.map.add_obstacles(ACROSS)
         command(explorer, stamp)
-        stamp += 0.1
+        stamp += WAIT
     assert explorer.status == "complete"

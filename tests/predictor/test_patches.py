@@ -27,8 +27,8 @@ from closedrooms.predictor.learned.patches import (
     _draw_door,
     sample_cells,
 )
-from closedrooms.predictor.learned.ratings import WEIGHTS, WORDS, Rater
-from closedrooms.predictor.learned.sides import ASIDE_CELLS, DOOR_ROW, SeenRoom, read_room
+from closedrooms.predictor.learned.ratings import OVERLAP, Rater
+from closedrooms.predictor.learned.seen_room import SeenRoom, read_room
 from closedrooms.predictor.prediction import WeighedRoom
 from closedrooms.predictor.structure.doorways import FacingDoor
 
@@ -151,7 +151,7 @@ def test_the_own_door_and_the_others_have_channels_of_their_own():
 
 
 class _Words(Model):
-    """A network that says of every patch what is in its channels."""
+    """A network that says of every patch what is in its first two channels."""
 
     def __init__(self):
         self.asked = []
@@ -159,11 +159,8 @@ class _Words(Model):
     def ask(self, patches):
         self.asked.append(len(patches))
         assert patches.dtype == np.float32
-        mask, parts = patches[:, :1] * 1.0, SIZE // 4
-        # Columns and rows in four groups: by number of the group, then the place in it.
-        columns = patches[:, 1, 0].reshape(len(patches), parts, 4).transpose(0, 2, 1)
-        rows = patches[:, 2, :, 0].reshape(len(patches), parts, 4).transpose(0, 2, 1)
-        return mask, columns, rows
+        # Of the unknown cells by their column as well, so that it tells a patch from its mirror image.
+        return patches[:, 0] + patches[:, 1] * np.arange(SIZE)
 
 
 def test_what_is_said_of_a_patch_and_of_its_mirror_image_is_averaged():
@@ -176,26 +173,18 @@ def test_what_is_said_of_a_patch_and_of_its_mirror_image_is_averaged():
     rooms = words.look(patches)
     assert words.asked == [2 * BATCH, 6]
     for patch, room in zip(patches, rooms, strict=True):
-        # The mirror image turned back is the patch: the columns are those of channel 1, first row; of the rows those
-        # of channel 2 in its first and its last column.
-        rows = (patch.channels[2, :, 0] + patch.channels[2, :, -1]) / 2
-        same = read_room(patch, patch.channels[0], patch.channels[1, 0], rows)
-        for name in ("left", "right", "back", "mask", "unknown"):
+        # The mirror image turned back is the patch; the columns of the two add up to the last one.
+        same = read_room(patch, patch.channels[0] + patch.channels[1] * (SIZE - 1) / 2)
+        for name in ("mask", "unknown"):
             np.testing.assert_allclose(getattr(room, name), getattr(same, name), atol=1e-5)
 
 
-def test_logits_become_probabilities_from_the_door_outward():
-    rng = np.random.default_rng(2)
-    mask, columns, rows = rng.normal(size=(SIZE, SIZE)), rng.normal(size=SIZE), rng.normal(size=SIZE)
+def test_logits_become_probabilities():
+    mask = np.random.default_rng(2).normal(size=(SIZE, SIZE))
     mask[0, 0], mask[0, 1] = 1e6, -1e6
     patch = _patch()
     patch.channels[2, 3, 4] = 0.25
-    room = read_room(patch, mask, columns, rows)
-    for logs, logits in (
-        (room.left, columns[63::-1]), (room.right, columns[64:]), (room.back, rows[32:])
-    ):  # fmt: skip
-        assert np.exp(logs) == pytest.approx(np.exp(logits) / np.exp(logits).sum())
-    assert (ASIDE_CELLS, DOOR_ROW) == (64, 32)
+    room = read_room(patch, mask)
     np.testing.assert_allclose(room.mask[1:], 1.0 / (1.0 + np.exp(-mask[1:])))
     assert room.mask[0, :2] == pytest.approx([1.0, 0.0], abs=1e-9)
     assert (room.mask[0, :2] > 0.0).all()
@@ -204,8 +193,7 @@ def test_logits_become_probabilities_from_the_door_outward():
 
 def _room(seed):
     rng = np.random.default_rng(seed)
-    sides = [np.log(rng.dirichlet(np.ones(count))) for count in (64, 64, 96)]
-    return SeenRoom(*sides, rng.random((SIZE, SIZE)), np.ones((SIZE, SIZE)))
+    return SeenRoom(rng.random((SIZE, SIZE)), np.ones((SIZE, SIZE)))
 
 
 def _heard(**doors):
@@ -236,9 +224,8 @@ def test_rectangles_are_rated_by_what_each_of_their_doors_heard_on_average():
     boxes = np.array(BOXES, dtype=float)
     moved = boxes - np.array([1.0, 0.0, 1.0, 0.0])
     said = rater.hear(["a"], _corners(*BOXES))
-    assert said == pytest.approx(np.column_stack((own.rate_sides(boxes), own.rate_cells(boxes))))
-    both = np.column_stack((other.rate_sides(moved), other.rate_cells(moved)))
-    assert rater.hear(["a", "b"], _corners(*BOXES)) == pytest.approx((said + both) / 2)
+    assert said == pytest.approx(own.rate(boxes))
+    assert rater.hear(["a", "b"], _corners(*BOXES)) == pytest.approx((said + other.rate(moved)) / 2)
 
 
 @pytest.mark.parametrize("keep", [1, 2, 9])
@@ -265,20 +252,20 @@ def test_what_the_network_says_is_added_to_the_scores_and_the_best_are_kept(monk
         (["a", "b"], alone[0], found.shared[0, 1][0]),
     ):  # fmt: skip
         said = rater.hear(doors, before.corners)
-        scores = before.scores + said[:, 0] * 1.0 + said[:, 1] * 4.0
+        scores = before.scores + said * OVERLAP
         order = np.argsort(-scores)[:keep]
         assert after.scores == pytest.approx(scores[order])
         assert np.array_equal(after.boxes, before.boxes[order])
         assert np.array_equal(after.corners, before.corners[order])
-        assert after.measured == pytest.approx(np.hstack((before.measured, said))[order])
-    assert WEIGHTS.tolist() == [1.0, 4.0]
+        assert after.measured == pytest.approx(np.column_stack((before.measured, said))[order])
+    assert OVERLAP > 0.0
 
 
 def test_rectangles_of_one_score_stand_by_their_place():
     rater = Rater(None, 9, _heard(a=(0, 0)))
     rater.heard["a"] = (
         rater.heard["a"][0],
-        SeenRoom(np.zeros(64), np.zeros(64), np.zeros(96), np.zeros((SIZE, SIZE)), np.ones((SIZE, SIZE))),
+        SeenRoom(np.zeros((SIZE, SIZE)), np.ones((SIZE, SIZE))),
     )
     same = ((3, 1, 5, 4), (2, 1, 5, 4), (2, 0, 5, 4), (2, 0, 4, 5))
     found = rater._rate(["a"], _hypotheses(*same, scores=(1.0, 1.0, 1.0, 1.0)))
@@ -292,12 +279,11 @@ def test_a_trace_tells_what_the_network_said_of_the_chosen_one_and_of_the_next(s
     weighed = WeighedRoom(
         ("a",), _corners(*BOXES), np.zeros(3), np.array([5.0, 6.0, 7.0]), 1, second, {"x": (1.0, 2.0)}
     )
-    said = rater.hear(["a"], _corners(*BOXES)) * [1.0, 4.0]
+    said = rater.hear(["a"], _corners(*BOXES)) * OVERLAP
     found = rater.explain(weighed)
-    assert found.joint == pytest.approx(np.array([5.0, 6.0, 7.0]) + said.sum(axis=1))
+    assert found.joint == pytest.approx(np.array([5.0, 6.0, 7.0]) + said)
     assert found.terms["x"] == (1.0, 2.0)
-    for word, column in zip(WORDS, said.T, strict=True):
-        assert found.terms[f"network: {word}"] == pytest.approx((column[1], 0.0 if second is None else column[2]))
+    assert found.terms["network"] == pytest.approx((said[1], 0.0 if second is None else said[2]))
 
 
 def _belief(share, *, along=(1.0, 0.0), evidence=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)):
@@ -316,7 +302,7 @@ def test_the_mask_counts_three_tenths_where_the_rectangles_reach(angle):
     patch = Patch(
         np.zeros((5, SIZE, SIZE)), np.array([-6.0, -5.0]), np.array([1.0, 0.0]), np.array([0.0, 1.0]), np.zeros(2)
     )
-    seen = SeenRoom(np.zeros(64), np.zeros(64), np.zeros(96), mask, np.ones((SIZE, SIZE)))
+    seen = SeenRoom(mask, np.ones((SIZE, SIZE)))
     room = shapely.Polygon(
         np.array([2.0, 1.0]) + np.array([(0.5, 0.5), (1.5, 0.5), (1.5, 2.0), (0.5, 2.0)]) @ np.array([(c, s), (-s, c)])
     )
@@ -330,9 +316,9 @@ def test_the_mask_counts_three_tenths_where_the_rectangles_reach(angle):
     inside = np.zeros((12, 9), dtype=bool)
     inside[2:8, 2:6] = True
     overlap = masks[inside].sum() / (inside.sum() + masks[~inside].sum())
-    # How far areas are spread, what the network said, and this.
-    assert found.evidence == pytest.approx((3.0, 5.0, 6.0, overlap), abs=2e-3)
+    # What the network said of the rectangle, and this.
+    assert found.evidence == pytest.approx((6.0, overlap), abs=2e-3)
     # What two doors heard is averaged.
-    blank = SeenRoom(seen.left, seen.right, seen.back, np.zeros((SIZE, SIZE)), seen.unknown)
+    blank = SeenRoom(np.zeros((SIZE, SIZE)), seen.unknown)
     both = believe_cells(belief, room, [(patch, seen), (patch, blank)])
     assert both.spread.share == pytest.approx(0.7 * share + 0.15 * masks, abs=2e-4)

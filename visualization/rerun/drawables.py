@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+import pyarrow as pa
 import rerun as rr
 import shapely
 from shapely.geometry.base import BaseGeometry
@@ -85,14 +86,12 @@ def outlines(
 ) -> rr.LineStrips3D:
     """Draw the rings of polygons."""
     rings = shapely.get_rings(shapely.get_parts(np.asarray(list(shapes), dtype=object)))
-    strips = [lifted(shapely.get_coordinates(ring), z) for ring in rings]
-    return rr.LineStrips3D(strips, colors=[colour], radii=[radius])
+    return strips([shapely.get_coordinates(ring) for ring in rings], colour, radius=radius, z=z)
 
 
 def dashed(shapes: Sequence[BaseGeometry], colour: Colour, *, z: float = Z_LINE) -> rr.LineStrips3D:
     """Draw the rings of polygons in dashes."""
-    pieces = [lifted(piece, z) for shape in shapes for piece in cut_dashes(shape, DASH)]
-    return rr.LineStrips3D(pieces, colors=[colour], radii=[MEDIUM])
+    return strips([piece for shape in shapes for piece in cut_dashes(shape, DASH)], colour, z=z)
 
 
 def strips(
@@ -102,7 +101,15 @@ def strips(
     z: float = Z_LINE,
 ) -> rr.LineStrips3D:
     """Draw polylines, each of shape (k, 2); one colour for all, or one each."""
-    return rr.LineStrips3D([lifted(line, z) for line in lines], colors=list(colour), radii=[radius])
+    held = _joined(lines, z) if lines else []
+    return rr.LineStrips3D(held, colors=list(colour), radii=[radius])
+
+
+def _joined(lines: Sequence[FloatArray], z: float) -> pa.Array:
+    """Join polylines, each of shape (k, 2), as rerun holds them, which makes an array of each and joins those."""
+    corners = rr.components.Position3DBatch(lifted(np.concatenate(lines), z)).as_arrow_array()
+    begins = np.cumsum([0, *map(len, lines)], dtype=np.int32)
+    return pa.ListArray.from_arrays(begins, corners, type=rr.components.LineStrip3DBatch([]).as_arrow_array().type)
 
 
 def points(

@@ -9,12 +9,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+import pyarrow as pa
 import rerun as rr
 import rerun.blueprint as rrb
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.errors import OutputError
 from closedrooms.core.files.unfinished import final_place
+from closedrooms.core.runtime.absence import hidden
 from closedrooms.core.runtime.stopping import wait_for_nothing
 from closedrooms.visualization.rerun.documents import text_document
 from closedrooms.visualization.rerun.live import LiveViewer
@@ -66,6 +68,9 @@ class RecordingStream:
             viewer: It is streamed to while it is written. Batches are then cut by time too, so that two equal runs give
                 the same values in files that differ.
         """
+        # Before its first array pyarrow imports pandas to ask what is one of its columns: 0.23 s of processor time.
+        with hidden("pandas"):
+            pa.array([0])
         self._path, self._name, self._viewer = path, name, viewer
         self._stage: int = Stage.BUILDING
         self._rec = rr.RecordingStream(

@@ -22,7 +22,7 @@ MAX_ALTERNATIVES = 100
 
 
 def write_rooms(path: Path, rooms: Sequence[Room]) -> None:
-    """Write predicted rooms (``kind``, ``score``, ``bounded``; ``confidence`` and ``alternatives``), or true ones."""
+    """Write rooms, true or predicted (``kind``, ``score``, ``bounded``, how sure it is: see :class:`Room`)."""
 
     def feature(room: Room) -> GeoFeature:
         properties: dict[str, Any] = {"doors": list(room.doors)}
@@ -38,6 +38,8 @@ def write_rooms(path: Path, rooms: Sequence[Room]) -> None:
                 }
                 for other in room.alternatives
             ]
+        if room.outside is not None:
+            properties["outside"] = round(room.outside, 4)
         return room.polygon, properties
 
     write_features(path, map(feature, rooms))
@@ -52,8 +54,8 @@ def read_rooms(path: Path, *, remarks: list[Remark] | None = None) -> list[Room]
 
     Raises:
         InvalidInputError: Another geometry than Polygon or MultiPolygon, ``doors`` that is no list of ids, a ``score``
-            or ``kind`` of another type, a ``confidence`` or probability that is none, ``alternatives`` that are no list
-            of polygons, more than ``MAX_ROOMS`` rooms.
+            or ``kind`` of another type, a ``confidence``, ``outside`` or probability that is none, ``alternatives``
+            that are no list of polygons, more than ``MAX_ROOMS`` rooms.
     """
     features = read_features(path, what="a GeoJSON FeatureCollection of rooms (Polygons)", remarks=remarks)
     check_count(len(features), MAX_ROOMS, "rooms", path)
@@ -79,7 +81,9 @@ def _room(number: int, read: BaseGeometry, properties: dict[str, Any], path: Pat
     confidence = _share(number, properties.get("confidence"), "confidence", path)
     others = _alternatives(number, properties.get("alternatives") or [], path)
     bounded = bool(properties.get("bounded"))
-    return Room(geometry, tuple(map(str, doors)), known, score, bounded, confidence, others)  # type: ignore[arg-type]
+    outside = _share(number, properties.get("outside"), "outside", path)
+    ids = tuple(map(str, doors))
+    return Room(geometry, ids, known, score, bounded, confidence, others, outside)  # type: ignore[arg-type]
 
 
 def _listed(value: Any) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 
 from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.experiments.tables import Row
-from closedrooms.visualization.colours import ROOM_COLOURS, Colour
+from closedrooms.visualization.colours import ROOM_COLOURS, UNKNOWN, Colour
 
 # One colour a method or estimate in every figure.
 COLOURS: dict[str, Colour] = {
@@ -190,6 +190,7 @@ def same_extent(panels: Sequence[Any]) -> None:
         (x0, x1), (y0, y1) = (_span([getattr(panel, get)() for panel in drawn]) for get in ("get_xlim", "get_ylim"))
         for panel in drawn:
             panel.set(xlim=(x0, x1), ylim=(y0, y1))
+            _fill_with_unknown(panel)
 
 
 def same_scale(panels: Sequence[Any]) -> None:
@@ -203,6 +204,15 @@ def same_scale(panels: Sequence[Any]) -> None:
         for panel, (low, high) in zip(drawn, limits, strict=True):
             middle = (low + high) / 2.0
             panel.set(**{name: (middle - half, middle + half)})
+    for panel in drawn:
+        _fill_with_unknown(panel)
+
+
+def _fill_with_unknown(panel: Any) -> None:
+    """Paint what a panel shows beyond its map as the map paints what it does not know."""
+    panel.axis("on")
+    panel.set(facecolor=str(UNKNOWN / 255), xticks=(), yticks=())
+    panel.spines[:].set_visible(False)
 
 
 def _span(limits: Sequence[tuple[float, float]]) -> tuple[float, float]:

@@ -186,7 +186,7 @@ def test_a_room_with_wrong_properties_is_one_clear_line(tmp_path: Path, wrong: d
 
 def test_a_room_is_read_with_its_confidence_and_alternatives(tmp_path: Path) -> None:
     others = (Alternative(box(0, 0, 3, 3), 0.25), Alternative(box(0, 0, 5, 3), 0.125))
-    room = Room(box(0, 0, 4, 3), ("d",), "border", 1.5, confidence=0.75, alternatives=others)
+    room = Room(box(0, 0, 4, 3), ("d",), "border", 1.5, confidence=0.75, alternatives=others, outside=0.125)
     write_rooms(tmp_path / "rooms.geojson", [room])
     (read,) = read_rooms(tmp_path / "rooms.geojson")
     assert read == room
@@ -197,6 +197,7 @@ def test_a_room_is_read_with_its_confidence_and_alternatives(tmp_path: Path) -> 
     [
         ("confidence", 1.5, "confidence"),
         ("confidence", "high", "confidence"),
+        ("outside", -0.1, "outside"),
         ("alternatives", {"probability": 1}, "alternatives"),
         ("alternatives", [3], "alternatives"),
         ("alternatives", [{"probability": 0.5}], "geometry"),

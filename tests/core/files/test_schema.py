@@ -81,5 +81,5 @@ def test_a_newer_folder_is_not_replaced(tmp_path: Path) -> None:
         pass
     manifest = json.loads((folder / "run.json").read_text())
     (folder / "run.json").write_text(json.dumps(manifest | {"schema": SCHEMA + 1}, indent=2) + "\n")
-    with pytest.raises(OutputError), output_folder(folder, {"command": "predict"}):
+    with pytest.raises(OutputError, match=NEWER + "run.json"), output_folder(folder, {"command": "predict"}):
         pass

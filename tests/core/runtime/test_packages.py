@@ -13,7 +13,7 @@ def test_all_missing_packages_stand_in_one_line_with_the_command_that_brings_the
     with pytest.raises(MissingPackageError) as caught:
         require("pybullet", "networkx", "rerun", by="closedrooms run", instead="--no-record")
     expected = "pip install 'closedrooms[sim]' rerun-sdk (or --no-record)"
-    assert str(caught.value) == f"closedrooms run needs pybullet, rerun, which is not installed here: {expected}"
+    assert str(caught.value) == f"closedrooms run needs pybullet, rerun, which are not installed here: {expected}"
 
 
 def test_a_failed_import_of_a_known_package_becomes_that_line():

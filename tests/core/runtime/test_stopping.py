@@ -83,14 +83,19 @@ def test_a_process_that_does_not_stop_is_ended_in_time_and_quietly(what: str, nu
     assert time.monotonic() - begin < 10
 
 
-def test_a_process_whose_library_waits_for_ever_ends_all_the_same_with_its_status() -> None:
-    code = (
-        "import atexit, sys, time; from closedrooms.core.runtime import stopping\n"
-        "atexit.register(time.sleep, 1000); stopping.leave_if_stuck(2); print('said', end='')\n"
-        "stopping.wait_for_nothing(); stopping.leave_if_stuck(3)"
-    )
+def ended(code: str) -> tuple[int, str]:
+    code = f"import atexit, time; from closedrooms.core.runtime import stopping\n{code}"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
-    assert (done.returncode, done.stdout) == (3, "said")
+    return done.returncode, done.stdout
+
+
+def test_a_process_ends_with_its_status_and_what_is_to_be_done_at_exit_is_done() -> None:
+    assert ended("atexit.register(print, 'done', end=''); print('said', end=' '); stopping.end(2)") == (2, "said done")
+
+
+def test_a_process_whose_library_waits_for_ever_ends_all_the_same_with_its_status() -> None:
+    code = "atexit.register(time.sleep, 1000); print('said', end=''); stopping.wait_for_nothing(); stopping.end(3)"
+    assert ended(code) == (3, "said")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the kernel of Linux alone does it")

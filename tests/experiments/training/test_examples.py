@@ -12,6 +12,9 @@ from closedrooms.experiments.training.batches import blur, draw_batches, hide_po
 from closedrooms.experiments.training.buildings import group_of, may_train
 from closedrooms.experiments.training.config import TrainConfig
 from closedrooms.experiments.training.examples import (
+    AHEAD_CELLS,
+    ASIDE_CELLS,
+    DOOR_ROW,
     WHOLE,
     Examples,
     draw_room,
@@ -33,6 +36,10 @@ def upright(channels=None) -> Patch:
     """A patch along the axes of the map, its corner in the origin."""
     zeros = np.zeros((5, SIZE, SIZE)) if channels is None else channels
     return Patch(zeros, np.zeros(2), np.array([1.0, 0.0]), np.array([0.0, 1.0]), np.array([ASIDE, BEHIND]))
+
+
+def test_a_patch_reaches_16_m_to_either_side_24_m_ahead_and_8_m_behind_the_door() -> None:
+    assert (ASIDE_CELLS, AHEAD_CELLS, DOOR_ROW) == (64, 96, 32)
 
 
 @pytest.mark.parametrize("sides", [(1.0, 3.0, 5.0), (2.5, 0.6, 1.9), (15.8, 15.8, 23.8), (0.7, 0.7, 12.3)])

@@ -1,10 +1,53 @@
 """Lines of panes: which of them say the same, and places along them."""
 
+import math
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from closedrooms.mapping.glass.pane_lines import THICK, sample, without_covered
+from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
+from closedrooms.mapping.glass.pane_lines import (
+    MOST_TURNED,
+    THICK,
+    join_lines,
+    sample,
+    turn_into_walls,
+    without_covered,
+)
+
+FRAME = GridFrame(resolution=0.05, origin_x=-4.0, origin_y=-4.0, rows=160, cols=160)
+
+
+def walls(heading: float, gap: float) -> OccupancyGrid:
+    """A wall through the middle, a cell thick, open by ``gap`` [m] to either side of it."""
+    cells = np.full(FRAME.shape, FREE, dtype=np.int8)
+    away = np.arange(gap, 3.5, 0.01)
+    points = np.concatenate((away, -away))[:, None] * np.array([math.cos(heading), math.sin(heading)])
+    rows, cols = FRAME.to_cells(points).T
+    cells[rows, cols] = OCCUPIED
+    return OccupancyGrid(FRAME, cells)
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(-1.0, 1.0), st.floats(0.075, 0.6))
+def test_a_pane_is_turned_into_the_line_of_the_walls_beside_it(heading: float, share: float, half: float) -> None:
+    # By as much as places a cell thick leave open, or normals do.
+    skew = share * 0.9 * min(math.atan2(0.05, half), MOST_TURNED)
+    ends = np.outer([-half, half], [math.cos(heading + skew), math.sin(heading + skew)])
+    found = turn_into_walls(ends, walls(heading, half + 0.05), reach=1.5)
+    along = found[1] - found[0]
+    off = math.atan2(along[1], along[0]) - heading
+    # A cell at the far end.
+    assert abs((off + math.pi / 2) % math.pi - math.pi / 2) <= 0.05 / (half + 1.5) + 1e-9
+    assert np.allclose(found.mean(axis=0), 0.0)
+    assert math.isclose(math.dist(*found), 2.0 * half)
+    assert np.hypot(*(found - ends).T).max() <= 0.1
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(0.075, 0.6))
+def test_a_pane_with_no_wall_in_reach_stays_as_it_was_hit(heading: float, half: float) -> None:
+    ends = np.outer([-half, half], [math.cos(heading), math.sin(heading)])
+    assert np.allclose(turn_into_walls(ends, walls(heading, half + 2.2), reach=2.0), ends)
 
 
 @given(seed=st.integers(0, 10_000), count=st.integers(0, 8))
@@ -40,3 +83,40 @@ def test_places_along_panes_are_near_each_other_and_reach_both_ends(ends: list[t
         assert (np.hypot(*np.diff(places, axis=0).T) <= step + 1e-9).all()
     places = sample(np.array(ends).reshape(-1, 2, 2), step)
     assert len(places) == sum(len(sample(np.array(end).reshape(1, 2, 2), step)) for end in ends)
+
+
+@given(
+    st.floats(-math.pi, math.pi),
+    st.tuples(st.floats(0.15, 1.5), st.floats(0.1, 0.6), st.floats(0.15, 1.5)),
+    st.floats(-0.25, 0.25),
+    st.booleans(),
+    st.permutations([0, 1]),
+)
+def test_panes_in_line_are_one_where_a_wall_between_them_parts_it(
+    heading: float, lengths: tuple[float, float, float], aside: float, wall: bool, order: list[int]
+) -> None:
+    first, gap, second = lengths
+    turn = np.array([[math.cos(heading), math.sin(heading)], [-math.sin(heading), math.cos(heading)]])
+    cells = np.full(FRAME.shape, FREE, dtype=np.int8)
+    if wall:
+        # It ends just behind the pane.
+        rows, cols = FRAME.to_cells(np.column_stack((np.zeros(100), np.linspace(0.04, 1.5, 100))) @ turn).T
+        cells[rows, cols] = OCCUPIED
+    grid = OccupancyGrid(FRAME, cells)
+    one = np.array([[-first - gap / 2, 0.0], [-gap / 2, 0.0]]) @ turn
+    other = np.array([[gap / 2, aside], [gap / 2 + second, aside]]) @ turn
+    found = join_lines([[one, other][k] for k in order], grid)
+    # Clearly in line: they lie so far from the line through their middles at most.
+    if wall and gap < 0.5 and abs(aside) < 0.05:
+        assert len(found) == 1
+        ends = sorted(found[0].tolist(), key=lambda end: float(np.dot(turn[0], end)))
+        assert np.allclose(ends, [one[0], other[1]])
+    elif not wall or gap > 0.5:
+        assert len(found) == 2
+
+
+def test_panes_side_by_side_and_across_stay_two() -> None:
+    grid = OccupancyGrid(FRAME, np.full(FRAME.shape, OCCUPIED, dtype=np.int8))
+    line = np.array([[0.0, 0.0], [1.0, 0.0]])
+    for other in ([[0.0, 0.3], [1.0, 0.3]], [[1.3, -0.5], [1.3, 0.5]], [[1.2, 0.3], [2.2, 0.3]]):
+        assert len(join_lines([line, np.array(other)], grid)) == 2

@@ -136,6 +136,22 @@ def test_a_pane_that_was_seen_from_the_front_in_part_goes_on_to_the_wall() -> No
     assert occupied_share(grid, map_T_world, PANE) > 0.95
 
 
+def test_the_last_look_may_come_before_the_end_and_moves_no_pose() -> None:
+    drive = GlassWorld(HALL).drive([(7.0, 3.0), (3.4, 3.0), (3.4, 5.2), (3.4, 3.0)], noise=0.01, beams=720)
+    mapper = Mapper()
+    for scan, odometry in zip(drive.scans, drive.odometry, strict=True):
+        mapper.process(scan, Pose2(*odometry))
+    pose = mapper.pose
+    mapper.look_for_glass()
+    assert known_share(mapper.grid(), Pose2(7.0, 3.0, math.pi).inverse(), ROOM_BEHIND) < 0.01
+    assert len(mapper.panes) == 1
+    assert mapper.pose == pose
+    found = mapper.panes
+    mapper.look_for_glass()
+    mapper.grid()
+    assert np.array_equal(mapper.panes, found)
+
+
 @pytest.mark.parametrize("short", [False, True])
 def test_a_pane_that_was_found_when_all_was_seen_stays_as_it_is_while_the_robot_goes_on(short: bool) -> None:
     # Of the long one only the left end was met.
@@ -173,6 +189,24 @@ def test_a_pane_before_which_a_robot_turned_for_long_is_one() -> None:
     grid, map_T_world = mapped(GlassWorld(HALL), [(1.0, 3.0), (4.0, 3.0), *turns])
     assert known_share(grid, map_T_world, ROOM_BEHIND) < 0.01
     assert occupied_share(grid, map_T_world, PANE) > 0.95
+
+
+@pytest.mark.parametrize("start", [(2.4, 4.4), (3.2, 4.6)])
+def test_a_pane_that_nearly_all_scans_met_is_one(start: tuple[float, float]) -> None:
+    # The robot drives to and fro in front of it: next to no scan goes through.
+    pane, turns = (3.5, 6.0, 4.5, 6.0), [(4.0, 5.4), (4.0, 4.4)] * 4
+    grid, map_T_world = mapped(GlassWorld(walls_beside(pane), pane), [start, (4.0, start[1]), *turns])
+    assert known_share(grid, map_T_world, ROOM_BEHIND) < 0.01
+    assert occupied_share(grid, map_T_world, pane) > 0.95
+
+
+def test_a_pane_of_which_half_a_metre_is_in_view_beside_something_is_one() -> None:
+    # An open door's leaf hides the rest of it, and the wall beyond.
+    pane, leaf = (3.0, 6.0, 4.5, 6.0), (3.5, 5.7, 4.6, 5.7)
+    route = [(1.0, 3.0), (1.0, 4.9), (3.2, 5.2), (3.2, 3.0), (5.0, 3.0)]
+    grid, map_T_world = mapped(GlassWorld([*walls_beside(pane), leaf], pane), route)
+    assert known_share(grid, map_T_world, ROOM_BEHIND) < 0.05
+    assert occupied_share(grid, map_T_world, (3.0, 6.0, 3.5, 6.0)) > 0.95
 
 
 def test_a_pane_is_found_from_close_by() -> None:

@@ -13,7 +13,6 @@ from closedrooms.predictor.confidence.room_features import NAMES, measure_rooms
 from closedrooms.predictor.confidence.shape_variants import FACTORS, SAME, RoomVariants
 from closedrooms.predictor.config import FacesConfig
 from closedrooms.predictor.inpainting import withdraw_unsure
-from closedrooms.predictor.learned.ratings import WORDS
 from closedrooms.predictor.methods import METHODS, Method, predict
 from closedrooms.predictor.prediction import free_probability
 
@@ -95,7 +94,7 @@ def test_shipped_numbers_fit_what_is_measured():
     calibrations = read_calibrations()
     assert {"paper", "best", "learned"} <= set(calibrations) <= set(METHODS)
     for method, numbers in calibrations.items():
-        evidence = {"best": 4 + len(FEATURES), "learned": 1 + len(WORDS) + 1}.get(method, 0)
+        evidence = {"best": 4 + len(FEATURES), "learned": 2}.get(method, 0)
         assert numbers.mean.shape == numbers.weights.shape == (len(NAMES) + evidence,)
         for curve in (numbers.confidence, numbers.cells, numbers.nearest):
             assert (np.diff(curve.x) >= 0).all()
@@ -156,6 +155,11 @@ def test_variants_are_the_room_itself_and_longer_and_wider_ones(scene):
     assert areas[deeper] == pytest.approx(2 * room.polygon.area, rel=0.15)
     assert variants.inward == pytest.approx([0.0, -1.0], abs=0.05)
     assert variants.overlaps_with(room.polygon).argmax() == SAME
+    # By the root of the probabilities: 1e-5 then weighs a 300th, and half of that is gained.
+    for seldom, others in ((1e-5, 1), (1e-7, 0)):
+        weights = np.zeros(len(FACTORS))
+        weights[SAME], weights[deeper] = 1.0 - seldom, seldom
+        assert len(variants.believe(weights).alternatives) == others
 
 
 def test_confidence_and_probabilities_are_told_to_six_digits(scene):
@@ -164,8 +168,10 @@ def test_confidence_and_probabilities_are_told_to_six_digits(scene):
     numbers = replace(
         usual, weights=np.zeros_like(usual.weights), intercept=0.12345678, confidence=straight, nearest=straight
     )
-    judged = judge("best", scene.grid, scene.doors, prediction, numbers)
+    # Where nothing tells whether doors lead outside, the IoU of rooms is all that counts.
+    judged = judge("best", scene.grid, scene.doors, replace(prediction, facing=()), numbers)
     assert {room.confidence for room in judged.rooms} == {0.123457}
+    assert {room.outside for room in judged.rooms} == {None}
     for room, belief in zip(judged.rooms, prediction.beliefs, strict=True):
         told = [other.probability for other in room.alternatives]
         assert told == [round(other.probability, 6) for other in belief.alternatives]

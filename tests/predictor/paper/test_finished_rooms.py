@@ -8,6 +8,7 @@ import shapely
 from shapely.geometry import box
 
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
+from closedrooms.predictor import absurd_rooms
 from closedrooms.predictor.config import PaperConfig
 from closedrooms.predictor.disjoint_rooms import NO_ROOM
 from closedrooms.predictor.paper.expansion import Growth
@@ -88,7 +89,9 @@ def test_border_rooms_take_what_others_leave_the_shallowest_first(faces):
     assert _differs(rooms[1], 4, 6, 8, 10) < 1e-6
 
 
-def test_a_border_room_that_another_room_fills_has_none_and_says_so(faces):
+def test_a_border_room_that_another_room_fills_has_none_and_says_so(faces, monkeypatch):
+    # The other one fills half of a map that shows no floor.
+    monkeypatch.setattr(absurd_rooms, "HALL", 400.0)
     start, growth = _start(faces, [A, ("p", (2.0, 10.0), (2.0, 5.0))])
     growth.owner[
         [i for i, face in enumerate(start.arrangement.faces) if face.centroid.y > 6.0 and face.centroid.x > 0]
@@ -132,3 +135,13 @@ def test_a_trace_draws_lines_from_side_to_side_and_those_with_a_span_from_line_t
     assert (trace.segments is start.structure.segments, trace.clusters is start.structure.clusters) == (True, True)
     assert [level.k for level in trace.levels] == [0]
     assert unite(growth, 0).equals(shapely.union_all([start.arrangement.faces[f] for f in growth.layout(0)]))
+
+
+def test_a_layout_narrower_than_a_door_is_no_room_and_takes_nothing_from_others(faces):
+    start, growth = _start(
+        faces, [("a", (2.0, 0.2), (2.0, -1.0)), ("b", (-2.0, 0.2), (-2.0, -1.0))], slanted=[Line(0.0, 0.5)]
+    )
+    growth.owner[faces.at(start.arrangement, -2.0, 1.0)] = 1
+    rooms, failures = finish_rooms(start, growth, BARE)
+    assert [room.doors for room in rooms] == [("b",)]
+    assert failures == {"a": "its room would be less than 0.6 m wide"}

@@ -19,8 +19,8 @@ from closedrooms.experiments.dataset.layout import (
 )
 from closedrooms.experiments.dataset.sample import Task, TaskResult
 from closedrooms.experiments.dataset.shard import DATA, PARTS, Shard, read_shard
+from closedrooms.experiments.dataset.shard_jobs import Filling, Part, work
 from closedrooms.experiments.dataset.shard_plan import ShardPlan
-from closedrooms.experiments.dataset.shards import Filling, Part, work
 from closedrooms.experiments.dataset.survey_store import survey_folder, survey_name
 from closedrooms.experiments.dataset.variants import (
     SPLITS,

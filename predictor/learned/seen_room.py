@@ -1,4 +1,4 @@
-"""What the network says of a room: how far it reaches to either side of its door and back, and which cells it fills."""
+"""What the network says of a room: which cells it fills."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,12 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from closedrooms.core.arrays import FloatArray
-from closedrooms.predictor.learned.patches import AHEAD, ASIDE, BEHIND, CELL, SIZE, Patch
-
-# The network tells columns and rows in groups of so many.
-PARTS = 4
-# Distances that are told apart, from the door to either side and back: one a cell.
-ASIDE_CELLS, AHEAD_CELLS, DOOR_ROW = round(ASIDE / CELL), round(AHEAD / CELL), round(BEHIND / CELL)
+from closedrooms.predictor.learned.patches import CELL, SIZE, Patch
 
 
 @dataclass(frozen=True, slots=False, eq=False)
@@ -19,16 +14,10 @@ class SeenRoom:
     """Room of one door as the network sees it.
 
     Attributes:
-        left: Logarithm of the probability that it reaches so far to the left, by cell, shape (ASIDE_CELLS,).
-        right: The same to the right.
-        back: The same from the door to the back, shape (AHEAD_CELLS,).
         mask: Probability of every cell of the patch to be in the room, shape (SIZE, SIZE).
         unknown: Share of each cell that the map does not know, shape (SIZE, SIZE).
     """
 
-    left: FloatArray
-    right: FloatArray
-    back: FloatArray
     mask: FloatArray
     unknown: FloatArray
 
@@ -39,13 +28,15 @@ class SeenRoom:
         tables[:, 1:, 1:] = np.stack((self.mask * self.unknown, self.unknown)).cumsum(axis=1).cumsum(axis=2)
         return tables
 
-    def rate_sides(self, boxes: FloatArray) -> FloatArray:
-        """Rate the sides of rectangles ``u0, v0, u1, v1`` [m of the patch], (n, 4): log probability, shape (n,)."""
-        sides = ((self.left, ASIDE - boxes[:, 0]), (self.right, boxes[:, 2] - ASIDE), (self.back, boxes[:, 3] - BEHIND))
-        return np.asarray(sum(np.interp(at / CELL - 0.5, np.arange(len(logs)), logs) for logs, at in sides))
+    def rate(self, boxes: FloatArray) -> FloatArray:
+        """Measure how the unknown part of rectangles overlaps with the mask (IoU).
 
-    def rate_cells(self, boxes: FloatArray) -> FloatArray:
-        """Rate the unknown part of rectangles (n, 4) by its overlap (IoU) with the mask, shape (n,)."""
+        Args:
+            boxes: Of the patch ``u0, v0, u1, v1`` [m], shape (n, 4).
+
+        Returns:
+            Shape (n,).
+        """
         shared, area = self._sum_in(boxes)
         return np.asarray(shared / np.maximum(area + self.sums[0, -1, -1] - shared, 1e-6))
 
@@ -64,24 +55,13 @@ class SeenRoom:
         return np.asarray(low * (1 - a) + high * a)
 
 
-def read_room(patch: Patch, mask: FloatArray, columns: FloatArray, rows: FloatArray) -> SeenRoom:
+def read_room(patch: Patch, mask: FloatArray) -> SeenRoom:
     """Make probabilities of what the network answers.
 
     Args:
         patch: What it was shown.
         mask: Logits of the cells, shape (SIZE, SIZE).
-        columns: Logits of the columns, shape (SIZE,).
-        rows: Logits of the rows, shape (SIZE,).
     """
     return SeenRoom(
-        left=_log_softmax(columns[:ASIDE_CELLS][::-1]),
-        right=_log_softmax(columns[ASIDE_CELLS:]),
-        back=_log_softmax(rows[DOOR_ROW:]),
-        mask=1.0 / (1.0 + np.exp(-np.clip(mask, -30.0, 30.0))),
-        unknown=patch.channels[2].astype(np.float64),
+        mask=1.0 / (1.0 + np.exp(-np.clip(mask, -30.0, 30.0))), unknown=patch.channels[2].astype(np.float64)
     )
-
-
-def _log_softmax(logits: FloatArray) -> FloatArray:
-    shifted = logits.astype(np.float64) - float(logits.max())
-    return np.asarray(shifted - np.log(np.exp(shifted).sum()))
