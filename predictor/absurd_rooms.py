@@ -1,4 +1,4 @@
-"""Predicted rooms that no building has: narrower than a door, endless strips, larger than all that the map shows."""
+"""Rooms of ``paper`` that no building has: narrower than a door, endless strips, larger than all that the map shows."""
 
 from collections.abc import Sequence
 
@@ -11,9 +11,9 @@ from closedrooms.core.shapes import Shape
 
 # A door's leaf passes no narrower place [m].
 NARROWEST = 0.6
-# Of 3,154 true rooms of ``fit`` and ``choose`` two are longer than this [m] and more than so many times as long as
-# wide, and one is narrower than the last. Of 18 such rooms that ``paper`` predicted there none had an IoU above 0.26.
-LONGEST, STRIP, NARROW_STRIP = 15.0, 4.0, 8.0
+# No room is longer than this (as of ``best``) [m] and so many times as long as wide: of 3,154 true rooms of ``fit`` and
+# ``choose`` none. Shorter strips are found in buildings.
+LONGEST, STRIP = 24.0, 4.0
 # A hall may be larger than all that was explored so far, up to this [m2].
 HALL = 100.0
 
@@ -42,7 +42,7 @@ def _find_flaw(shape: Shape, floor: float) -> str | None:
         return f"its room would be less than {NARROWEST:g} m wide"
     corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(shape))
     width, length = sorted(float(np.hypot(*side)) for side in np.diff(corners[:3], axis=0))
-    if length > (STRIP if length > LONGEST else NARROW_STRIP) * width:
+    if length > LONGEST and length > STRIP * width:
         return f"its room would be a strip of {length:.0f} x {width:.1f} m"
     if shape.area > max(floor, HALL):
         return f"its room of {shape.area:.0f} m2 would be larger than all floor of the map"

@@ -44,6 +44,7 @@ class Method:
         function: The predictor, or ``module:name`` of it, imported when it is first used.
         disjoint: Rooms of one prediction never overlap, so that a tour can be planned on the completed map (the
             baselines predict each room for itself; paper, section 5.2).
+        leaves_outside: It gives no room behind a door that leads outside; what reproduces the paper does.
         shares_faces: The function takes ``started=`` from ``paper.initial_layouts.find_initial_faces``, which several
             methods can share.
     """
@@ -54,6 +55,7 @@ class Method:
     function: Predictor | str
     disjoint: bool = True
     shares_faces: bool = False
+    leaves_outside: bool = True
 
     @property
     def resolved_function(self) -> Any:
@@ -65,9 +67,10 @@ class Method:
 
     def run(self, grid: "OccupancyGrid", doors: "Sequence[ClosedDoor]", config: Any, **shared: Any) -> "Prediction":
         """Predict, and say how sure every room and cell is, whatever the function itself says of that."""
-        from closedrooms.predictor.confidence.judge import judge
+        from closedrooms.predictor.confidence.judge import judge, leave_outside
 
-        return judge(self.name, grid, doors, self.resolved_function(grid, doors, config, **shared))
+        judged = judge(self.name, grid, doors, self.resolved_function(grid, doors, config, **shared))
+        return leave_outside(judged, grid, doors) if self.leaves_outside else judged
 
     def checked(self, config: Any | None) -> Any:
         """Check settings for this method: its defaults for ``None``.
@@ -91,6 +94,7 @@ _OURS = (
         PaperConfig,
         "closedrooms.predictor.paper.method:predict_paper",
         shares_faces=True,
+        leaves_outside=False,
     ),
     Method(
         "rose",
@@ -98,6 +102,7 @@ _OURS = (
         RoseConfig,
         "closedrooms.predictor.paper.method:predict_paper",
         shares_faces=True,
+        leaves_outside=False,
     ),
     Method(
         "best",
@@ -118,6 +123,7 @@ _OURS = (
         "closedrooms.predictor.baselines:line_of_sight",
         disjoint=False,
         shares_faces=True,
+        leaves_outside=False,
     ),
     Method(
         "geometric",
@@ -126,6 +132,7 @@ _OURS = (
         "closedrooms.predictor.baselines:geometric",
         disjoint=False,
         shares_faces=True,
+        leaves_outside=False,
     ),
 )
 

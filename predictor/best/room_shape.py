@@ -11,7 +11,6 @@ from shapely.geometry import Polygon
 from closedrooms.core.arrays import BoolArray, FloatArray
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.room import Room, RoomKind
-from closedrooms.predictor.absurd_rooms import leave_absurd
 from closedrooms.predictor.best.door_frame import TurnedMap
 from closedrooms.predictor.best.resolution import RESOLUTION, in_cells
 from closedrooms.predictor.best.scene import Scene
@@ -60,13 +59,12 @@ def trace_rooms(
         others = [other.corners for other in choices if other is not choice]
         kind = _name_kind(choice.corners, others, scene.grid, in_cells(scene.walls.usual))
         rooms.append(Room(shape, names, kind, round(choice.score, 9), choice.cut))
-    rooms, absurd = leave_absurd(rooms, scene.grid)
     apart, without = part_rooms(rooms, {door.door.id: door.door.midpoint for door in facing})
     for opening in openings:
         if opening is not None and opening.door.door.id in without:
             apart = _lead_into(apart, opening, scene.grid.frame.resolution)
     found = {door for room in apart for door in room.doors}
-    return apart, {door: reason for door, reason in (failures | absurd | without).items() if door not in found}
+    return apart, {door: reason for door, reason in (failures | without).items() if door not in found}
 
 
 def _lead_into(rooms: list[Room], opening: Doorway, resolution: float) -> list[Room]:

@@ -44,8 +44,8 @@ def judge(
         calibration: In place of the shipped one.
 
     Returns:
-        The prediction with ``confidence``, ``outside`` and ``alternatives`` of each room and ``probability``, without
-        the rooms behind doors that lead outside; one that has them is returned as it is.
+        The prediction with ``confidence``, ``outside`` and ``alternatives`` of each room and ``probability``; one that
+        has them is returned as it is.
     """
     if prediction.probability is not None:
         return prediction
@@ -72,8 +72,7 @@ def judge(
     percent[joint < LEAST] = 0
     percent[grid.on(frame).known] = -1
     probability = OccupancyGrid(frame, handed_over(percent))
-    judged = replace(prediction, rooms=rooms, probability=probability, beliefs=(), facing=())
-    return leave_outside(judged, grid, doors)
+    return replace(prediction, rooms=rooms, probability=probability, beliefs=(), facing=())
 
 
 def _lead_outside(room: Room, exits: Mapping[str, float]) -> float | None:

@@ -88,9 +88,9 @@ def test_what_rays_show_through_a_window_is_no_floor(mapped):
         assert seen[name] == pytest.approx(chance, rel=0.1)
 
 
-def predicted(scene, monkeypatch, **chances):
+def predicted(scene, monkeypatch, method="best", **chances):
     monkeypatch.setattr(judging, "find_outside", lambda *_: chances)
-    return predict(scene.grid, scene.doors, "best")
+    return predict(scene.grid, scene.doors, method)
 
 
 def test_a_room_is_as_sure_as_that_its_door_does_not_lead_outside(mapped, monkeypatch):
@@ -113,3 +113,12 @@ def test_behind_a_door_that_leads_outside_there_is_no_room(mapped, monkeypatch):
     inside = cells_inside(scene.hidden["t1"].buffer(-0.3), frame)
     assert prediction.grid.unknown[inside].all()
     assert prediction.grid.free[cells_inside(scene.hidden["t2"].buffer(-0.5), frame)].all()
+
+
+def test_what_reproduces_the_paper_predicts_a_room_behind_every_door(mapped, monkeypatch):
+    scene = mapped(CLOSED)
+    prediction = predicted(scene, monkeypatch, method="paper", t1=0.93)
+    (room,) = (room for room in prediction.rooms if "t1" in room.doors)
+    assert room.outside == 0.93
+    assert room.confidence < 0.07
+    assert prediction.failures == {}
