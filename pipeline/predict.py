@@ -114,6 +114,8 @@ def _rows(prediction: Prediction, least: float, seconds: float) -> list[tuple[st
     def describe(room: Room) -> str:
         sure = 0.0 if room.confidence is None else room.confidence
         told = [room.kind or "room", f"confidence {sure:.2f}" + (", not drawn" if sure < least else "")]
+        if room.outside is not None and room.outside >= DOUBTFUL:
+            told.append(f"or the door leads outside ({room.outside:.2f})")
         return ", ".join([*told, *(["search was cut"] if room.bounded else [])])
 
     return [

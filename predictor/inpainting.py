@@ -134,20 +134,6 @@ def withdraw_unsure(
         least: Confidence of the rooms that stay drawn.
     """
     unsure = [room for room in prediction.rooms if room.confidence is not None and room.confidence < least]
-    return undraw(prediction, grid, doors, unsure)
-
-
-def undraw(
-    prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedDoor], unsure: Sequence[Room]
-) -> Prediction:
-    """Take some rooms of a prediction out of its completed map again; as rooms they stay.
-
-    Args:
-        prediction: Of the map.
-        grid: The map.
-        doors: Closed doors of the map.
-        unsure: Rooms of the prediction.
-    """
     if not unsure:
         return prediction
     sure = [room for room in prediction.rooms if room not in unsure]

@@ -44,7 +44,6 @@ class Method:
         function: The predictor, or ``module:name`` of it, imported when it is first used.
         disjoint: Rooms of one prediction never overlap, so that a tour can be planned on the completed map (the
             baselines predict each room for itself; paper, section 5.2).
-        leaves_outside: It gives no room behind a door that leads outside; what reproduces the paper does.
         shares_faces: The function takes ``started=`` from ``paper.initial_layouts.find_initial_faces``, which several
             methods can share.
     """
@@ -55,7 +54,6 @@ class Method:
     function: Predictor | str
     disjoint: bool = True
     shares_faces: bool = False
-    leaves_outside: bool = True
 
     @property
     def resolved_function(self) -> Any:
@@ -67,10 +65,9 @@ class Method:
 
     def run(self, grid: "OccupancyGrid", doors: "Sequence[ClosedDoor]", config: Any, **shared: Any) -> "Prediction":
         """Predict, and say how sure every room and cell is, whatever the function itself says of that."""
-        from closedrooms.predictor.confidence.judge import judge, leave_outside
+        from closedrooms.predictor.confidence.judge import judge
 
-        judged = judge(self.name, grid, doors, self.resolved_function(grid, doors, config, **shared))
-        return leave_outside(judged, grid, doors) if self.leaves_outside else judged
+        return judge(self.name, grid, doors, self.resolved_function(grid, doors, config, **shared))
 
     def checked(self, config: Any | None) -> Any:
         """Check settings for this method: its defaults for ``None``.
@@ -94,7 +91,6 @@ _OURS = (
         PaperConfig,
         "closedrooms.predictor.paper.method:predict_paper",
         shares_faces=True,
-        leaves_outside=False,
     ),
     Method(
         "rose",
@@ -102,7 +98,6 @@ _OURS = (
         RoseConfig,
         "closedrooms.predictor.paper.method:predict_paper",
         shares_faces=True,
-        leaves_outside=False,
     ),
     Method(
         "best",
@@ -123,7 +118,6 @@ _OURS = (
         "closedrooms.predictor.baselines:line_of_sight",
         disjoint=False,
         shares_faces=True,
-        leaves_outside=False,
     ),
     Method(
         "geometric",
@@ -132,7 +126,6 @@ _OURS = (
         "closedrooms.predictor.baselines:geometric",
         disjoint=False,
         shares_faces=True,
-        leaves_outside=False,
     ),
 )
 

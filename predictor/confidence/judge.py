@@ -17,14 +17,10 @@ from closedrooms.predictor.confidence.calibration import Calibration, calibratio
 from closedrooms.predictor.confidence.outside import find_outside
 from closedrooms.predictor.confidence.room_features import measure_rooms
 from closedrooms.predictor.confidence.shape_variants import believe_variants
-from closedrooms.predictor.inpainting import undraw
 from closedrooms.predictor.prediction import Prediction
 
 # What is less probable is not drawn.
 LEAST = 0.01
-# Behind a door that leads outside with more than this there is no room to predict: so say 0.6 and 0.5 % of the doors of
-# rooms of ``choose`` (drawn maps, runs), and 20 and 25 % of exits drawn there (``benchmarks/fitting/fit_outside.py``).
-OUTSIDE = 0.4
 
 
 def judge(
@@ -83,15 +79,6 @@ def _lead_outside(room: Room, exits: Mapping[str, float]) -> float | None:
 def _thin_out(belief: Belief, outside: float) -> Belief:
     """Take from where a room may be the probability that there is none."""
     return replace(belief, spread=replace(belief.spread, share=belief.spread.share * (1.0 - outside)))
-
-
-def leave_outside(prediction: Prediction, grid: OccupancyGrid, doors: Sequence[ClosedDoor]) -> Prediction:
-    """Drop the rooms behind doors that lead outside more probably than :data:`OUTSIDE`; ``failures`` says so."""
-    gone = [room for room in prediction.rooms if room.outside is not None and room.outside > OUTSIDE]
-    reasons = {door: f"leads outside ({room.outside:.2f}), no room predicted" for room in gone for door in room.doors}
-    failures = prediction.failures | reasons
-    drawn = undraw(prediction, grid, doors, gone)
-    return replace(drawn, rooms=tuple(room for room in prediction.rooms if room not in gone), failures=failures)
 
 
 def form_beliefs(
