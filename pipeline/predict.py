@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 Beside = Callable[[Path, RosMap, Prediction], dict[str, Any]]
 """Writes more files into the folder of a prediction; what it returns joins the manifest."""
+# That a door may lead outside is said from this probability on: so say one door of a room in 200, and one exit in four.
+DOUBTFUL = 0.4
 
 
 def predict_map(
