@@ -31,7 +31,7 @@ class Room:
         kind: How it was predicted (paper, sections 3.3 and 3.6); ``None`` for a true room.
         score: Value of the evaluation function (paper, section 3.4); ``None`` where none was computed.
         bounded: A search limit cut something while the room was found.
-        confidence: Expected IoU with the true room, 0..1, 0 for one that leads outside; ``None`` where nothing tells.
+        confidence: Expected IoU with the true room if there is one, 0..1; ``None`` where nothing tells.
         alternatives: Up to three other shapes; the first few are the best choice of so many (``confidence.belief``).
         outside: Probability that its doors lead outside and there is no room, 0..1; ``None`` where nothing tells.
     """

@@ -1,6 +1,7 @@
 """A prediction with how sure it is: confidence and alternatives of every room, and the probability of every cell.
 
-That a door leads outside and there is no room is a hypothesis of its own, beside all shapes of the room.
+That a door leads outside and there is no room is a hypothesis of its own, beside all shapes of the room: confidence and
+probability hold for the case that there is one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -49,21 +50,19 @@ def judge(
     beliefs = form_beliefs(grid, doors, prediction, numbers)
     features = measure_rooms(grid, prediction.rooms, beliefs)
     exits = find_outside(grid, prediction.facing)
-    outside = [_lead_outside(room, exits) for room in prediction.rooms]
     rooms = tuple(
         replace(
             room,
-            confidence=round(numbers.expect_iou(measured) * (1.0 - (chance or 0.0)), 6),
+            confidence=round(numbers.expect_iou(measured), 6),
             alternatives=tuple(
                 replace(other, probability=round(float(numbers.nearest.at(other.probability)), 6))
                 for other in belief.alternatives
             ),
-            outside=chance,
+            outside=_lead_outside(room, exits),
         )
-        for room, belief, measured, chance in zip(prediction.rooms, beliefs, features, outside, strict=True)
+        for room, belief, measured in zip(prediction.rooms, beliefs, features, strict=True)
     )
-    inside = [_thin_out(belief, chance or 0.0) for belief, chance in zip(beliefs, outside, strict=True)]
-    frame, joint = join_spreads(prediction.grid.frame, inside)
+    frame, joint = join_spreads(prediction.grid.frame, beliefs)
     percent = np.rint(100.0 * numbers.cells.at(joint)).astype(np.int8)
     percent[joint < LEAST] = 0
     percent[grid.on(frame).known] = -1
@@ -74,11 +73,6 @@ def judge(
 def _lead_outside(room: Room, exits: Mapping[str, float]) -> float | None:
     """Find how probable it is that a room is none: all of its doors lead outside."""
     return min((exits[door] for door in room.doors if door in exits), default=None)
-
-
-def _thin_out(belief: Belief, outside: float) -> Belief:
-    """Take from where a room may be the probability that there is none."""
-    return replace(belief, spread=replace(belief.spread, share=belief.spread.share * (1.0 - outside)))
 
 
 def form_beliefs(

@@ -168,10 +168,8 @@ def test_confidence_and_probabilities_are_told_to_six_digits(scene):
     numbers = replace(
         usual, weights=np.zeros_like(usual.weights), intercept=0.12345678, confidence=straight, nearest=straight
     )
-    # Where nothing tells whether doors lead outside, the IoU of rooms is all that counts.
-    judged = judge("best", scene.grid, scene.doors, replace(prediction, facing=()), numbers)
+    judged = judge("best", scene.grid, scene.doors, prediction, numbers)
     assert {room.confidence for room in judged.rooms} == {0.123457}
-    assert {room.outside for room in judged.rooms} == {None}
     for room, belief in zip(judged.rooms, prediction.beliefs, strict=True):
         told = [other.probability for other in room.alternatives]
         assert told == [round(other.probability, 6) for other in belief.alternatives]
