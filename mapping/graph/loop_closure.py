@@ -93,16 +93,18 @@ def find_loop(
     rival = searched.best(away_from=(found.pose, RIVAL_DISTANCE, apart_angle), floor=loops.max_rival * found.score)
     if rival.score > loops.max_rival * found.score:
         return None
-    if foreign[older.index] and _contradicts(keyframes, foreign, match.pose, config):
+    others = foreign if foreign[older.index] else inconsistent & ~foreign
+    elsewhere = foreign[older.index] or match.pose.distance(latest.pose) > RIVAL_DISTANCE
+    if elsewhere and _contradicts(keyframes, others, match.pose, config):
         return None
     return Loop(older.index, latest.index, older.pose.inverse() @ match.pose, match.score, match.hessian)
 
 
-def _contradicts(keyframes: Sequence[Keyframe], foreign: BoolArray, pose: Pose2, config: MapperConfig) -> bool:
-    """Check if the recent keyframes, moved as a whole so the latest is at ``pose``, contradict the older submap."""
+def _contradicts(keyframes: Sequence[Keyframe], others: BoolArray, pose: Pose2, config: MapperConfig) -> bool:
+    """Check if the recent keyframes, moved as a whole so the latest is at ``pose``, contradict the others."""
     latest = keyframes[-1]
     correction = pose @ latest.pose.inverse()
-    older = [keyframes[i] for i in np.flatnonzero(foreign).tolist()]
+    older = [keyframes[i] for i in np.flatnonzero(others).tolist()]
     places = np.array([(k.pose.x, k.pose.y, k.pose.theta) for k in older])
     conflicts = []
     for keyframe in _recent(keyframes, config.loops.recent_distance):

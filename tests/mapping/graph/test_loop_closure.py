@@ -134,3 +134,23 @@ def test_a_submap_is_sought_in_the_older_one_at_any_heading(office: Any) -> None
     assert math.remainder(loop.a_T_b.theta - true.theta, math.tau) == pytest.approx(0.0, abs=0.02)
     # In one map nobody turns as far.
     assert found(visit(office, off=off)) is None
+
+
+@pytest.mark.parametrize(("off", "built", "recognised"), [(0.5, True, True), (1.3, True, False), (1.3, False, True)])
+def test_what_leads_far_away_must_not_contradict_what_was_seen_there(
+    segment_world: Any, off: float, built: bool, recognised: bool
+) -> None:
+    room = [
+        (0.0, 0.0, 8.0, 0.0),
+        (8.0, 0.0, 8.0, 6.0),
+        (8.0, 6.0, 0.0, 6.0),
+        (0.0, 6.0, 0.0, 2.0),
+        (0.0, 1.0, 0.0, 0.0),
+        (6.0, 6.0, 6.0, 5.0),
+    ]
+    # Where the robot saw the floor there stands a wall later, or it is another room that looks much the same.
+    before, later = segment_world(room), segment_world([*room, (2.6, 2.0, 5.0, 2.0)] if built else room)
+    frames = [seen(before, Pose2(x, 3.0), Pose2(x, 3.0), n, 0.8 * n) for n, x in enumerate((2.6, 3.4, 4.2))]
+    for n, x in enumerate((2.8, 3.6)):
+        frames.append(seen(later, Pose2(x, 3.0), Pose2(x + off, 3.1), len(frames), 61.6 + 0.8 * n))
+    assert (found(frames) is not None) == recognised
