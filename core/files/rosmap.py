@@ -206,7 +206,7 @@ def _looks_inverted(grid: OccupancyGrid) -> bool:
     """Check whether a map shows free walls around occupied rooms."""
     import cv2
 
-    if int(grid.occupied.sum()) <= int(grid.free.sum()):
+    if np.count_nonzero(grid.occupied) <= np.count_nonzero(grid.free):
         return False
     around = 2 * max(round(HALF_WALL / grid.frame.resolution), 1) + 1
     inside = np.ones((around, around), dtype=np.uint8)

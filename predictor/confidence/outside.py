@@ -77,8 +77,11 @@ def find_floor(grid: OccupancyGrid) -> KnownFloor:
     share = cv2.warpAffine(smooth, scale, (cols, rows), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
     kernel = np.ones((round(NARROWEST / CELL),) * 2, np.uint8)
     free = cv2.morphologyEx((share > 0.5).view(np.uint8), cv2.MORPH_OPEN, kernel) > 0
-    points = frame.to_points(np.argwhere(free))
-    return KnownFloor(frame, free, points, shapely.MultiPoint(points).convex_hull)
+    # The outermost cells of each row are enough for the hull.
+    held = np.flatnonzero(free.any(axis=1))
+    ends = np.concatenate((free[held].argmax(axis=1), cols - 1 - free[held, ::-1].argmax(axis=1)))
+    outermost = frame.to_points(np.column_stack((np.tile(held, 2), ends)))
+    return KnownFloor(frame, free, frame.to_points(np.argwhere(free)), shapely.MultiPoint(outermost).convex_hull)
 
 
 class DoorView:
@@ -218,10 +221,7 @@ FEATURES: tuple[Callable[[DoorView], float], ...] = (
 def measure_doors(grid: OccupancyGrid, facing: Sequence[FacingDoor]) -> FloatArray:
     """Measure what a map shows around its doors: a row a door, a column for each of :data:`FEATURES`."""
     floor = find_floor(grid)
-    views = (
-        DoorView(floor, door, [other for other in facing if other is not door and other.door.id != door.door.id])
-        for door in facing
-    )
+    views = (DoorView(floor, door, [other for other in facing if other.door.id != door.door.id]) for door in facing)
     return np.array([[feature(view) for feature in FEATURES] for view in views]).reshape(-1, len(FEATURES))
 
 
