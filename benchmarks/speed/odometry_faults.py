@@ -125,7 +125,8 @@ def rows_of(
             errors, seconds = [], 0.0
             drawn = 1 if kind in ("good", "none") else seeds
             for seed in range(drawn):
-                failing = dataclasses.replace(run, odometry=with_faults(run.odometry, kind, share, seed))
+                odometry = with_faults(run.odometry, kind, share, seed)
+                failing = dataclasses.replace(run, odometry=odometry, has_odometry=kind != "none")
                 start = time.process_time()
                 try:
                     poses = method(failing)

@@ -407,15 +407,16 @@ def test_real_robots_are_mapped_within_the_required_error(name: str, limit: floa
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "limit"), [("freiburg-079", 0.15), ("aces", 0.3)])
-def test_real_robots_are_mapped_without_their_odometry(name: str, limit: float) -> None:
+@pytest.mark.parametrize(("name", "limit", "halls"), [("freiburg-079", 0.15, False), ("aces", 0.3, True)])
+def test_real_robots_are_mapped_without_their_odometry(name: str, limit: float, halls: bool) -> None:
+    """Plain corridors, up to ten metres of them between two scans that hold, are told; nothing else is lost."""
     path = SHARED / f"{name}-corrected.log.gz"
     if not path.exists():
         pytest.skip(f"{path} is not there")
     run = read_run(path)
     result = build_map(replace(run, odometry=np.zeros_like(run.odometry), has_odometry=False))
     assert result.errors["final"][0] < limit
-    assert not any(remark.loss for remark in result.remarks)
+    assert ["along a hall" in remark.why for remark in result.remarks if remark.loss] == [True] * halls
 
 
 @pytest.mark.parametrize(("clock", "stamp"), [(7.5, 7.5), (0, 9.25)])
