@@ -7,6 +7,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from closedrooms.core.arrays import BoolArray, CellArray, FloatArray, IntArray, Mask
 from closedrooms.core.grid import UNKNOWN, OccupancyGrid
@@ -25,9 +26,13 @@ gone: the place of somebody who was seen from ten keyframes, and from four not, 
 NOISE = 0.10
 """Distance around a cell in which these are counted [m]."""
 SAME_WALL = 0.20
-"""A scan that met something this near to a place [m] did not go through what was seen there from the other side: of a
-wall that was seen from both, each with a pose of its own error, the faces lie behind each other, and either scan ends
-at the other."""
+"""Within this distance of where its crossed space ends [m] a scan did not go through what was seen: of a wall that was
+seen from both sides, each with a pose of its own error, the faces lie behind each other, and either scan ends at the
+other; and who looks along a wall past a face that lies a little too far out sees it in few places only."""
+SAME_SIDE = 0.5
+"""Product of the mean directions from which a place was hit, and was missed by scans that end nearby, from which on
+both saw it from the same side: of a wall whose two faces fell on one cell both directions are mixed, and short."""
+Counts = NDArray[np.float32]
 LatticeWindow = tuple[int, int, int, int]
 """First row and column in the arrays, and number of rows and columns."""
 
@@ -65,16 +70,18 @@ class EvidenceGrid:
         self._config = config
         self._lattice = Lattice(config.resolution)
         self._noise = math.ceil(NOISE / config.resolution)
-        span = 2 * math.ceil(SAME_WALL / config.resolution) + 1
-        self._same_wall = np.ones((span, span), dtype=np.uint8)
+        same_wall = math.ceil(SAME_WALL / config.resolution)
+        self._same_wall = np.ones((2 * same_wall + 1, 2 * same_wall + 1), dtype=np.uint8)
+        # How far around it counts matter to how a cell is drawn.
+        self._reach = self._noise + same_wall
         shape = self._lattice.frame.shape
         self._hits = np.zeros(shape, dtype=np.int32)
         # Whole numbers, exact up to 2^24: OpenCV adds a mask to floats five times as quickly as to integers.
         self._misses = np.zeros(shape, dtype=np.float32)
-        # Of the misses, those of scans that met something nearby.
+        # Of the misses, those of scans whose crossed space ends nearby.
         self._beside = np.zeros(shape, dtype=np.int16)
-        # Sums of the directions (rows, columns) from which each cell was hit, and missed by scans that met something
-        # nearby, to eighths of a turn.
+        # Sums of the directions (rows, columns) from which each cell was hit, and missed by scans that end nearby, to
+        # eighths of a turn.
         self._hit_from = [np.zeros(shape, dtype=np.int16) for _ in range(2)]
         self._beside_from = [np.zeros(shape, dtype=np.int16) for _ in range(2)]
         self._cells: CellArray = np.full(shape, UNKNOWN, dtype=np.int8)
@@ -152,10 +159,7 @@ class EvidenceGrid:
         hit = np.divmod(flat, window[3])
         self._hits[rows, cols][hit] += sign
         _count_sides(self._hit_from, (rows, cols), hit, viewpoint, sign)
-        met = np.zeros_like(mask)
-        met.ravel()[flat] = 1
-        near = cv2.bitwise_and(mask, cv2.dilate(met, self._same_wall))
-        beside = np.divmod(np.flatnonzero(near), window[3])
+        beside = np.divmod(np.flatnonzero(mask - cv2.erode(mask, self._same_wall)), window[3])
         self._beside[rows, cols][beside] += sign
         _count_sides(self._beside_from, (rows, cols), beside, viewpoint, sign)
         if sign > 0:
@@ -197,7 +201,7 @@ class EvidenceGrid:
             return self._grid
         if self._dirty is not None:
             # What is drawn of a cell depends on those around it.
-            window = self._wider(self._dirty, self._noise)
+            window = self._wider(self._dirty, self._reach)
             rows, cols = _slices(window)
             hits, misses = self._hits[rows, cols], self._misses[rows, cols]
             most_hits, most_misses = self._percent.shape
@@ -267,20 +271,31 @@ class EvidenceGrid:
         The noise of a wall was gone through, too, often, but the wall beside it was not: what counts are the hits
         around a cell, and how many of them were gone through as often.
         """
-        around = self._wider(window, self._noise)
+        around = self._wider(window, self._reach)
         cells = _slices(around)
-        hits = self._hits[cells].astype(np.float32)
+        hits, misses = self._hits[cells].astype(np.float32), self._misses[cells]
+        beside = self._beside[cells]
         # Who ended just behind what was seen from the same side went through its place.
         (hit_row, hit_col), (row, col) = (
             [sums[cells] for sums in both] for both in (self._hit_from, self._beside_from)
         )
-        same_side = np.multiply(hit_row, row, dtype=np.int32) + np.multiply(hit_col, col, dtype=np.int32) > 0
-        through = self._misses[cells] - np.where(same_side, np.int16(0), self._beside[cells])
+        alike = np.multiply(hit_row, row, dtype=np.int32) + np.multiply(hit_col, col, dtype=np.int32)
+        same_side = alike > SAME_SIDE * (hits * beside)
+        faded = self._crossed_again(hits, misses - np.where(same_side, np.int16(0), beside))
+        # That leaves standing what they ended at: two faces seen along their wall from one end take each other away.
+        config = self._config
+        stands = ~faded & (hits * np.float32(config.log_odds_hit) > misses * np.float32(config.log_odds_miss))
+        faded &= cv2.dilate(stands.astype(np.uint8), self._same_wall) > 0
+        faded |= self._crossed_again(hits, misses - beside)
+        return faded[window[0] - around[0] :, window[1] - around[1] :][: window[2], : window[3]]
+
+    def _crossed_again(self, hits: Counts, through: Counts) -> BoolArray:
+        """Mark the cells around which enough of the hits were gone through afterwards, of counts of both."""
         span = (2 * self._noise + 1, 2 * self._noise + 1)
         most = cv2.dilate(np.where(hits > 0.0, through, np.float32(0.0)), np.ones(span, dtype=np.uint8))
         again = cv2.boxFilter(np.minimum(hits, through), -1, span, normalize=False)
-        faded: BoolArray = (most >= GONE) & (again >= GONE_SHARE * cv2.boxFilter(hits, -1, span, normalize=False))
-        return faded[window[0] - around[0] :, window[1] - around[1] :][: window[2], : window[3]]
+        crossed: BoolArray = (most >= GONE) & (again >= GONE_SHARE * cv2.boxFilter(hits, -1, span, normalize=False))
+        return crossed
 
     def _wider(self, window: LatticeWindow, reach: int) -> LatticeWindow:
         """Widen a window by ``reach`` cells to all sides, as far as the arrays go."""
