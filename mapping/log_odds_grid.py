@@ -273,29 +273,34 @@ class EvidenceGrid:
         """
         around = self._wider(window, self._reach)
         cells = _slices(around)
-        hits, misses = self._hits[cells].astype(np.float32), self._misses[cells]
-        beside = self._beside[cells]
-        # Who ended just behind what was seen from the same side went through its place.
-        (hit_row, hit_col), (row, col) = (
-            [sums[cells] for sums in both] for both in (self._hit_from, self._beside_from)
-        )
-        alike = np.multiply(hit_row, row, dtype=np.int32) + np.multiply(hit_col, col, dtype=np.int32)
-        same_side = alike > SAME_SIDE * (hits * beside)
-        faded = self._crossed_again(hits, misses - np.where(same_side, np.int16(0), beside))
-        # That leaves standing what they ended at: two faces seen along their wall from one end take each other away.
-        config = self._config
-        stands = ~faded & (hits * np.float32(config.log_odds_hit) > misses * np.float32(config.log_odds_miss))
-        faded &= cv2.dilate(stands.astype(np.uint8), self._same_wall) > 0
-        faded |= self._crossed_again(hits, misses - beside)
-        return faded[window[0] - around[0] :, window[1] - around[1] :][: window[2], : window[3]]
-
-    def _crossed_again(self, hits: Counts, through: Counts) -> BoolArray:
-        """Mark the cells around which enough of the hits were gone through afterwards, of counts of both."""
+        hits = self._hits[cells].astype(np.float32)
+        # Below, values of the few cells that were hit.
+        at = np.divmod(np.flatnonzero(hits), hits.shape[1])
+        hit, missed, beside = hits[at], self._misses[cells][at], self._beside[cells][at]
         span = (2 * self._noise + 1, 2 * self._noise + 1)
-        most = cv2.dilate(np.where(hits > 0.0, through, np.float32(0.0)), np.ones(span, dtype=np.uint8))
-        again = cv2.boxFilter(np.minimum(hits, through), -1, span, normalize=False)
-        crossed: BoolArray = (most >= GONE) & (again >= GONE_SHARE * cv2.boxFilter(hits, -1, span, normalize=False))
-        return crossed
+        enough = GONE_SHARE * cv2.boxFilter(hits, -1, span, normalize=False)
+
+        def crossed_again(through: Counts) -> BoolArray:
+            """Mark the cells around which enough of the hits were gone through as often."""
+            surely, again = np.zeros(hits.shape, dtype=np.uint8), np.zeros_like(hits)
+            surely[at], again[at] = through >= GONE, np.minimum(hit, through)
+            crossed: BoolArray = cv2.boxFilter(again, -1, span, normalize=False) >= enough
+            return crossed & (cv2.dilate(surely, np.ones(span, dtype=np.uint8)) > 0)
+
+        faded = crossed_again(missed - beside)
+        # Who ended just behind what was seen from the same side went through its place.
+        alike = np.zeros_like(hit)
+        for hit_from, beside_from in zip(self._hit_from, self._beside_from, strict=True):
+            alike += hit_from[cells][at].astype(np.float32) * beside_from[cells][at]
+        same_side = alike > SAME_SIDE * hit * beside
+        if same_side.any():
+            # What they ended at still stands: two faces seen along their wall from one end take each other away.
+            behind = crossed_again(np.where(same_side, missed, missed - beside))
+            stands = np.zeros(hits.shape, dtype=np.uint8)
+            stands[at] = hit * self._config.log_odds_hit > missed * self._config.log_odds_miss
+            stands &= ~behind.view(np.uint8)
+            faded |= behind & (cv2.dilate(stands, self._same_wall) > 0)
+        return faded[window[0] - around[0] :, window[1] - around[1] :][: window[2], : window[3]]
 
     def _wider(self, window: LatticeWindow, reach: int) -> LatticeWindow:
         """Widen a window by ``reach`` cells to all sides, as far as the arrays go."""
