@@ -193,6 +193,7 @@ def read_ros_map(path: Path, *, allow_outside: bool = False) -> RosMap:
         why = f"a JPEG spreads greys: up to {SPREAD} from {PIXEL_UNKNOWN} counts as unknown"
         remarks.append(Remark(action="guessed", what="cells", why=why, names=(image.name,)))
     table = _raw() if mode == "raw" else _meanings(fields, mode, path, spread=SPREAD if lossy else 1)
+    remarks += _unsaid(fields, mode, path)
     # A turned grid keeps its own axes, with its corner as their origin.
     corner, map_T_grid = ((x, y), IDENTITY) if yaw == 0.0 else ((0.0, 0.0), Pose2(x, y, yaw))
     grid = _grid(image, table, resolution, *corner)
@@ -281,7 +282,7 @@ def _origin(value: Any, path: Path, remarks: list[Remark]) -> tuple[float, float
     x, y, yaw = (float(v) for v in (*numbers, 0.0)[:3] if v is not None)
     for name, coordinate in (("x", x), ("y", y)):
         bounded(coordinate, -FARTHEST, FARTHEST, name=f"map origin {name}", unit="m", where=path)
-    if math.isnan(yaw):
+    if len(numbers) == 2 or math.isnan(yaw):
         remarks.append(Remark(action="guessed", what="yaw of the map", why="no number in the file, 0 was taken"))
         return x, y, 0.0
     turned = wrap_angle(bounded(yaw, -1e6, 1e6, name="map origin yaw", unit="rad", where=path))
@@ -324,6 +325,19 @@ def _negate(value: Any, path: Path) -> bool:
     if negate is None:
         raise InvalidInputError(f"map negate {repr_of(value)}", expected="0 or 1", where=path)
     return negate
+
+
+def _unsaid(fields: dict[str, Any], mode: str, path: Path) -> list[Remark]:
+    """Say which meanings of greys a file leaves open, and what was taken."""
+    if mode == "raw":
+        return []
+    free_below, occupied_above = _thresholds(fields, path)
+    taken = {"negate": "0", "free_thresh": f"{free_below:g}", "occupied_thresh": f"{occupied_above:g}"}
+    missing = {name: value for name, value in taken.items() if name not in fields}
+    if not missing:
+        return []
+    why = f"not in the file; taken: {', '.join(f'{name} {value}' for name, value in missing.items())}"
+    return [Remark(action="guessed", what="meaning of greys", why=why)]
 
 
 def _thresholds(fields: dict[str, Any], path: Path) -> tuple[float, float]:
