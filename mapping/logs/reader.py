@@ -14,6 +14,7 @@ from closedrooms.mapping.logs.bags.bag_options import BagOptions
 from closedrooms.mapping.logs.odometry_units import UNITS, contradicts, find_unit, unit_remark
 from closedrooms.mapping.logs.recorded_odometry import bridge_jumps, jump_remarks
 from closedrooms.mapping.logs.recorded_run import RecordedRun
+from closedrooms.mapping.logs.stated_view import with_fitting_view
 
 GZIP, ZIP, SQLITE, MCAP = b"\x1f\x8b", b"PK\x03\x04", b"SQLite format 3", b"\x89MCAP0\r\n"
 OLD_BAG = re.compile(rb"#ROS(?:BAG|RECORD|LOG) V(\d+\.\d+)")
@@ -60,7 +61,7 @@ def read_run(
     if not run.scans:
         found = "".join(f"; {remark}" for remark in run.remarks)
         raise InvalidInputError(f"no scan that can be used{found}", expected="laser scans", where=path)
-    return _of_one_lidar(_fitting(_without_frozen_odometry(run)))
+    return _of_one_lidar(_fitting(with_fitting_view(_without_frozen_odometry(run))))
 
 
 def _read(path: Path, options: BagOptions) -> RecordedRun:
