@@ -403,6 +403,7 @@ def test_meanings_of_greys_that_a_file_leaves_open_are_said(
 def test_a_whole_description_and_a_raw_one_leave_nothing_to_guess(tmp_path: Path) -> None:
     pixels = np.array([[0, 205, 254]], dtype=np.uint8)
     assert read_ros_map(save(tmp_path, pixels, HEAD)).remarks == ()
+    pixels = np.array([[0, 100, 255]], dtype=np.uint8)
     raw = "resolution: 0.05\norigin: [-1.0, 2.0, 0.0]\n"
     assert read_ros_map(save(tmp_path, pixels, raw, mode="raw")).remarks == ()
 
@@ -413,3 +414,43 @@ def test_a_yaw_that_a_file_leaves_open_is_said(tmp_path: Path, origin: str) -> N
     read = read_ros_map(save(tmp_path, np.array([[0, 205, 254]], dtype=np.uint8), head))
     assert [str(remark) for remark in read.remarks] == ["guessed yaw of the map: no number in the file, 0 was taken"]
     assert not read.turned
+
+
+@pytest.mark.parametrize(
+    ("mode", "free_thresh", "negate", "grey", "said", "loss"),
+    [
+        ("trinary", "0.25", "0", 205, "205 means unknown, though free_thresh 0.25 makes it free", False),
+        ("trinary", "0.25", "1", 50, "50 means unknown, though free_thresh 0.25 makes it free", False),
+        ("trinary", "0.25", "0", 204, None, False),
+        ("trinary", "0.19", "0", 205, None, False),
+        ("scale", "0.196", "0", 205, "205, unknown in the mode trinary, is nearly free in the mode scale", False),
+        ("scale", "0.196", "0", 128, None, False),
+        ("raw", "0.196", "0", 205, "greys from 101 to 254 mean nothing in the mode raw (trinary?); unknown", True),
+        ("raw", "0.196", "0", 255, None, False),
+    ],
+)
+def test_greys_that_other_programs_take_for_something_else_are_counted_and_said(
+    tmp_path: Path, mode: str, free_thresh: str, negate: str, grey: int, said: str | None, loss: bool
+) -> None:
+    pixels = np.full((4, 6), 100, dtype=np.uint8)
+    pixels[1, :3] = grey
+    head = HEAD.replace("0.196", free_thresh).replace("negate: 0", f"negate: {negate}")
+    remarks = read_ros_map(save(tmp_path, pixels, head, mode=mode)).remarks
+    assert [(said in remark.why, remark.count, remark.loss) for remark in remarks if said] == (
+        [(True, 3, loss)] if said else []
+    )
+    assert said or not remarks
+
+
+def test_greys_under_transparent_pixels_are_not_counted(tmp_path: Path) -> None:
+    pixels = np.full((4, 6, 4), 205, dtype=np.uint8)
+    pixels[..., 3] = 0
+    pixels[0] = (254, 254, 254, 255)
+    assert read_ros_map(save(tmp_path, pixels, HEAD, mode="scale")).remarks == ()
+
+
+@pytest.mark.parametrize(("resolution", "said"), [("0.5", False), ("0.6", True), ("5", True)])
+def test_cells_too_coarse_for_a_door_are_said(tmp_path: Path, resolution: str, said: bool) -> None:
+    head = HEAD.replace("resolution: 0.05", f"resolution: {resolution}")
+    read = read_ros_map(save(tmp_path, np.full((4, 6), 254, dtype=np.uint8), head))
+    assert ["centimetres?" in remark.why for remark in read.remarks] == ([True] if said else [])
