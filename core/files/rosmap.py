@@ -277,7 +277,7 @@ def _odd_greys(counts: npt.NDArray[np.int64], fields: dict[str, Any], mode: str,
     if mode == "scale":
         why = f"{unknown}, unknown in the mode trinary, is nearly free in the mode scale; taken so"
         return [Remark(action="guessed", what="cells", why=why, count=count)]
-    if (255 - PIXEL_UNKNOWN) / 255 >= free_below:
+    if free_below <= (255 - PIXEL_UNKNOWN) / 255:
         return []
     why = f"{unknown} means unknown, though free_thresh {free_below:g} makes it free"
     return [Remark(action="guessed", what="cells", why=why, count=count)]
