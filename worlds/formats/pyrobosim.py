@@ -18,7 +18,7 @@ from closedrooms.core.remarks import Remark
 from closedrooms.worlds.formats.hallways import Hallway, JoinedRooms, extend_into_rooms
 from closedrooms.worlds.formats.portals import plan_of_portals
 from closedrooms.worlds.formats.room_outlines import cut_out_inner_rooms
-from closedrooms.worlds.formats.settlement import Source, settle
+from closedrooms.worlds.formats.settlement import Source, not_in_plan, settle
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
 from closedrooms.worlds.wall_assembly import clean_coverage
 
@@ -50,7 +50,7 @@ def read_pyrobosim(path: str | Path) -> FloorPlan:
     rows, halls = _rows(data, "rooms", path), _rows(data, "hallways", path)
     if not rows:
         raise InvalidInputError("a plan without rooms", expected=WHAT, where=path)
-    remarks: list[Remark] = []
+    remarks = not_in_plan(data, {"locations": "the shape of such furniture stands in another file"})
     # Rooms without a name are counted, as pyrobosim does.
     names = [str(row.get("name") or f"room_{number}") for number, row in enumerate(rows)]
     twice = next((name for name in names if names.count(name) > 1), None)

@@ -15,6 +15,7 @@ from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.yaml_text import parse_yaml
 from closedrooms.core.remarks import Remark
+from closedrooms.worlds.formats.settlement import not_in_plan
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import DoorKind
 
@@ -88,6 +89,8 @@ def read_level(path: Path, level: str | None, remarks: list[Remark]) -> RmfLevel
     data = parse_yaml(path, what=WHAT)
     system = _coordinate_system(data, path)
     name, fields = _level_fields(data, level, path)
+    remarks += not_in_plan(fields, {"models": "the shape of such furniture stands in other files"})
+    remarks += not_in_plan(data, {"lifts": "neither their cabins nor their doors are in the plan"})
     metres = (1.0, 1.0) if system == "cartesian_meters" else _pixel(data, fields, path, remarks)
     rows = _rows(fields, "vertices", path)
     vertices = [_vertex(row, metres) for row in rows]
