@@ -19,7 +19,8 @@ from closedrooms.core.remarks import Remark
 GeoFeature = tuple[BaseGeometry, dict[str, Any]]
 MAX_FEATURES = 1_000_000
 # Properties that editors and drivers spell in capitals (shapefiles, GDAL), by how they are spelt here.
-SPELT = ("id", "state", "width", "open", "closed")
+SPELT = ("id", "state", "status", "width", "open", "closed", "is_open", "is_closed")
+METRES = ("m", "metre", "metres", "meter", "meters")
 DEGREES = ("CRS84", "4326", "4979", "WGS84", "WGS 84")
 
 
@@ -62,7 +63,7 @@ def read_features(
     if features is None:
         kind = data.get("type") if isinstance(data, dict) else type(data).__name__
         raise InvalidInputError(f"no FeatureCollection but {repr_of(kind)}", expected=what, where=path)
-    if data.get("units", "m") != "m":
+    if data.get("units", "m") not in METRES:
         raise InvalidInputError(f"units {repr_of(data['units'])}", expected="metres in the map frame ('m')", where=path)
     check_count(len(features), MAX_FEATURES, "features", path)
     if remarks is not None:

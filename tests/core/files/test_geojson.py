@@ -347,3 +347,25 @@ def test_rings_that_are_not_closed_are_closed_and_said(tmp_path: Path, opened: i
     said = [] if noun is None else [f"repaired {noun}: the last point is not the first, closed"]
     assert [str(remark) for remark in remarks] == said
     assert not any(remark.loss for remark in remarks)
+
+
+@pytest.mark.parametrize("key", ["status", "is_open", "IS_OPEN", "is_closed", "Status"])
+def test_doors_that_are_open_by_another_property_are_left_out_and_said(tmp_path: Path, key: str) -> None:
+    words = {"status": ("open", "closed"), "is_open": (True, False), "is_closed": (0, 1)}[key.lower()]
+    features = [point(0, 0, id="a", **{key: words[0]}), point(3, 0, id="b", **{key: words[1]})]
+    doors, remarks = told(collection(tmp_path / "d", *features))
+    assert [door.id for door in doors] == ["b"]
+    assert remarks == ["dropped 1 door (a): the file says open"]
+
+
+@pytest.mark.parametrize(
+    ("units", "read"), [("m", True), ("meters", True), ("metre", True), ("cm", False), ([], False)]
+)
+def test_units_are_metres_in_any_spelling(tmp_path: Path, units: object, read: bool) -> None:
+    path = tmp_path / "d.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "units": units, "features": [point(0, 0, id="a")]}))
+    if read:
+        assert len(read_doors(path)) == 1
+    else:
+        with pytest.raises(InvalidInputError, match="units"):
+            read_doors(path)
