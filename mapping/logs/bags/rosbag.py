@@ -193,11 +193,14 @@ def _run(
 
 
 def _reading_remarks(messages: BagMessages) -> list[Remark]:
-    """Say which messages were broken or too many."""
+    """Say which messages were broken, too many, or changed what should not change."""
     remarks = [
         Remark(action="dropped", what=what, why="broken in the bag", count=count, loss=what == "scans")
         for what, count in messages.broken.items()
     ]
+    if messages.tree.changed:
+        why, names = "published as static with different values; the last are taken", tuple(messages.tree.changed)
+        remarks.append(Remark(action="guessed", what="transforms", why=why, names=names, count=len(names)))
     if messages.surplus:
         why = f"more than {MAX_SCANS}"
         remarks.append(Remark(action="dropped", what="scans", why=why, count=messages.surplus, loss=True))

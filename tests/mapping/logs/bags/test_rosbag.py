@@ -558,3 +558,15 @@ def test_without_odometry_scans_of_a_second_lidar_are_left_out(new_bag: Bags) ->
     assert (remark.action, remark.count, remark.loss) == ("dropped", 4, True)
     with pytest.raises(InvalidInputError, match="unknown mounting"):
         read_run(with_two_lidars(new_bag()).write())
+
+
+@pytest.mark.parametrize(("second", "said"), [((0.3, 0, 0.2), False), ((0.305, 0, 0.2), False), ((0.4, 0, 0.2), True)])
+def test_a_static_transform_that_changes_is_said_and_the_last_one_counts(
+    new_bag: Bags, second: tuple[float, float, float], said: bool
+) -> None:
+    bag = new_bag().drive().transform("base_link", "laser", (0.3, 0.0, 0.2))
+    run = read_run(bag.transform("base_link", "laser", second, stamp=100.5).write())
+    assert run.scans[0].robot_T_sensor == pytest.approx((second[0], 0.0, 0.0))
+    assert [str(remark) for remark in run.remarks] == (
+        ["guessed 1 transforms (laser): published as static with different values; the last are taken"] if said else []
+    )
