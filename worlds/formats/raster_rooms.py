@@ -196,7 +196,7 @@ def _reach(grid: OccupancyGrid, point: Point, u: FloatArray) -> float:
 def _fault(segment: Segment, frame: GridFrame) -> str | None:
     """Say what makes a segment no door whatever the map shows."""
     width = math.dist(*segment)
-    if not NARROWEST <= width <= WIDEST:
+    if not NARROWEST - 1e-6 <= width <= WIDEST + 1e-6:
         return f"{width:.3g} m wide; expected {NARROWEST:g} to {WIDEST:g} m"
     return None if frame.contains(frame.to_cells(np.array(segment))).all() else "not on the map"
 
