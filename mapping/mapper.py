@@ -74,6 +74,7 @@ class Mapper:
         self._usual_score = 0.0
         self._stamps: list[float] = []
         self._references: list[tuple[int, Pose2]] = []
+        self._latest: dict[tuple[float, float, float], Keyframe] = {}
         self._travelled = 0.0
 
     @property
@@ -139,11 +140,12 @@ class Mapper:
         if self.keyframes:
             self._match(points, beams, scan.stamp, before, step)
         self._prediction.moved(before.inverse() @ self._pose)
-        if self._wants_keyframe():
+        if self._wants_keyframe(self._latest.get(scan.robot_T_sensor)):
             ends = beams().points
             surfaces = ends[self._local.crossed.stands_still(self._pose, ends)]
             number = len(self.keyframes)
             self._insert(Keyframe(number, scan.stamp, self._pose, beams(), points, surfaces, self._travelled))
+            self._latest[scan.robot_T_sensor] = self.keyframes[-1]
         self._last_odometry = odometry
         latest = self.keyframes[-1]
         keyframe_T_robot = latest.pose.inverse() @ self._pose
@@ -300,24 +302,28 @@ class Mapper:
             self._events.note(Event.RECOVERED, stamp)
         return match
 
-    def _far(self, pose: Pose2, stretch: float = 1.0) -> bool:
-        """Check whether a pose is as far from the latest keyframe as keyframes are apart."""
-        latest, config = self.keyframes[-1].pose, self._config
+    def _far(self, pose: Pose2, stretch: float = 1.0, *, latest: Keyframe | None = None) -> bool:
+        """Check whether a pose is as far from a keyframe, by default the latest, as keyframes are apart."""
+        last, config = (latest or self.keyframes[-1]).pose, self._config
         return (
-            latest.distance(pose) >= stretch * config.keyframe_distance
-            or abs(wrap_angle(latest.theta - pose.theta)) >= stretch * config.keyframe_angle
+            last.distance(pose) >= stretch * config.keyframe_distance
+            or abs(wrap_angle(last.theta - pose.theta)) >= stretch * config.keyframe_angle
         )
 
-    def _wants_keyframe(self) -> bool:
-        """Check whether the scan goes into the map: far enough from the last one, later where it fits poorly."""
+    def _wants_keyframe(self, latest: Keyframe | None) -> bool:
+        """Check whether the scan goes into the map: far enough from the last one, later where it fits poorly.
+
+        Args:
+            latest: The last one of the same lidar: of two that look ahead and back, neither sees what the other does.
+        """
         recovery = self._config.recovery
-        if not self.keyframes:
+        if latest is None and not self._lost:
             return True
         if self._lost:
             # A map should not be given up while the next scan may still find back.
             far = self._travelled - self.keyframes[-1].travelled > recovery.lost_distance
             return far or self._lost >= recovery.submap_after
-        return self._far(self._pose, 1.0 if self._trusted else self._config.poor_spacing)
+        return self._far(self._pose, 1.0 if self._trusted else self._config.poor_spacing, latest=latest)
 
     def _insert(self, keyframe: Keyframe) -> None:
         """Add a keyframe to graph and local map, and close a loop where there is one."""

@@ -245,9 +245,9 @@ def _mounts(
     Without odometry it does not matter for the map; the lidar is taken to be the robot where nobody says more.
     """
     if options.mount is not None or options.upside_down:
-        mount = Mount(Pose2(*(options.mount or (0.0, 0.0, 0.0))), options.upside_down)
-        return dict.fromkeys(frames, mount), []
-    if not measured and base is None:
+        given = Mount(Pose2(*(options.mount or (0.0, 0.0, 0.0))), options.upside_down)
+        return _given_mounts(tree, base, frames, given)
+    if not measured and base is None and len(frames) == 1:
         why = "no transform to the lidar; it is taken to hang upright in the middle of the robot"
         level = Mount(Pose2(), upside_down=False)
         return dict.fromkeys(frames, level), [Remark(action="guessed", what="mounting", why=why)]
@@ -263,3 +263,19 @@ def _mounts(
             why = f"{frame} is tilted by {math.degrees(mount.tilt):.0f} degrees; taken to be level"
             remarks.append(Remark(action="guessed", what="mounting", why=why))
     return mounts, remarks
+
+
+def _given_mounts(
+    tree: TransformTree, base: str | None, frames: list[str], given: Mount
+) -> tuple[dict[str, Mount], list[Remark]]:
+    """Take the mounting that was given; of several lidars it is that of those which no transform tells of."""
+    mounts = dict.fromkeys(frames, given)
+    if len(frames) == 1:
+        return mounts, []
+    for frame in frames:
+        with contextlib.suppress(InvalidInputError):
+            mounts[frame] = tree.mount(base or "", frame)
+    told = tuple(frame for frame in frames if mounts[frame] is given)
+    where = f"the one that was given is taken for {', '.join(told) or 'none'}, for the others that of the transforms"
+    why = f"scans of several lidars on one topic; {where}"
+    return mounts, [Remark(action="guessed", what="mountings", why=why, names=tuple(frames), count=len(frames))]

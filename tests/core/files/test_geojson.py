@@ -331,3 +331,19 @@ def test_a_door_with_a_bend_and_one_on_another_are_told(tmp_path: Path) -> None:
     remarks: list[Remark] = []
     assert [door.id for door in read_doors(path, remarks=remarks)] == ["bent", "straight", "a", "b"]
     assert [(remark.action, remark.names) for remark in remarks] == [("guessed", ("bent",)), ("guessed", ("b",))]
+
+
+@pytest.mark.parametrize(("opened", "noun"), [(0, None), (1, "ring"), (2, "2 rings")])
+def test_rings_that_are_not_closed_are_closed_and_said(tmp_path: Path, opened: int, noun: str | None) -> None:
+    square = [[0, 0], [4, 0], [4, 3], [0, 3], [0, 0]]
+    geometries = [
+        {"type": "Polygon", "coordinates": [square[:-1] if opened > 0 else square]},
+        {"type": "MultiPolygon", "coordinates": [[square[:-1] if opened > 1 else [[*p, 1.0] for p in square]]]},
+    ]
+    features = [{"type": "Feature", "geometry": g, "properties": {"doors": []}} for g in geometries]
+    remarks: list[Remark] = []
+    rooms = read_rooms(collection(tmp_path / "r", *features), remarks=remarks)
+    assert [room.polygon.area for room in rooms] == [12.0, 12.0]
+    said = [] if noun is None else [f"repaired {noun}: the last point is not the first, closed"]
+    assert [str(remark) for remark in remarks] == said
+    assert not any(remark.loss for remark in remarks)

@@ -93,6 +93,26 @@ def test_walls_cover_every_edge_of_every_room_at_any_angle(
     check_floor(read_kth(path))
 
 
+@settings(max_examples=8, deadline=None)
+@given(degrees=st.floats(0.0, 360.0), jitter=st.floats(0.0, 0.05), seed=st.integers(0, 10_000))
+@example(degrees=90.0, jitter=0.05, seed=1)
+@example(degrees=0.0, jitter=0.02, seed=0)
+def test_doors_stay_where_they_are_drawn_however_the_hand_trembles(
+    tmp_path_factory: pytest.TempPathFactory, degrees: float, jitter: float, seed: int
+) -> None:
+    path = tmp_path_factory.mktemp("floor") / "floor.xml"
+    path.write_text(floor_xml(math.radians(degrees), jitter, seed))
+    plan = read_kth(path)
+    check_floor(plan)
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    for number in range(4):
+        x, y = number * (4.0 + GAP) + 1.5 + DOOR / 2, GAP / 2
+        drawn = (c * x - s * y, s * x + c * y)
+        # The border lies on one side of the wall; corners stray by three standard deviations.
+        assert min(math.dist(door.midpoint, drawn) for door in plan.doors) < GAP / 2 + 3 * jitter + 0.02
+    assert not [remark for remark in plan.remarks if remark.what == "doors"]
+
+
 def test_a_wall_that_is_missing_from_a_plan_lets_a_robot_out(tmp_path: Path) -> None:
     from dataclasses import replace
 
