@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
@@ -61,8 +60,14 @@ class EvidenceGrid:
     fades by its miss count, and does not take as many misses as it had hits.
     """
 
-    def __init__(self, config: MapperConfig) -> None:
-        self._config = config
+    def __init__(self, config: MapperConfig, *, draws: bool = True) -> None:
+        """Begin without scans.
+
+        Args:
+            config: Resolution, weights of hits and misses.
+            draws: Whether :meth:`grid` is asked for: what only that needs is not counted else.
+        """
+        self._config, self._draws = config, draws
         self._lattice = Lattice(config.resolution)
         self._noise = math.ceil(NOISE / config.resolution)
         span = 2 * math.ceil(SAME_WALL / config.resolution) + 1
@@ -147,29 +152,50 @@ class EvidenceGrid:
         self, window: LatticeWindow, mask: Mask, flat: IntArray, viewpoint: tuple[float, float], sign: int
     ) -> None:
         """Add hits (``flat``: indices in the window) and misses (``mask``) of a keyframe, or take them off."""
-        rows, cols = _slices(window)
         # A cell that several beams hit counts once: the same sum is written for each.
-        hit = np.divmod(flat, window[3])
-        self._hits[rows, cols][hit] += sign
-        _count_sides(self._hit_from, (rows, cols), hit, viewpoint, sign)
-        met = np.zeros_like(mask)
-        met.ravel()[flat] = 1
-        near = cv2.bitwise_and(mask, cv2.dilate(met, self._same_wall))
-        beside = np.divmod(np.flatnonzero(near), window[3])
-        self._beside[rows, cols][beside] += sign
-        _count_sides(self._beside_from, (rows, cols), beside, viewpoint, sign)
+        self._hits.reshape(-1)[self._flat(flat, window)[0]] += sign
+        if self._draws:
+            self._count_sides(window, mask, flat, viewpoint, sign)
         if sign > 0:
-            cv2.accumulate(mask, self._misses[rows, cols])
+            cv2.accumulate(mask, self._misses[_slices(window)])
         else:
-            cv2.subtract(self._misses[rows, cols], mask, self._misses[rows, cols], dtype=cv2.CV_32F)
+            misses = self._misses[_slices(window)]
+            cv2.subtract(misses, mask, misses, dtype=cv2.CV_32F)
         self._dirty = window if self._dirty is None else _union(self._dirty, window)
+
+    def _count_sides(
+        self, window: LatticeWindow, mask: Mask, flat: IntArray, viewpoint: tuple[float, float], sign: int
+    ) -> None:
+        """Count misses beside hits, and to both from where they were seen, to an eighth of a turn."""
+        met = np.zeros_like(mask)
+        met.reshape(-1)[flat] = 1
+        near = cv2.bitwise_and(mask, cv2.dilate(met, self._same_wall))
+        hits = len(flat)
+        at, rows, cols = self._flat(np.concatenate((flat, np.flatnonzero(near.view(np.bool_)))), window)
+        self._beside.reshape(-1)[at[hits:]] += sign
+        away = viewpoint[0] - rows, viewpoint[1] - cols
+        far = np.maximum(np.hypot(*away), 1e-9)
+        for of_hits, of_misses, part in zip(self._hit_from, self._beside_from, away, strict=True):
+            side = (sign * np.rint(part / far)).astype(np.int16)
+            of_hits.reshape(-1)[at[:hits]] += side[:hits]
+            of_misses.reshape(-1)[at[hits:]] += side[hits:]
+
+    def _flat(self, cells: IntArray, window: LatticeWindow) -> tuple[IntArray, IntArray, IntArray]:
+        """Convert flat indices in a window to those in the arrays, and to rows and columns in the window."""
+        row, col, _, width = window
+        rows = cells // width  # with the product sooner than np.divmod
+        cols = cells - rows * width
+        return (rows + row) * self._lattice.cols + (cols + col), rows, cols
 
     def _crossed(self, outline: FloatArray, window: LatticeWindow) -> Mask:
         """Mark the cells that beams cross before they end: the inside of the scan's outline [m] without its rim."""
         lattice = self._lattice
         # OpenCV puts integer coordinates on cell centres.
-        corner = np.array([lattice.col0 + window[1], lattice.row0 + window[0]]) + 0.5
-        vertices = np.rint((outline / lattice.resolution - corner) * (1 << SUBCELL_BITS)).astype(np.int32)
+        corners = outline / lattice.resolution
+        corners[:, 0] -= lattice.col0 + window[1] + 0.5
+        corners[:, 1] -= lattice.row0 + window[0] + 0.5
+        corners *= 1 << SUBCELL_BITS
+        vertices = np.rint(corners, out=corners).astype(np.int32)
         mask = np.zeros((window[2], window[3]), dtype=np.uint8)
         cv2.fillPoly(mask, [vertices], 1, cv2.LINE_8, SUBCELL_BITS)
         cv2.polylines(mask, [vertices], True, 0, 1, cv2.LINE_8, SUBCELL_BITS)
@@ -199,18 +225,15 @@ class EvidenceGrid:
             # What is drawn of a cell depends on those around it.
             window = self._wider(self._dirty, self._noise)
             rows, cols = _slices(window)
-            hits, misses = self._hits[rows, cols], self._misses[rows, cols]
-            most_hits, most_misses = self._percent.shape
-            if hits.max() >= most_hits or misses.max() >= most_misses:
-                most_hits = max(most_hits, 16 + int(1.25 * hits.max()))
-                most_misses = max(most_misses, 16 + int(1.25 * float(misses.max())))
+            misses, (stands, hits) = self._misses[rows, cols], self._standing(window)
+            most, (most_hits, most_misses) = (int(hits.max(initial=0)), int(misses.max())), self._percent.shape
+            if most[0] >= most_hits or most[1] >= most_misses:
+                most_hits = max(most_hits, 16 + int(1.25 * most[0]))
+                most_misses = max(most_misses, 16 + int(1.25 * most[1]))
                 self._percent = self._probabilities(most_hits, most_misses)
-            places = hits * self._percent.shape[1]
-            places += misses.astype(np.int32)
-            # What has gone is free, however long it stood there.
-            gone = self._faded(window) & (misses > 0.0)
-            np.copyto(places, misses.astype(np.int32), where=gone)
-            self._cells[rows, cols] = self._percent.ravel().take(places)
+            places = misses.astype(np.int32)
+            places.reshape(-1)[stands] += hits * self._percent.shape[1]
+            self._cells[rows, cols] = self._percent.reshape(-1).take(places)
             self._redrawn = self._dirty if self._redrawn is None else _union(self._redrawn, self._dirty)
             self._dirty = None
         cells = self._cells.copy()
@@ -255,32 +278,49 @@ class EvidenceGrid:
             (row, last_row), (col, last_col) = (cells.tolist() for cells in lattice.cells(np.stack(within)))
             n_rows, n_cols = last_row + 1 - row, last_col + 1 - col
         hits, misses = (a[row : row + n_rows, col : col + n_cols] for a in (self._hits, self._misses))
-        through = misses >= least + hits * np.float32(share)
+        through, met = misses >= least, np.flatnonzero(hits > 0)
+        at = self._flat(met, (row, col, *through.shape))[0]
+        often = self._misses.reshape(-1).take(at) >= least + self._hits.reshape(-1).take(at) * np.float32(share)
+        through.reshape(-1)[met] = often
         span = 2 * math.ceil(apart / lattice.resolution) + 1
-        solid = ((hits > 0) & ~through).astype(np.uint8)
-        through &= cv2.dilate(solid, np.ones((span, span), dtype=np.uint8)) == 0
-        return row + lattice.row0, col + lattice.col0, through
+        solid = np.zeros(through.shape, dtype=np.uint8)
+        solid.reshape(-1)[met] = ~often
+        beside = cv2.dilate(solid, np.ones((span, span), dtype=np.uint8))
+        return row + lattice.row0, col + lattice.col0, np.greater(through, beside.view(np.bool_), out=through)
 
-    def _faded(self, window: LatticeWindow) -> BoolArray:
-        """Mark the cells of a window in which something stood that has gone.
+    def _standing(self, window: LatticeWindow) -> tuple[IntArray, IntArray]:
+        """List the cells of a window, flat, in which something was hit that has not gone since, and those hits.
 
         The noise of a wall was gone through, too, often, but the wall beside it was not: what counts are the hits
         around a cell, and how many of them were gone through as often.
         """
         around = self._wider(window, self._noise)
-        cells = _slices(around)
-        hits = self._hits[cells].astype(np.float32)
+        # Few cells were hit: what is asked of those is not computed for the others.
+        met = np.flatnonzero(self._hits[_slices(around)] > 0)
+        at, rows, cols = self._flat(met, around)
+        hits, misses, beside = (counts.reshape(-1).take(at) for counts in (self._hits, self._misses, self._beside))
         # Who ended just behind what was seen from the same side went through its place.
         (hit_row, hit_col), (row, col) = (
-            [sums[cells] for sums in both] for both in (self._hit_from, self._beside_from)
+            [sums.reshape(-1).take(at).astype(np.int32) for sums in both]
+            for both in (self._hit_from, self._beside_from)
         )
-        same_side = np.multiply(hit_row, row, dtype=np.int32) + np.multiply(hit_col, col, dtype=np.int32) > 0
-        through = self._misses[cells] - np.where(same_side, np.int16(0), self._beside[cells])
-        span = (2 * self._noise + 1, 2 * self._noise + 1)
-        most = cv2.dilate(np.where(hits > 0.0, through, np.float32(0.0)), np.ones(span, dtype=np.uint8))
-        again = cv2.boxFilter(np.minimum(hits, through), -1, span, normalize=False)
-        faded: BoolArray = (most >= GONE) & (again >= GONE_SHARE * cv2.boxFilter(hits, -1, span, normalize=False))
-        return faded[window[0] - around[0] :, window[1] - around[1] :][: window[2], : window[3]]
+        same_side = hit_row * row + hit_col * col > 0
+        through = misses - np.where(same_side, np.int16(0), beside)
+        shape, span = around[2:], (2 * self._noise + 1, 2 * self._noise + 1)
+        twice = np.zeros(shape, dtype=np.uint8)
+        twice.reshape(-1)[met] = through >= GONE
+        near = cv2.dilate(twice, np.ones(span, dtype=np.uint8)).reshape(-1).take(met)
+        sums = []
+        for counts in (np.minimum(hits, through), hits):
+            # Of whole numbers of 16 bits in half the time that single precision takes.
+            whole = np.zeros(shape, dtype=np.int16)
+            whole.reshape(-1)[met] = counts
+            sums.append(cv2.boxFilter(whole, cv2.CV_32F, span, normalize=False).reshape(-1).take(met))
+        stands = (near == 0) | (sums[0] < GONE_SHARE * sums[1]) | (misses <= 0.0)
+        rows += around[0] - window[0]
+        cols += around[1] - window[1]
+        stands &= (rows >= 0) & (rows < window[2]) & (cols >= 0) & (cols < window[3])
+        return (rows * window[3] + cols)[stands], hits[stands]
 
     def _wider(self, window: LatticeWindow, reach: int) -> LatticeWindow:
         """Widen a window by ``reach`` cells to all sides, as far as the arrays go."""
@@ -317,17 +357,3 @@ def _slices(window: LatticeWindow) -> tuple[slice, slice]:
 def _union(a: LatticeWindow, b: LatticeWindow) -> LatticeWindow:
     row, col = min(a[0], b[0]), min(a[1], b[1])
     return (row, col, max(a[0] + a[2], b[0] + b[2]) - row, max(a[1] + a[3], b[1] + b[3]) - col)
-
-
-def _count_sides(
-    sums: list[np.ndarray[Any, np.dtype[np.int16]]],
-    window: tuple[slice, slice],
-    cells: tuple[IntArray, IntArray],
-    viewpoint: tuple[float, float],
-    sign: int,
-) -> None:
-    """Add to two sums the direction, to an eighth of a turn, in which the viewpoint lies from cells of a window."""
-    away = [at - axis for at, axis in zip(viewpoint, cells, strict=True)]
-    far = np.maximum(np.hypot(*away), 1e-9)
-    for total, part in zip(sums, away, strict=True):
-        total[window][cells] += (sign * np.rint(part / far)).astype(np.int16)
