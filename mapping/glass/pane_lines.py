@@ -195,9 +195,7 @@ def draw_lines(places: FloatArray, normals: FloatArray, resolution: float) -> li
         left &= ~chosen
         groups = _groups(places[chosen], resolution)
         for number in np.unique(groups):
-            line = _line(places[chosen][groups == number], angles[chosen][groups == number])
-            if line is not None:
-                lines.append(line)
+            lines += _lines(places[chosen][groups == number], angles[chosen][groups == number])
     return lines
 
 
@@ -255,6 +253,20 @@ def _groups(places: FloatArray, resolution: float) -> IntArray:
     mask[cells[:, 0], cells[:, 1]] = 1
     _, labels = cv2.connectedComponents(cv2.dilate(mask, np.ones((5, 5), dtype=np.uint8)), connectivity=8)
     return np.asarray(labels)[cells[:, 0], cells[:, 1]].astype(np.int64)
+
+
+def _lines(places: FloatArray, angles: FloatArray) -> list[FloatArray]:
+    """Draw the line through places, or one along each face of a thick pane that was met on both."""
+    middle = places.mean(axis=0)
+    _, spread, axes = np.linalg.svd(places - middle, full_matrices=False)
+    parts = [np.ones(len(places), dtype=np.bool_)]
+    if spread[-1] / math.sqrt(len(places)) > THICK:
+        front = (places - middle) @ axes[-1] < 0.0
+        parts = [front, ~front]
+        if max(float(np.std((places[part] - middle) @ axes[-1])) for part in parts) > THICK / 2.0:
+            return []
+    found = (_line(places[part], angles[part]) for part in parts)
+    return [line for line in found if line is not None]
 
 
 def _line(places: FloatArray, angles: FloatArray) -> FloatArray | None:

@@ -10,6 +10,7 @@ from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.mapping.glass.pane_lines import (
     MOST_TURNED,
     THICK,
+    draw_lines,
     join_lines,
     sample,
     turn_into_walls,
@@ -136,3 +137,15 @@ def test_panes_side_by_side_and_across_stay_two() -> None:
     line = np.array([[0.0, 0.0], [1.0, 0.0]])
     for other in ([[0.0, 0.3], [1.0, 0.3]], [[1.3, -0.5], [1.3, 0.5]], [[1.2, 0.3], [2.2, 0.3]]):
         assert len(join_lines([line, np.array(other)], grid, np.zeros((0, 2)))) == 2
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(0.05, 0.6))
+def test_both_faces_of_a_pane_are_in_line_however_thick_it_is(heading: float, thickness: float) -> None:
+    along, across = np.array([math.cos(heading), math.sin(heading)]), np.array([-math.sin(heading), math.cos(heading)])
+    t = np.arange(-1.0, 1.01, 0.05)
+    places = np.concatenate([t[:, None] * along + side * thickness / 2.0 * across for side in (-1.0, 1.0)])
+    found = draw_lines(places, np.broadcast_to(across, places.shape), 0.05)
+    assert 1 <= len(found) <= 2
+    for line in found:
+        assert np.abs(np.sort(line @ along) - [-1.0, 1.0]).max() < 0.02
+        assert np.abs(line @ across).max() < thickness / 2.0 + 1e-6
