@@ -133,13 +133,17 @@ def horizon(config: RobotNavigation) -> float:
 
 
 def near_points(scan: LaserScan, config: RobotNavigation) -> FloatArray:
-    """Select what the scan shows close to the robot, robot frame, shape (n, 2) [m].
+    """Select what the scan shows close to the robot, as :func:`points_within` does."""
+    return points_within(scan, horizon(config))
+
+
+def points_within(scan: LaserScan, reach: float) -> FloatArray:
+    """Select what the scan shows up to ``reach`` [m], at most ``FAR``, from the sensor, robot frame, shape (n, 2) [m].
 
     A median over five beams leaves out lone outliers and halves the noise: the nearest of a hundred noisy points would
     otherwise always lie too close.
     """
     ranges = np.where(scan.ranges < FAR, scan.ranges, FAR).astype(np.float32)
-    reach = horizon(config)
     if float(ranges.min()) >= reach:
         return np.empty((0, 2))
     smooth = cv2.medianBlur(np.concatenate((ranges[-2:], ranges, ranges[:2]))[None, :], 5)[0, 2:-2]
