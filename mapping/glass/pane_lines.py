@@ -11,7 +11,8 @@ from closedrooms.core.grid import OccupancyGrid, is_occupied
 
 ALONE, LENGTH, SHORT = 0.75, 0.45, 0.09
 """Shortest run of places that is a pane with a solid wall at one end, between two (a person is 0.4 m wide), and there
-where it was open before [m]. Where no wall is it is what somebody who walked was seen along."""
+where it was open before [m]. Where no wall is it is what somebody who walked was seen along, unless it was hit, gone
+through and hit again."""
 FEWEST = 4
 """Fewest places of a pane."""
 THICK = 0.12

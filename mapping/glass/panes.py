@@ -197,10 +197,11 @@ class Panes:
             long, widest = length >= LENGTH, WIDE if last else FRAME
             around = may_be, before, against, self._driven
             segment, walls = extend_line(pane, grid, *around, widest if long else FRAME, far)
-            if not long and walls < 2 and self._all_seen and self._in_turns(line):
-                long = True
+            in_turns = length < ALONE and self._all_seen and self._in_turns(line)
+            if not long and walls < 2 and in_turns:
                 segment, walls = extend_line(pane, grid, *around, widest, WIDE)
-            if (walls and length >= ALONE) or (walls == 2 and (long or self._was_open(line))):
+            alone = (walls and length >= ALONE) or (long and in_turns)
+            if alone or (walls == 2 and (long or in_turns or self._was_open(line))):
                 segments.append(segment)
         return without_covered(np.array(segments).reshape(-1, 2, 2))
 
