@@ -44,6 +44,20 @@ class Beams:
     origin: FloatArray
 
 
+@functools.lru_cache(maxsize=8)
+def by_bearing(beams: Beams) -> tuple[FloatArray, FloatArray]:
+    """Sort the outline by direction from the sensor: bearings [rad], ascending, and ranges [m], shape (k,) each.
+
+    Of the latest scans it is kept: each is compared with the one before and with the one after.
+    """
+    outline = beams.outline - beams.origin
+    ranges = np.hypot(outline[:, 0], outline[:, 1])
+    seen = (ranges > 0.0).nonzero()[0]
+    bearings = np.arctan2(outline[:, 1], outline[:, 0])[seen]
+    order = np.argsort(bearings, kind="stable")
+    return bearings[order], ranges[seen[order]]
+
+
 def hit_points(scan: LaserScan, *, max_range: float, motion: SweepMotion | None = None) -> FloatArray:
     """End points of all beams that ended on something up to ``max_range`` [m], robot frame, shape (n, 2).
 
@@ -52,7 +66,9 @@ def hit_points(scan: LaserScan, *, max_range: float, motion: SweepMotion | None 
     ranges = scan.ranges
     hits = (ranges >= scan.range_min) & (ranges < min(max_range, scan.range_max))
     units, _ = directions(scan.angle_min, scan.angle_increment, ranges.size)
-    points: FloatArray = units[hits] * ranges[hits, None]
+    which = hits.nonzero()[0]
+    points: FloatArray = units.take(which, axis=0)
+    points *= ranges.take(which)[:, None]
     if scan.robot_T_sensor != (0.0, 0.0, 0.0):
         points = Pose2(*scan.robot_T_sensor).transform(points)
     return points if motion is None else motion.straighten(points, beam_ages(scan)[hits])
@@ -229,7 +245,16 @@ def directions(angle_min: float, increment: float, beams: int) -> tuple[FloatArr
 
 def thin_points(points: FloatArray, spacing: float, most: int) -> FloatArray:
     """Thin the points of a scan, shape (n, 2), in beam order, to ``most`` at most, about ``spacing`` [m] apart."""
-    return points[spaced(points, np.array([len(points)]), spacing, most)]
+    if len(points) < 3:
+        return points
+    # As :func:`spaced` does it for many scans at once.
+    x, y = np.ascontiguousarray(points.T)
+    along = np.zeros(len(points))
+    np.cumsum(np.minimum(np.hypot(x[1:] - x[:-1], y[1:] - y[:-1]), spacing), out=along[1:])
+    ticks = np.floor(along / max(spacing, float(along[-1]) / most))
+    keep = np.ones(len(points), dtype=np.bool_)
+    np.greater(ticks[1:], ticks[:-1], out=keep[1:])
+    return points[keep]
 
 
 def spaced(points: FloatArray, counts: IntArray, spacing: float, most: int) -> BoolArray:

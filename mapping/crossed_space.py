@@ -40,7 +40,7 @@ class CrossedSpace:
 
     def clear(self) -> None:
         """Forget all, because poses were corrected."""
-        self._evidence = EvidenceGrid(self._config)
+        self._evidence = EvidenceGrid(self._config, draws=False)
         self._lattice = Lattice(self._config.resolution)
         self._free: BoolArray = np.zeros(self._lattice.frame.shape, dtype=np.bool_)
 
@@ -50,8 +50,8 @@ class CrossedSpace:
         if not outlines:
             return
         self._evidence.add_all(scans)
-        corners = np.concatenate(outlines)
-        box = corners.min(axis=0), corners.max(axis=0)
+        x, y = np.concatenate(outlines).T.copy()
+        box = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
         row, col, free = self._evidence.crossed(APART, share=SHARE, within=box)
         lattice, (rows, cols) = self._lattice, free.shape
         size = lattice.resolution

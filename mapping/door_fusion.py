@@ -19,18 +19,29 @@ def fuse_doors(keyframes: Sequence[Keyframe]) -> list[ClosedDoor]:
     The jambs are weighted medians over the sightings: a heading error moves a far door more than a near one, so a
     sighting weighs inversely to its squared distance, and a few wrong poses move nothing.
     """
-    sighted = [(name, k.pose, *seen) for k in keyframes for name, seen in k.sightings.items()]
-    if not sighted:
-        return []
-    segments = np.array([segment for _, _, segment, _ in sighted])
-    turns = [(math.cos(pose.theta), math.sin(pose.theta)) for _, pose, _, _ in sighted]
-    # All sightings at once; as Pose2.transform.
-    rotations = np.array([((c, s), (-s, c)) for c, s in turns])
-    ends = segments @ rotations + np.array([(pose.x, pose.y) for _, pose, _, _ in sighted])[:, None]
-    weights = np.array([max(distance, NEAR) ** -2 for *_, distance in sighted])
     of: dict[str, list[int]] = {}
-    for number, (name, *_) in enumerate(sighted):
-        of.setdefault(name, []).append(number)
+    segments: list[float] = []
+    distances: list[float] = []
+    poses: list[float] = []
+    for keyframe in keyframes:
+        if not keyframe.sightings:
+            continue
+        pose = keyframe.pose
+        placed = (pose.x, pose.y, math.cos(pose.theta), math.sin(pose.theta))
+        for name, ((start, end), distance) in keyframe.sightings.items():
+            of.setdefault(name, []).append(len(distances))
+            distances.append(distance)
+            # Plain numbers, one after the other, become an array many times as quickly as pairs of pairs.
+            segments += start
+            segments += end
+            poses += placed
+    if not of:
+        return []
+    x, y, c, s = np.array(poses).reshape(-1, 4).T
+    # All sightings at once; as Pose2.transform.
+    rotations = np.stack((c, s, -s, c), axis=1).reshape(-1, 2, 2)
+    ends = np.array(segments).reshape(-1, 2, 2) @ rotations + np.stack((x, y), axis=1)[:, None]
+    weights = np.array([max(distance, NEAR) ** -2 for distance in distances])
     return [_fused(name, ends[of[name]], weights[of[name]]) for name in sorted(of)]
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from closedrooms.core.arrays import BoolArray, CellArray, FloatArray, IntArray, Mask
 from closedrooms.core.grid import UNKNOWN, OccupancyGrid
@@ -32,9 +31,11 @@ other; and who looks along a wall past a face that lies a little too far out see
 SAME_SIDE = 0.5
 """Product of the mean directions from which a place was hit, and was missed by scans that end nearby, from which on
 both saw it from the same side: of a wall whose two faces fell on one cell both directions are mixed, and short."""
-Counts = NDArray[np.float32]
 LatticeWindow = tuple[int, int, int, int]
 """First row and column in the arrays, and number of rows and columns."""
+Counts = np.ndarray[Any, np.dtype[Any]]
+WindowCells = tuple[IntArray, tuple[int, int]]
+"""Cells of a window, flat, and its rows and columns."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,8 +67,14 @@ class EvidenceGrid:
     fades by its miss count, and does not take as many misses as it had hits.
     """
 
-    def __init__(self, config: MapperConfig) -> None:
-        self._config = config
+    def __init__(self, config: MapperConfig, *, draws: bool = True) -> None:
+        """Begin without scans.
+
+        Args:
+            config: Resolution, weights of hits and misses.
+            draws: Whether :meth:`grid` is asked for: what only that needs is not counted else.
+        """
+        self._config, self._draws = config, draws
         self._lattice = Lattice(config.resolution)
         self._noise = math.ceil(NOISE / config.resolution)
         same_wall = math.ceil(SAME_WALL / config.resolution)
@@ -154,26 +161,48 @@ class EvidenceGrid:
         self, window: LatticeWindow, mask: Mask, flat: IntArray, viewpoint: tuple[float, float], sign: int
     ) -> None:
         """Add hits (``flat``: indices in the window) and misses (``mask``) of a keyframe, or take them off."""
-        rows, cols = _slices(window)
         # A cell that several beams hit counts once: the same sum is written for each.
-        hit = np.divmod(flat, window[3])
-        self._hits[rows, cols][hit] += sign
-        _count_sides(self._hit_from, (rows, cols), hit, viewpoint, sign)
-        beside = np.divmod(np.flatnonzero(mask - cv2.erode(mask, self._same_wall)), window[3])
-        self._beside[rows, cols][beside] += sign
-        _count_sides(self._beside_from, (rows, cols), beside, viewpoint, sign)
+        self._hits.reshape(-1)[self._flat(flat, window)[0]] += sign
+        if self._draws:
+            self._count_sides(window, mask, flat, viewpoint, sign)
         if sign > 0:
-            cv2.accumulate(mask, self._misses[rows, cols])
+            cv2.accumulate(mask, self._misses[_slices(window)])
         else:
-            cv2.subtract(self._misses[rows, cols], mask, self._misses[rows, cols], dtype=cv2.CV_32F)
+            misses = self._misses[_slices(window)]
+            cv2.subtract(misses, mask, misses, dtype=cv2.CV_32F)
         self._dirty = window if self._dirty is None else _union(self._dirty, window)
+
+    def _count_sides(
+        self, window: LatticeWindow, mask: Mask, flat: IntArray, viewpoint: tuple[float, float], sign: int
+    ) -> None:
+        """Count misses near the end of what was crossed, and from where these and hits were seen, to an eighth turn."""
+        near = cv2.subtract(mask, cv2.erode(mask, self._same_wall))
+        hits = len(flat)
+        at, rows, cols = self._flat(np.concatenate((flat, np.flatnonzero(near.view(np.bool_)))), window)
+        self._beside.reshape(-1)[at[hits:]] += sign
+        away = viewpoint[0] - rows, viewpoint[1] - cols
+        far = np.maximum(np.hypot(*away), 1e-9)
+        for of_hits, of_misses, part in zip(self._hit_from, self._beside_from, away, strict=True):
+            side = (sign * np.rint(part / far)).astype(np.int16)
+            of_hits.reshape(-1)[at[:hits]] += side[:hits]
+            of_misses.reshape(-1)[at[hits:]] += side[hits:]
+
+    def _flat(self, cells: IntArray, window: LatticeWindow) -> tuple[IntArray, IntArray, IntArray]:
+        """Convert flat indices in a window to those in the arrays, and to rows and columns in the window."""
+        row, col, _, width = window
+        rows = cells // width  # with the product sooner than np.divmod
+        cols = cells - rows * width
+        return (rows + row) * self._lattice.cols + (cols + col), rows, cols
 
     def _crossed(self, outline: FloatArray, window: LatticeWindow) -> Mask:
         """Mark the cells that beams cross before they end: the inside of the scan's outline [m] without its rim."""
         lattice = self._lattice
         # OpenCV puts integer coordinates on cell centres.
-        corner = np.array([lattice.col0 + window[1], lattice.row0 + window[0]]) + 0.5
-        vertices = np.rint((outline / lattice.resolution - corner) * (1 << SUBCELL_BITS)).astype(np.int32)
+        corners = outline / lattice.resolution
+        corners[:, 0] -= lattice.col0 + window[1] + 0.5
+        corners[:, 1] -= lattice.row0 + window[0] + 0.5
+        corners *= 1 << SUBCELL_BITS
+        vertices = np.rint(corners, out=corners).astype(np.int32)
         mask = np.zeros((window[2], window[3]), dtype=np.uint8)
         cv2.fillPoly(mask, [vertices], 1, cv2.LINE_8, SUBCELL_BITS)
         cv2.polylines(mask, [vertices], True, 0, 1, cv2.LINE_8, SUBCELL_BITS)
@@ -203,18 +232,15 @@ class EvidenceGrid:
             # What is drawn of a cell depends on those around it.
             window = self._wider(self._dirty, self._reach)
             rows, cols = _slices(window)
-            hits, misses = self._hits[rows, cols], self._misses[rows, cols]
-            most_hits, most_misses = self._percent.shape
-            if hits.max() >= most_hits or misses.max() >= most_misses:
-                most_hits = max(most_hits, 16 + int(1.25 * hits.max()))
-                most_misses = max(most_misses, 16 + int(1.25 * float(misses.max())))
+            misses, (stands, hits) = self._misses[rows, cols], self._standing(window)
+            most, (most_hits, most_misses) = (int(hits.max(initial=0)), int(misses.max())), self._percent.shape
+            if most[0] >= most_hits or most[1] >= most_misses:
+                most_hits = max(most_hits, 16 + int(1.25 * most[0]))
+                most_misses = max(most_misses, 16 + int(1.25 * most[1]))
                 self._percent = self._probabilities(most_hits, most_misses)
-            places = hits * self._percent.shape[1]
-            places += misses.astype(np.int32)
-            # What has gone is free, however long it stood there.
-            gone = self._faded(window) & (misses > 0.0)
-            np.copyto(places, misses.astype(np.int32), where=gone)
-            self._cells[rows, cols] = self._percent.ravel().take(places)
+            places = misses.astype(np.int32)
+            places.reshape(-1)[stands] += hits * self._percent.shape[1]
+            self._cells[rows, cols] = self._percent.reshape(-1).take(places)
             self._redrawn = self._dirty if self._redrawn is None else _union(self._redrawn, self._dirty)
             self._dirty = None
         cells = self._cells.copy()
@@ -259,48 +285,66 @@ class EvidenceGrid:
             (row, last_row), (col, last_col) = (cells.tolist() for cells in lattice.cells(np.stack(within)))
             n_rows, n_cols = last_row + 1 - row, last_col + 1 - col
         hits, misses = (a[row : row + n_rows, col : col + n_cols] for a in (self._hits, self._misses))
-        through = misses >= least + hits * np.float32(share)
+        through, met = misses >= least, np.flatnonzero(hits > 0)
+        at = self._flat(met, (row, col, *through.shape))[0]
+        often = self._misses.reshape(-1).take(at) >= least + self._hits.reshape(-1).take(at) * np.float32(share)
+        through.reshape(-1)[met] = often
         span = 2 * math.ceil(apart / lattice.resolution) + 1
-        solid = ((hits > 0) & ~through).astype(np.uint8)
-        through &= cv2.dilate(solid, np.ones((span, span), dtype=np.uint8)) == 0
-        return row + lattice.row0, col + lattice.col0, through
+        solid = np.zeros(through.shape, dtype=np.uint8)
+        solid.reshape(-1)[met] = ~often
+        beside = cv2.dilate(solid, np.ones((span, span), dtype=np.uint8))
+        return row + lattice.row0, col + lattice.col0, np.greater(through, beside.view(np.bool_), out=through)
 
-    def _faded(self, window: LatticeWindow) -> BoolArray:
-        """Mark the cells of a window in which something stood that has gone.
+    def _standing(self, window: LatticeWindow) -> tuple[IntArray, Counts]:
+        """List the cells of a window, flat, in which something was hit that has not gone since, and those hits.
 
         The noise of a wall was gone through, too, often, but the wall beside it was not: what counts are the hits
         around a cell, and how many of them were gone through as often.
         """
         around = self._wider(window, self._reach)
-        cells = _slices(around)
-        hits = self._hits[cells].astype(np.float32)
-        # Below, values of the few cells that were hit.
-        at = np.divmod(np.flatnonzero(hits), hits.shape[1])
-        hit, missed, beside = hits[at], self._misses[cells][at], self._beside[cells][at]
-        span = (2 * self._noise + 1, 2 * self._noise + 1)
-        enough = GONE_SHARE * cv2.boxFilter(hits, -1, span, normalize=False)
-
-        def crossed_again(through: Counts) -> BoolArray:
-            """Mark the cells around which enough of the hits were gone through as often."""
-            surely, again = np.zeros(hits.shape, dtype=np.uint8), np.zeros_like(hits)
-            surely[at], again[at] = through >= GONE, np.minimum(hit, through)
-            crossed: BoolArray = cv2.boxFilter(again, -1, span, normalize=False) >= enough
-            return crossed & (cv2.dilate(surely, np.ones(span, dtype=np.uint8)) > 0)
-
-        faded = crossed_again(missed - beside)
+        # Few cells were hit: what is asked of those is not computed for the others.
+        met = np.flatnonzero(self._hits[_slices(around)] > 0)
+        at, rows, cols = self._flat(met, around)
+        hits, misses, beside = self._hits.reshape(-1)[at], self._misses.reshape(-1)[at], self._beside.reshape(-1)[at]
         # Who ended just behind what was seen from the same side went through its place.
-        alike = np.zeros_like(hit)
-        for hit_from, beside_from in zip(self._hit_from, self._beside_from, strict=True):
-            alike += hit_from[cells][at].astype(np.float32) * beside_from[cells][at]
-        same_side = alike > SAME_SIDE * hit * beside
-        if same_side.any():
-            # What they ended at still stands: two faces seen along their wall from one end take each other away.
-            behind = crossed_again(np.where(same_side, missed, missed - beside))
-            stands = np.zeros(hits.shape, dtype=np.uint8)
-            stands[at] = hit * self._config.log_odds_hit > missed * self._config.log_odds_miss
-            stands &= ~behind.view(np.uint8)
-            faded |= behind & (cv2.dilate(stands, self._same_wall) > 0)
-        return faded[window[0] - around[0] :, window[1] - around[1] :][: window[2], : window[3]]
+        (hit_row, hit_col), (row, col) = (
+            [sums.reshape(-1).take(at).astype(np.int32) for sums in both]
+            for both in (self._hit_from, self._beside_from)
+        )
+        same_side = hit_row * row + hit_col * col > SAME_SIDE * (hits * beside)
+        cells = (met, around[2:])
+        faded = self._crossed_again(cells, hits, misses - np.where(same_side, np.int16(0), beside))
+        # That leaves standing what they ended at: two faces seen along their wall from one end take each other away.
+        config = self._config
+        solid = hits.astype(np.float32) * np.float32(config.log_odds_hit) > misses * np.float32(config.log_odds_miss)
+        faded &= self._near(cells, ~faded & solid, self._same_wall)
+        faded |= self._crossed_again(cells, hits, misses - beside)
+        stands = ~faded | (misses <= 0.0)
+        rows += around[0] - window[0]
+        cols += around[1] - window[1]
+        stands &= (rows >= 0) & (rows < window[2]) & (cols >= 0) & (cols < window[3])
+        return (rows * window[3] + cols)[stands], hits[stands]
+
+    def _crossed_again(self, cells: WindowCells, hits: Counts, through: Counts) -> BoolArray:
+        """Mark the cells around which enough of the hits were gone through afterwards, of counts of each."""
+        (met, shape), span = cells, 2 * self._noise + 1
+        sums = []
+        for counts in (np.minimum(hits, through), hits):
+            # Of whole numbers of 16 bits in half the time that single precision takes.
+            whole = np.zeros(shape, dtype=np.int16)
+            whole.reshape(-1)[met] = counts
+            sums.append(cv2.boxFilter(whole, cv2.CV_32F, (span, span), normalize=False).reshape(-1).take(met))
+        enough: BoolArray = sums[0] >= GONE_SHARE * sums[1]
+        return enough & self._near(cells, through >= GONE, np.ones((span, span), dtype=np.uint8))
+
+    @staticmethod
+    def _near(cells: WindowCells, marked: BoolArray, reach: Mask) -> BoolArray:
+        """Mark the cells around which one is marked."""
+        met, shape = cells
+        mask = np.zeros(shape, dtype=np.uint8)
+        mask.reshape(-1)[met] = marked
+        near: BoolArray = cv2.dilate(mask, reach).reshape(-1).take(met) > 0
+        return near
 
     def _wider(self, window: LatticeWindow, reach: int) -> LatticeWindow:
         """Widen a window by ``reach`` cells to all sides, as far as the arrays go."""
@@ -337,17 +381,3 @@ def _slices(window: LatticeWindow) -> tuple[slice, slice]:
 def _union(a: LatticeWindow, b: LatticeWindow) -> LatticeWindow:
     row, col = min(a[0], b[0]), min(a[1], b[1])
     return (row, col, max(a[0] + a[2], b[0] + b[2]) - row, max(a[1] + a[3], b[1] + b[3]) - col)
-
-
-def _count_sides(
-    sums: list[np.ndarray[Any, np.dtype[np.int16]]],
-    window: tuple[slice, slice],
-    cells: tuple[IntArray, IntArray],
-    viewpoint: tuple[float, float],
-    sign: int,
-) -> None:
-    """Add to two sums the direction, to an eighth of a turn, in which the viewpoint lies from cells of a window."""
-    away = [at - axis for at, axis in zip(viewpoint, cells, strict=True)]
-    far = np.maximum(np.hypot(*away), 1e-9)
-    for total, part in zip(sums, away, strict=True):
-        total[window][cells] += (sign * np.rint(part / far)).astype(np.int16)

@@ -15,6 +15,7 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.beams import Beams, clean, hit_points, matched_range, thin_points
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.door_fusion import fuse_doors
+from closedrooms.mapping.glass.leaks import without_leaks
 from closedrooms.mapping.glass.met_surfaces import Glimpse
 from closedrooms.mapping.glass.panes import Panes
 from closedrooms.mapping.graph.keyframe import Keyframe
@@ -66,6 +67,7 @@ class Mapper:
         self._corrected = self._finished = False
         self._glimpsed = Pose2()
         self._panes = Panes(self._config.resolution)
+        self._without_leaks: tuple[OccupancyGrid, OccupancyGrid] | None = None
         self._pose = Pose2()
         self._prediction = MotionPrediction(self._config.recovery, self._events)
         self._motion = UncertainMotion()
@@ -74,6 +76,7 @@ class Mapper:
         self._usual_score = 0.0
         self._stamps: list[float] = []
         self._references: list[tuple[int, Pose2]] = []
+        self._latest: dict[tuple[float, float, float], Keyframe] = {}
         self._travelled = 0.0
 
     @property
@@ -139,11 +142,12 @@ class Mapper:
         if self.keyframes:
             self._match(points, beams, scan.stamp, before, step)
         self._prediction.moved(before.inverse() @ self._pose)
-        if self._wants_keyframe():
+        if self._wants_keyframe(self._latest.get(scan.robot_T_sensor)):
             ends = beams().points
             surfaces = ends[self._local.crossed.stands_still(self._pose, ends)]
             number = len(self.keyframes)
             self._insert(Keyframe(number, scan.stamp, self._pose, beams(), points, surfaces, self._travelled))
+            self._latest[scan.robot_T_sensor] = self.keyframes[-1]
         self._last_odometry = odometry
         latest = self.keyframes[-1]
         keyframe_T_robot = latest.pose.inverse() @ self._pose
@@ -300,24 +304,28 @@ class Mapper:
             self._events.note(Event.RECOVERED, stamp)
         return match
 
-    def _far(self, pose: Pose2, stretch: float = 1.0) -> bool:
-        """Check whether a pose is as far from the latest keyframe as keyframes are apart."""
-        latest, config = self.keyframes[-1].pose, self._config
+    def _far(self, pose: Pose2, stretch: float = 1.0, *, latest: Keyframe | None = None) -> bool:
+        """Check whether a pose is as far from a keyframe, by default the latest, as keyframes are apart."""
+        last, config = (latest or self.keyframes[-1]).pose, self._config
         return (
-            latest.distance(pose) >= stretch * config.keyframe_distance
-            or abs(wrap_angle(latest.theta - pose.theta)) >= stretch * config.keyframe_angle
+            last.distance(pose) >= stretch * config.keyframe_distance
+            or abs(wrap_angle(last.theta - pose.theta)) >= stretch * config.keyframe_angle
         )
 
-    def _wants_keyframe(self) -> bool:
-        """Check whether the scan goes into the map: far enough from the last one, later where it fits poorly."""
+    def _wants_keyframe(self, latest: Keyframe | None) -> bool:
+        """Check whether the scan goes into the map: far enough from the last one, later where it fits poorly.
+
+        Args:
+            latest: The last one of the same lidar: of two that look ahead and back, neither sees what the other does.
+        """
         recovery = self._config.recovery
-        if not self.keyframes:
+        if latest is None and not self._lost:
             return True
         if self._lost:
             # A map should not be given up while the next scan may still find back.
             far = self._travelled - self.keyframes[-1].travelled > recovery.lost_distance
             return far or self._lost >= recovery.submap_after
-        return self._far(self._pose, 1.0 if self._trusted else self._config.poor_spacing)
+        return self._far(self._pose, 1.0 if self._trusted else self._config.poor_spacing, latest=latest)
 
     def _insert(self, keyframe: Keyframe) -> None:
         """Add a keyframe to graph and local map, and close a loop where there is one."""
@@ -359,6 +367,15 @@ class Mapper:
 
     def grid(self) -> OccupancyGrid:
         """Draw the map so far, from the keyframes' present poses."""
+        grid = self._draw_with_panes()
+        if not len(self._panes.segments):
+            return grid
+        if self._without_leaks is None or self._without_leaks[0] is not grid:
+            places = np.array([(keyframe.pose.x, keyframe.pose.y) for keyframe in self.keyframes])
+            self._without_leaks = grid, without_leaks(grid, places)
+        return self._without_leaks[1]
+
+    def _draw_with_panes(self) -> OccupancyGrid:
         grid = self._draw()
         new = len(self.keyframes) - self._looked
         if not self._config.glass or new < (1 if self._finished else LOOK):

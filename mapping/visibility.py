@@ -4,7 +4,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
-from closedrooms.mapping.beams import Beams
+from closedrooms.mapping.beams import Beams, by_bearing
 
 MARGIN = 0.25
 """Distance before the end of a beam up to which a surface is taken for the one it ended on [m]: five cells, the noise
@@ -34,14 +34,9 @@ def conflict(a: Beams, b: Beams, a_T_b: Pose2) -> float | None:
 
 def _passed_through(beams: Beams, points: FloatArray) -> float | None:
     """Measure which share of the points in a scan's view, shape (n, 2), its frame, lies well before its ends."""
-    outline = beams.outline - beams.origin
-    bearings, ranges = np.arctan2(outline[:, 1], outline[:, 0]), np.hypot(outline[:, 0], outline[:, 1])
-    seen = ranges > 0.0
-    if np.count_nonzero(seen) < 2 or not len(points):
+    bearings, ranges = by_bearing(beams)
+    if len(bearings) < 2 or not len(points):
         return None
-    bearings, ranges = bearings[seen], ranges[seen]
-    order = np.argsort(bearings, kind="stable")
-    bearings, ranges = bearings[order], ranges[order]
     offsets = points - beams.origin
     bearing, distance = np.arctan2(offsets[:, 1], offsets[:, 0]), np.hypot(offsets[:, 0], offsets[:, 1])
     after = np.clip(np.searchsorted(bearings, bearing), 1, len(bearings) - 1)

@@ -133,7 +133,8 @@ class Simulation:
         """
         world_T_robot = self.world_T_robot
         scan, bodies = self._lidar.sweep(world_T_robot, self._time, self._beam_poses())
-        hit = set(bodies.tolist())
+        # Sooner than a set of all: bodies have small numbers, -1 without a hit.
+        hit = set((np.flatnonzero(np.bincount(bodies + 1)) - 1).tolist())
         doors = self._building.door_of_body
         seen = [doors[body] for body in sorted(hit & doors.keys()) if doors[body].closed]
         robot_T_world = world_T_robot.inverse()

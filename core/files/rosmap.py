@@ -32,6 +32,8 @@ SPREAD = 24
 HALF_WALL, MOST_WIDE = 0.2, 0.1
 # Less floor is no room [square metres].
 SMALLEST_ROOM = 2.0
+# Cells above this show no door of 0.9 m [m].
+COARSE = 0.5
 # No yaw in radians is larger, but one in degrees is.
 LARGEST_YAW = 2.0 * math.pi + 0.1
 WHAT = "a ROS map (image, resolution, origin)"
@@ -193,9 +195,14 @@ def read_ros_map(path: Path, *, allow_outside: bool = False) -> RosMap:
         why = f"a JPEG spreads greys: up to {SPREAD} from {PIXEL_UNKNOWN} counts as unknown"
         remarks.append(Remark(action="guessed", what="cells", why=why, names=(image.name,)))
     table = _raw() if mode == "raw" else _meanings(fields, mode, path, spread=SPREAD if lossy else 1)
+    remarks += _unsaid(fields, mode, path)
     # A turned grid keeps its own axes, with its corner as their origin.
     corner, map_T_grid = ((x, y), IDENTITY) if yaw == 0.0 else ((0.0, 0.0), Pose2(x, y, yaw))
-    grid = _grid(image, table, resolution, *corner)
+    grid, counts = _grid(image, table, resolution, *corner)
+    remarks += _odd_greys(counts, fields, mode, path)
+    if resolution > COARSE:
+        why = f"{resolution:g} m a cell shows no door (centimetres?); taken as metres"
+        remarks.append(Remark(action="guessed", what="resolution", why=why))
     if _looks_inverted(grid):
         why = "what is free is as thin as walls, what is occupied is wide: an inverted picture (negate)?"
         remarks.append(Remark(action="guessed", what="cells", why=why))
@@ -225,21 +232,55 @@ def read_bare_picture(path: Path, *, resolution: float) -> OccupancyGrid:
     Raises:
         InvalidInputError: See :func:`closedrooms.core.files.map_picture.read_picture`.
     """
-    return _grid(path, _meanings({}, "trinary", path), resolution, 0.0, 0.0)
+    return _grid(path, _meanings({}, "trinary", path), resolution, 0.0, 0.0)[0]
 
 
-def _grid(picture: Path, table: CellArray, resolution: float, x: float, y: float) -> OccupancyGrid:
-    """Make the grid that a picture holds when ``table`` gives the cell of each grey value."""
+def _grid(
+    picture: Path, table: CellArray, resolution: float, x: float, y: float
+) -> tuple[OccupancyGrid, npt.NDArray[np.int64]]:
+    """Make the grid that a picture holds when ``table`` gives the cell of each grey value, and count the greys.
+
+    Returns:
+        The grid, and how many opaque pixels have each grey, shape (256,).
+    """
     import cv2
 
     pixels, opaque = read_picture(picture)
+    mask = None if opaque is None else opaque.astype(np.uint8)
+    counts = cv2.calcHist([pixels], [0], mask, [256], [0.0, 256.0]).ravel().astype(np.int64)
     # Ten times as quick as indexing the table, and in place where nobody else holds the picture.
     upwards = np.ascontiguousarray(pixels[::-1])
     own = upwards if upwards.flags.writeable else None
     cells: CellArray = cv2.LUT(upwards, table.view(np.uint8), dst=own).view(np.int8)
     if opaque is not None:
         cells[~opaque[::-1]] = UNKNOWN
-    return OccupancyGrid(GridFrame(resolution, x, y, *pixels.shape), handed_over(cells))
+    return OccupancyGrid(GridFrame(resolution, x, y, *pixels.shape), handed_over(cells)), counts
+
+
+def _odd_greys(counts: npt.NDArray[np.int64], fields: dict[str, Any], mode: str, path: Path) -> list[Remark]:
+    """Say where greys are taken for something else than other programs take them for.
+
+    Args:
+        counts: Pixels of each grey, shape (256,).
+        fields: Of the YAML.
+        mode: As it stands there.
+        path: Of the YAML.
+    """
+    if mode == "raw":
+        strange = int(counts[OCCUPIED + 1 : 255].sum())
+        why = f"greys from {OCCUPIED + 1} to 254 mean nothing in the mode raw (trinary?); unknown"
+        return [Remark(action="dropped", what="cells", why=why, count=strange, loss=True)] if strange else []
+    unknown = 255 - PIXEL_UNKNOWN if _negate(fields.get("negate", "0"), path) else PIXEL_UNKNOWN
+    count, free_below = int(counts[unknown]), _thresholds(fields, path)[0]
+    if not count:
+        return []
+    if mode == "scale":
+        why = f"{unknown}, unknown in the mode trinary, is nearly free in the mode scale; taken so"
+        return [Remark(action="guessed", what="cells", why=why, count=count)]
+    if free_below <= (255 - PIXEL_UNKNOWN) / 255:
+        return []
+    why = f"{unknown} means unknown, though free_thresh {free_below:g} makes it free"
+    return [Remark(action="guessed", what="cells", why=why, count=count)]
 
 
 def _read_fields(path: Path) -> dict[str, Any]:
@@ -281,7 +322,7 @@ def _origin(value: Any, path: Path, remarks: list[Remark]) -> tuple[float, float
     x, y, yaw = (float(v) for v in (*numbers, 0.0)[:3] if v is not None)
     for name, coordinate in (("x", x), ("y", y)):
         bounded(coordinate, -FARTHEST, FARTHEST, name=f"map origin {name}", unit="m", where=path)
-    if math.isnan(yaw):
+    if len(numbers) == 2 or math.isnan(yaw):
         remarks.append(Remark(action="guessed", what="yaw of the map", why="no number in the file, 0 was taken"))
         return x, y, 0.0
     turned = wrap_angle(bounded(yaw, -1e6, 1e6, name="map origin yaw", unit="rad", where=path))
@@ -324,6 +365,19 @@ def _negate(value: Any, path: Path) -> bool:
     if negate is None:
         raise InvalidInputError(f"map negate {repr_of(value)}", expected="0 or 1", where=path)
     return negate
+
+
+def _unsaid(fields: dict[str, Any], mode: str, path: Path) -> list[Remark]:
+    """Say which meanings of greys a file leaves open, and what was taken."""
+    if mode == "raw":
+        return []
+    free_below, occupied_above = _thresholds(fields, path)
+    taken = {"negate": "0", "free_thresh": f"{free_below:g}", "occupied_thresh": f"{occupied_above:g}"}
+    missing = {name: value for name, value in taken.items() if name not in fields}
+    if not missing:
+        return []
+    why = f"not in the file; taken: {', '.join(f'{name} {value}' for name, value in missing.items())}"
+    return [Remark(action="guessed", what="meaning of greys", why=why)]
 
 
 def _thresholds(fields: dict[str, Any], path: Path) -> tuple[float, float]:

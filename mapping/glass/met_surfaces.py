@@ -8,10 +8,12 @@ import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.pose import Pose2
-from closedrooms.mapping.glass.scan_view import faces
+from closedrooms.mapping.glass.scan_view import MOST_APART, faces
 from closedrooms.mapping.lattice import Lattice, grown
 
-NO_POINT: FloatArray = np.full((1, 2), np.nan)
+FIRST_POINTS = 65_536
+"""Points for which there is room at first; twice as much whenever it is full."""
+NO_POINTS: FloatArray = np.full((MOST_APART, 2), np.nan)
 """What stands between the points of two scans."""
 
 
@@ -49,7 +51,8 @@ class MetSurfaces:
     def clear(self) -> None:
         """Forget all points, because poses were corrected, but not which cells were told."""
         self._latest.fill(0)
-        self._before: npt.NDArray[np.int32] = np.zeros(1, dtype=np.int32)
+        self._before: npt.NDArray[np.int32] = np.zeros(FIRST_POINTS, dtype=np.int32)
+        self._points = 1
         self._glimpses: list[tuple[Glimpse, Pose2]] = []
         self._firsts: list[int] = []
 
@@ -61,7 +64,7 @@ class MetSurfaces:
         """Add glimpses, each with the pose of its keyframe, ``map_T_keyframe``."""
         if not glimpses:
             return
-        first = len(self._before)
+        begin = first = self._points
         for glimpse, pose in zip(glimpses, keyframe_poses, strict=True):
             self._firsts.append(first)
             self._glimpses.append((glimpse, pose))
@@ -71,19 +74,23 @@ class MetSurfaces:
         )
         if not len(points):
             return
-        padding = self._lattice.cover(points.min(axis=0), points.max(axis=0), margin=0)
+        x, y = points.T.copy()
+        low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
+        padding = self._lattice.cover(low, high, margin=0)
         if padding is not None:
             self._latest, self._told = grown(self._latest, padding), grown(self._told, padding)
         rows, cols = self._lattice.cells(points)
         cells = rows * self._lattice.cols + cols
         # Point after point of each cell in turn.
         order = np.argsort(cells, kind="stable")
-        cells, numbers = cells[order], (len(self._before) + order).astype(np.int32)
+        cells, numbers = cells[order], (begin + order).astype(np.int32)
         before = self._latest.ravel()[cells]
         np.copyto(before[1:], numbers[:-1], where=cells[1:] == cells[:-1])
         # Of the points in one cell the last one is written last.
         self._latest.ravel()[cells] = numbers
-        self._before = np.concatenate((self._before, np.empty(len(points), dtype=np.int32)))
+        self._points = first
+        if first > len(self._before):
+            self._before = np.concatenate((self._before, np.zeros(first, dtype=np.int32)))
         self._before[numbers] = before
 
     def near_normal(self, row: int, col: int, asked: BoolArray, limit: float) -> tuple[FloatArray, FloatArray]:
@@ -129,8 +136,12 @@ class MetSurfaces:
                 (low - (row, col), high - low),
             )
         )
-        found = np.argwhere(asked[there] & (self._latest[here] > 0) & ~self._told[here])
-        return found + low - (lattice.row0, lattice.col0)
+        found = (self._latest[here] > 0) & asked[there]
+        np.greater(found, self._told[here], out=found)
+        cells = np.flatnonzero(found)  # sooner than np.argwhere
+        rows = cells // found.shape[1]
+        first = np.subtract(low, (lattice.row0, lattice.col0), dtype=np.int64)
+        return np.stack((rows, cells - rows * found.shape[1]), axis=1) + first
 
     def _points_of(self, cells: IntArray) -> tuple[IntArray, IntArray]:
         """List the points in cells, in their order: numbers, and to which of the cells each belongs."""
@@ -150,11 +161,11 @@ class MetSurfaces:
 
         The directions of what was not met near its normal are NaN.
         """
-        ends = np.searchsorted(numbers, [*self._firsts[1:], len(self._before)])
+        ends = np.searchsorted(numbers, [*self._firsts[1:], self._points])
         begins = np.concatenate(([0], ends[:-1]))
         turns, places, towards = np.empty(len(numbers)), np.empty((len(numbers), 2)), np.empty((len(numbers), 2))
-        # Scans one after the other, a row of NaN behind each.
-        at, scans, begin = np.empty(len(numbers), dtype=np.int64), [NO_POINT], 1
+        # Scans one after the other, rows of NaN behind each.
+        at, scans, begin = np.empty(len(numbers), dtype=np.int64), [NO_POINTS], MOST_APART
         for k in np.flatnonzero(ends > begins).tolist():
             glimpse, pose = self._glimpses[k]
             mine = slice(begins[k], ends[k])
@@ -164,8 +175,8 @@ class MetSurfaces:
             towards[mine] = points - glimpse.origin
             places[mine] = pose.transform(glimpse.keyframe_T_robot.transform(points))
             turns[mine] = glimpse.keyframe_T_robot.theta + pose.theta
-            scans += [glimpse.points, NO_POINT]
-            begin += len(glimpse.points) + 1
+            scans += [glimpse.points, NO_POINTS]
+            begin += len(glimpse.points) + MOST_APART
         normals, incidence = faces(np.concatenate(scans), at, towards)
         angles = np.arctan2(normals[:, 1], normals[:, 0]) + turns
         return places, np.where(incidence < limit, angles, np.nan)

@@ -86,7 +86,9 @@ def _mapped(log: CarmenLog) -> RecordedRun:
     remarks = _reading_remarks(log)
     kind = _kind(log)
     if kind is None:
-        return RecordedRun((), np.empty((0, 3)), None, tuple(remarks))
+        why = "they say neither where the laser sits nor where it looks"
+        unsaid = [Remark(action="dropped", what=f"{k} scans", why=why, count=len(s)) for k, s in log.scans.items()]
+        return RecordedRun((), np.empty((0, 3)), None, (*remarks, *unsaid))
     remarks += [
         Remark(action="dropped", what=f"{other} scans", why=f"{kind} is mapped", count=len(scans))
         for other, scans in log.scans.items()

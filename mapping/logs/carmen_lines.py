@@ -122,6 +122,8 @@ class CarmenLog:
         n = _count(words[1])
         ranges = _numbers(words[2 : 2 + n], n)
         tail = words[2 + n :]
+        if not all(map(_is_number, tail[:7])) or (len(tail) > 8 and not _is_number(tail[8])):
+            raise ValueError("more or fewer readings than the line says")
         stamp = _stamp(tail[6], tail[-1])
         return ScanLine(ranges, None, 0.0, None, self._pose(tail[0:3]), self._pose(tail[3:6]), stamp, len(self.moves))
 
@@ -239,6 +241,14 @@ def _even_step(view: float, beams: int, *, hint: float = 0.0) -> float:
     """
     gaps = beams - 1 if beams % 2 or hint == beams - 1 else beams
     return view / max(gaps, 1)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _numbers(words: list[str], count: int) -> FloatArray:

@@ -1,6 +1,6 @@
 """Odometry against the scans: whether it fits them at all, and in which unit its lengths are."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -9,6 +9,8 @@ from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.core.scan import LaserScan
 
+Scans = Sequence[LaserScan] | Mapping[int, LaserScan]
+"""Scans by their number."""
 UNITS = {1.0: "metres", 0.01: "centimetres", 0.001: "millimetres"}
 """Units that writers of logs put, in metres."""
 LEAST_MOTION, MOST_MOTION = 0.5, 1.5
@@ -42,12 +44,12 @@ def contradicts(scans: Sequence[LaserScan], odometry: FloatArray) -> bool:
         odometry: ``odom_T_robot`` at each as written, shape (n, 3).
     """
     for weights, farthest in ((DRIVING, np.inf), (TURNING, MOST_MOTION)):
-        pairs = _pairs(odometry, weights, farthest=farthest)
+        pairs = pairs_that_move(odometry, weights, farthest=farthest)
         # No lidar measures the same twice: one that hangs says nothing about the motion.
         pairs = [(i, j) for i, j in pairs if not np.array_equal(scans[i].ranges, scans[j].ranges, equal_nan=True)]
         if len(pairs) < LEAST_PAIRS:
             continue
-        moves, *others = _fits(scans, [odometry, *(odometry * np.array(factors) for factors in OTHERS)], pairs)
+        moves, *others = fits(scans, [odometry, *(odometry * np.array(factors) for factors in OTHERS)], pairs)
         if any(np.median(other - moves) >= MARGIN for other in others):
             return True
     return False
@@ -66,9 +68,9 @@ def find_unit(scans: Sequence[LaserScan], odometry: FloatArray) -> float | None:
     margins = {}
     for unit in UNITS:
         scaled = odometry * np.array([unit, unit, 1.0])
-        pairs = _pairs(scaled, DRIVING, farthest=MOST_MOTION)
+        pairs = pairs_that_move(scaled, DRIVING, farthest=MOST_MOTION)
         if len(pairs) >= LEAST_PAIRS:
-            moves, turns = _fits(scans, [scaled, odometry * np.array([0.0, 0.0, 1.0])], pairs)
+            moves, turns = fits(scans, [scaled, odometry * np.array([0.0, 0.0, 1.0])], pairs)
             margins[unit] = float(np.median(moves - turns))
     best = max(margins, key=lambda unit: margins[unit], default=None)
     return None if best is None or margins[best] < MARGIN else best
@@ -80,7 +82,7 @@ def unit_remark(units: str) -> Remark:
     return Remark(action="guessed", what="units of the odometry", why=why)
 
 
-def _pairs(odometry: FloatArray, weights: tuple[float, float], *, farthest: float) -> list[tuple[int, int]]:
+def pairs_that_move(odometry: FloatArray, weights: tuple[float, float], *, farthest: float) -> list[tuple[int, int]]:
     """Choose pairs of scans, spread over the run, between which the robot moves so far.
 
     Args:
@@ -104,7 +106,7 @@ def _pairs(odometry: FloatArray, weights: tuple[float, float], *, farthest: floa
     return [(int(i), int(behind[i])) for i in chosen]
 
 
-def _fits(scans: Sequence[LaserScan], tracks: Sequence[FloatArray], pairs: list[tuple[int, int]]) -> FloatArray:
+def fits(scans: Scans, tracks: Sequence[FloatArray], pairs: list[tuple[int, int]]) -> FloatArray:
     """Score pairs of scans by the motion in between: 0 to 1, how much of one lies on what the other saw.
 
     Returns:

@@ -14,6 +14,7 @@ from closedrooms.mapping.logs.bags.bag_options import BagOptions
 from closedrooms.mapping.logs.odometry_units import UNITS, contradicts, find_unit, unit_remark
 from closedrooms.mapping.logs.recorded_odometry import bridge_jumps, jump_remarks
 from closedrooms.mapping.logs.recorded_run import RecordedRun
+from closedrooms.mapping.logs.stated_view import with_fitting_view
 
 GZIP, ZIP, SQLITE, MCAP = b"\x1f\x8b", b"PK\x03\x04", b"SQLite format 3", b"\x89MCAP0\r\n"
 OLD_BAG = re.compile(rb"#ROS(?:BAG|RECORD|LOG) V(\d+\.\d+)")
@@ -60,7 +61,7 @@ def read_run(
     if not run.scans:
         found = "".join(f"; {remark}" for remark in run.remarks)
         raise InvalidInputError(f"no scan that can be used{found}", expected="laser scans", where=path)
-    return _fitting(_without_frozen_odometry(run))
+    return _of_one_lidar(_fitting(with_fitting_view(_without_frozen_odometry(run))))
 
 
 def _read(path: Path, options: BagOptions) -> RecordedRun:
@@ -131,6 +132,20 @@ def _fitting(run: RecordedRun) -> RecordedRun:
         why = "the odometry contradicts the scans (a wrong mounting or field of view?); found from the scans alone"
         return _by_scans_alone(run, Remark(action="guessed", what="motion", why=why, loss=True))
     return replace(run, odometry=scaled, remarks=(*run.remarks, unit_remark(UNITS[unit])))
+
+
+def _of_one_lidar(run: RecordedRun) -> RecordedRun:
+    """Keep the scans of the lidar that most are of, where there is no odometry: two that look elsewhere fit nowhere."""
+    mounts = [scan.robot_T_sensor for scan in run.scans]
+    usual = max(dict.fromkeys(mounts), key=mounts.count)
+    kept = np.array([mount == usual for mount in mounts])
+    if run.has_odometry or kept.all():
+        return run
+    why = "of another lidar on the same topic, which cannot be matched without odometry"
+    remark = Remark(action="dropped", what="scans", why=why, count=int((~kept).sum()), loss=True)
+    reference = None if run.reference is None else run.reference[kept]
+    scans = tuple(scan for scan, keep in zip(run.scans, kept, strict=True) if keep)
+    return replace(run, scans=scans, odometry=run.odometry[kept], reference=reference, remarks=(*run.remarks, remark))
 
 
 def _by_scans_alone(run: RecordedRun, remark: Remark) -> RecordedRun:

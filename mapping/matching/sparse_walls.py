@@ -24,22 +24,24 @@ def find_sparse_walls(points: FloatArray) -> SparseWalls | None:
     """
     if len(points) < 3:
         return None
-    steps = np.diff(points.T, axis=1)
-    wide = np.hypot(steps[0], steps[1]) > SPARSE
-    sparse = np.flatnonzero(np.concatenate((wide[:1], wide[1:] & wide[:-1], wide[-1:])))
+    x, y = np.ascontiguousarray(points.T)
+    dx, dy = x[1:] - x[:-1], y[1:] - y[:-1]
+    wide = np.hypot(dx, dy) > SPARSE
+    far = np.concatenate((wide[:1], wide[1:] & wide[:-1], wide[-1:]))
+    sparse = far.nonzero()[0]
     if not sparse.size:
         return None
     # Each point against the line through its two neighbours; the ends of a wall take the line of the point beside them.
-    before, after = steps[:, :-1], steps[:, 1:]
-    chord = before + after
+    x0, x1, y0, y1 = dx[:-1], dx[1:], dy[:-1], dy[1:]
+    chord = np.stack((x0 + x1, y0 + y1))
     length = np.hypot(chord[0], chord[1]) + 1e-9
-    off = np.abs(before[0] * after[1] - before[1] * after[0]) / length
-    straight = np.zeros(len(points), dtype=np.bool_)
-    straight[1:-1] = (off <= OFF_LINE) & ((before * after).sum(axis=0) > 0.0)
-    beside = np.clip(np.stack((sparse, sparse - 1, sparse + 1)), 0, len(points) - 1)
-    fits = straight[beside]
-    on_wall = fits.any(axis=0)
-    if not on_wall.any():
+    # One more at either end: nothing is straight there.
+    straight = np.zeros(len(points) + 2, dtype=np.bool_)
+    straight[2:-2] = (np.abs(x0 * y1 - y0 * x1) / length <= OFF_LINE) & (x0 * x1 + y0 * y1 > 0.0)
+    own, before = straight[sparse + 1], straight[sparse]
+    on_wall = own | before | straight[sparse + 2]
+    sparse = sparse[on_wall]
+    if not sparse.size:
         return None
-    chosen = beside[fits.argmax(axis=0), np.arange(len(sparse))][on_wall] - 1
-    return sparse[on_wall], chord[:, chosen] / length[chosen]
+    chosen = sparse - np.where(own, 1, np.where(before, 2, 0))[on_wall]
+    return sparse, chord[:, chosen] / length[chosen]

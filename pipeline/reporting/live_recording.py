@@ -58,7 +58,7 @@ class InterimPrediction:
             The prediction, and how well it meets the true rooms by door; ``None`` where there is nothing new.
         """
         new = [door.id for door in doors if door.id not in self._seen]
-        known = int(grid.known.sum())
+        known = int(np.count_nonzero(grid.known))
         large = grid.cells.size > LARGE
         if not doors or not ((new and not large) or known > GROWN * self._known):
             return None

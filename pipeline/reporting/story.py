@@ -130,7 +130,7 @@ def summarise_run(metrics: Mapping[str, Any]) -> str:
 
 def known_area(grid: OccupancyGrid) -> float:
     """Measure what a map knows [m²]."""
-    return float(grid.known.sum()) * grid.frame.resolution**2
+    return float(np.count_nonzero(grid.known)) * grid.frame.resolution**2
 
 
 def _is_another(door: str, old: Prediction, new: Prediction) -> bool:

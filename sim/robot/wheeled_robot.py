@@ -103,7 +103,10 @@ class WheeledRobot(DrivenRobot):
 
     def _feel(self) -> None:
         """Note what presses against the body."""
-        contacts = self._physics.bullet.getContactPoints(bodyA=self._body, physicsClientId=self._physics.client)
+        bullet, client = self._physics.bullet, self._physics.client
+        # Of our own robot only the body meets anything but the floor: what its wheels say there is not listed.
+        part = {} if self.model.foreign else {"linkIndexA": -1}
+        contacts = bullet.getContactPoints(bodyA=self._body, physicsClientId=client, **part)
         pressing = [c for c in contacts if c[2] != self._physics.floor and c[9] > PRESSES]
         if pressing:
             self._locate()

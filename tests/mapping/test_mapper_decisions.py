@@ -77,8 +77,23 @@ def test_a_pose_is_far_where_the_next_keyframe_would_be(pose: Pose2, stretch: fl
 def test_when_a_scan_becomes_a_keyframe(trusted: bool, lost: int, x: float, travelled: float, wanted: bool) -> None:
     mapper = mapper_at(Pose2())
     mapper._trusted, mapper._lost, mapper._pose, mapper._travelled = trusted, lost, Pose2(x, 0.0, 0.0), travelled
-    assert mapper._wants_keyframe() == wanted
-    assert Mapper()._wants_keyframe()
+    assert mapper._wants_keyframe(mapper.keyframes[-1]) == wanted
+    assert Mapper()._wants_keyframe(None)
+
+
+@pytest.mark.parametrize(("x", "lost", "wanted"), [(0.0, 0, True), (0.3, 0, True), (0.0, 1, False)])
+def test_the_first_scan_of_another_lidar_is_a_keyframe_unless_the_robot_is_lost(
+    x: float, lost: int, wanted: bool
+) -> None:
+    mapper = mapper_at(Pose2())
+    mapper._trusted, mapper._lost, mapper._pose = True, lost, Pose2(x, 0.0, 0.0)
+    assert mapper._wants_keyframe(None) == wanted
+
+
+def test_a_keyframe_is_wanted_where_the_last_one_of_the_same_lidar_is_far() -> None:
+    mapper = mapper_at(Pose2(), Pose2(0.3, 0.0, 0.0))
+    mapper._trusted, mapper._pose = True, Pose2(0.5, 0.0, 0.0)
+    assert [mapper._wants_keyframe(keyframe) for keyframe in mapper.keyframes] == [True, False]
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,11 @@ import math
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
 import pytest
 import shapely
 from shapely.affinity import rotate
-from shapely.geometry import box
+from shapely.geometry import Polygon, box
 
 from closedrooms.core.door import Segment
 from closedrooms.core.errors import InvalidInputError
@@ -192,3 +193,66 @@ def test_the_room_to_start_in_is_sought_once_for_a_plan(small: FloorPlan, monkey
     hidden_rooms(plan, doors)
     start_pose(plan)
     assert asked == ["r0"]
+
+
+@pytest.fixture
+def every_room_rough(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(start_pose_module, "ROUGH", 0)
+
+
+@pytest.mark.usefixtures("every_room_rough")
+@pytest.mark.parametrize("degrees", [0, 30, 90, 135])
+@pytest.mark.parametrize("crowded", [False, True])
+def test_the_start_in_cells_is_as_wide_as_the_widest_place(small: FloorPlan, degrees: int, crowded: bool) -> None:
+    things = (Furniture("f0", rotate(box(0.2, 0.2, 7, 1.8), degrees, origin=(0, 0))),) if crowded else ()
+    plan = replace(turned_by(small, degrees), name=f"in cells {degrees} {crowded}", furniture=things)
+    pose = start_pose(plan)
+    solid = shapely.union_all([wall_area(plan), *(thing.polygon for thing in things)])
+    widest = shapely.maximum_inscribed_circle(room_interior(plan, "r0").difference(solid), tolerance=0.01).length
+    # A cell is taken for blocked when a wall touches it, and its middle lies half a cell from where that may be.
+    assert solid.distance(shapely.Point(pose.x, pose.y)) == pytest.approx(widest, abs=2 * start_pose_module.CELL)
+    assert start_room(plan) == "r0"
+    off = math.remainder(pose.theta - math.radians(degrees), math.pi)
+    assert off == pytest.approx(0.0, abs=0.05)
+
+
+@pytest.mark.usefixtures("every_room_rough")
+@pytest.mark.parametrize("thickness", [0.01, 0.2])
+@pytest.mark.parametrize(("gap", "behind"), [(0.4, False), (0.55, False), (1.0, True)])
+def test_a_start_in_cells_is_not_behind_a_narrow_gap_nor_a_thin_wall(
+    small: FloorPlan, thickness: float, gap: float, behind: bool
+) -> None:
+    # The smaller part behind the wall holds the wider circle.
+    hall = PlanRoom("r0", "hall", shapely.union_all([box(0, 0, 7, 3), box(7, 0, 11, 4)]))
+    edges = [*pairwise(hall.polygon.exterior.coords), ((7.0, gap), (7.0, 3.0))]
+    walls = tuple(Wall(f"w{n}", (a, b), thickness) for n, (a, b) in enumerate(edges))
+    plan = replace(small, rooms=(hall,), walls=walls, doors=(), openings=(), start=None, name=f"gap {thickness} {gap}")
+    pose = start_pose(plan)
+    assert (pose.x > 7.0) == behind
+    assert wall_area(plan).distance(shapely.Point(pose.x, pose.y)) > 1.0
+
+
+@pytest.mark.usefixtures("every_room_rough")
+def test_in_cells_too_a_room_without_a_place_is_no_start(small: FloorPlan) -> None:
+    plan = replace(small, name="full", start=None, furniture=(Furniture("f0", box(0, 0, 12, 5)),))
+    with pytest.raises(InvalidInputError, match="without a place"):
+        start_pose(plan)
+
+
+def test_a_noisy_room_is_looked_at_in_cells_and_started_in_where_the_robot_fits(small: FloorPlan) -> None:
+    rng = np.random.default_rng(3)
+    floor = box(0, 0, 30, 12)
+    specks = [Polygon(box(x, y, x + 0.05, y + 0.05)) for x, y in rng.uniform((0.3, 0.3), (29.7, 11.7), (700, 2))]
+    outline = floor.difference(shapely.union_all(specks))
+    assert isinstance(outline, Polygon)
+    assert shapely.get_num_coordinates(outline) > start_pose_module.ROUGH
+    edges = pairwise(floor.exterior.coords)
+    lone = [((x, y + 0.025), (x + 0.05, y + 0.025)) for x, y, *_ in (speck.bounds for speck in specks)]
+    walls = (
+        *(Wall(f"w{n}", pair, 0.2) for n, pair in enumerate(edges)),
+        *(Wall(f"s{n}", pair, 0.05) for n, pair in enumerate(lone)),
+    )
+    room = PlanRoom("r0", "hall", outline)
+    plan = replace(small, rooms=(room,), walls=walls, doors=(), openings=(), start=None, name="noisy")
+    pose = start_pose(plan)
+    assert wall_area(plan).distance(shapely.Point(pose.x, pose.y)) > start_pose_module.CLEARANCE

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Literal
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
@@ -50,7 +51,7 @@ def grid_map(grid: OccupancyGrid) -> rr.GridMap:
     rerun draws the first row at the top and places the lower-left corner, so that the rows are turned.
     """
     row, col, rows, cols = grid.known_bounds() or (0, 0, 1, 1)
-    pixels = GREY[grid.cells[row : row + rows, col : col + cols].view(np.uint8)]
+    pixels = np.asarray(cv2.LUT(grid.cells[row : row + rows, col : col + cols].view(np.uint8), GREY), dtype=np.uint8)
     return picture(pixels, grid.frame.cropped(row, col, rows, cols))
 
 

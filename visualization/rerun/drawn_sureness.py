@@ -55,8 +55,9 @@ def probability_map(observed: OccupancyGrid, prediction: "Prediction") -> rr.Gri
     if rows.size:
         height, width = int(rows[-1] - rows[0]) + 1, int(cols[-1] - cols[0]) + 1
         frame = frame.cropped(int(rows[0]), int(cols[0]), height, width)
-    chance = np.maximum(percent.on(frame).cells, 0)[..., None] / 100.0
-    pixels = np.rint((1.0 - chance) * NOT_AT_ALL + chance * SURE).astype(np.uint8)
+    chance = np.arange(101)[:, None] / 100.0
+    shades = np.rint((1.0 - chance) * NOT_AT_ALL + chance * SURE).astype(np.uint8)
+    pixels = shades[np.maximum(percent.on(frame).cells, 0)]
     cells = known.on(frame)
     pixels[cells.free] = colours.FREE
     pixels[cells.occupied] = colours.OCCUPIED

@@ -44,6 +44,8 @@ def read_houseexpo(path: str | Path) -> FloorPlan:
     """
     path = Path(path)
     data = read_json(path, what=WHAT)
+    if isinstance(data, list):
+        raise InvalidInputError(f"a list of {len(data)} homes", expected="one HouseExpo home a file", where=path)
     remarks: list[Remark] = []
     outline = _outline(data, path, remarks)
     boxes = _boxes(data, path, remarks)
@@ -104,6 +106,9 @@ def _boxes(data: dict[str, Any], path: Path, remarks: list[Remark]) -> list[tupl
         raise InvalidInputError("room_category", expected="boxes by category", where=path)
     boxes = []
     for label, rows in categories.items():
+        if not isinstance(rows, list | None):
+            why = "no list of boxes"
+            remarks.append(Remark(action="dropped", what="rooms", why=why, names=(str(label),), loss=True))
         for number, row in enumerate(rows if isinstance(rows, list) else []):
             try:
                 x0, y0, x1, y1 = (float(v) for v in row)
@@ -137,6 +142,9 @@ def _rooms(
     # Strips between boxes are the walls that the boxes leave out: nobody walks there.
     wide = left.buffer(-NARROWEST / 2, join_style="mitre").buffer(NARROWEST / 2, join_style="mitre").intersection(left)
     corridors = _parts(wide, SMALLEST)
+    if corridors:
+        why = f"{sum(part.area for part in corridors):.1f} square metres that no box covers"
+        remarks.append(Remark(action="guessed", what="corridors", why=why, count=len(corridors)))
     labels += ["corridor"] * len(corridors)
     polygons += corridors
     strips = _parts(left.difference(shapely.union_all(corridors)), 0.0)

@@ -11,6 +11,7 @@ from shapely.geometry import Polygon
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
+from closedrooms.worlds.formats.door_stretches import straight_at_doors
 from closedrooms.worlds.formats.portals import Portal, pair_portals, plan_of_portals
 from closedrooms.worlds.formats.room_outlines import GAP, clean_outlines, hull_areas, outline_lines, repaired
 from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
@@ -50,7 +51,7 @@ def read_kth(path: str | Path) -> FloorPlan:
     rooms = tuple(PlanRoom(f"r{i:02d}", _label(space), polygon) for i, (space, polygon) in enumerate(kept))
     portals, widths = _portals([space for space, _ in kept], rooms, metres, remarks)
     dropped = sum(remark.count for remark in remarks if remark.action == "dropped" and remark.what == "doors")
-    plan = plan_of_portals(rooms, portals, remarks)
+    plan = plan_of_portals(straight_at_doors(rooms, portals), portals, remarks)
     plan = replace(plan, name=path.stem, meta={"source": path.name, "format": "kth"})
     source = Source(
         rooms=len(spaces),
@@ -112,7 +113,7 @@ def _outline(space: Any, name: str, metres: float, remarks: list[Remark]) -> Pol
         points += [p for p in (a, b) if not points or math.dist(p, points[-1]) > 1e-6]
     polygon = Polygon(points) if len(set(points)) >= 3 else None
     if polygon is None:
-        why = "their contour has fewer than 3 points"
+        why = "their contour lines have no four numbers" if broken else "their contour has fewer than 3 points"
         remarks.append(Remark(action="dropped", what="rooms", why=why, names=(name,), loss=True))
         return None
     if not polygon.is_valid:

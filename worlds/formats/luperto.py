@@ -40,8 +40,8 @@ def read_luperto(path: str | Path, level: str | None = None) -> FloorPlan:
     """
     path = Path(path)
     root = parse_xml(path, what=WHAT)
-    metres = _scale(root, path)
     remarks: list[Remark] = []
+    metres = _scale(root, path, remarks)
     name, spaces = _floor(root, level, path)
     names = [f"space {number} ({_label(space)})" for number, space in enumerate(spaces)]
     outlines = [_outline(space, name, metres, remarks) for space, name in zip(spaces, names, strict=True)]
@@ -62,12 +62,16 @@ def read_luperto(path: str | Path, level: str | None = None) -> FloorPlan:
     return settle(plan, remarks, Source(rooms=len(spaces), doors=len(portals) + dropped, walls=walls, within=GAP), path)
 
 
-def _scale(root: Any, path: Path) -> float:
+def _scale(root: Any, path: Path, remarks: list[Remark]) -> float:
     """Read the scale: metres per pixel."""
     scale = child(root, "scale")
     pixels = text(child(child(scale, "represented_distance"), "value"))
     real = text(child(child(scale, "real_distance"), "value"))
-    unit = text(child(child(scale, "real_distance"), "um")) or "cm"
+    unit = text(child(child(scale, "real_distance"), "um"))
+    if not unit.strip():
+        unit = "cm"
+        why = "its length has no unit (um); taken as centimetres"
+        remarks.append(Remark(action="guessed", what="scale", why=why))
     name = unit.strip().lower()
     factor = UNITS.get(name, UNITS.get(name.removesuffix("s"), UNITS.get(name.removesuffix("es"))))
     try:

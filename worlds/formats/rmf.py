@@ -17,7 +17,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.door_hinges import hung
 from closedrooms.worlds.formats.rmf_level import RmfLevel, read_level
-from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
+from closedrooms.worlds.formats.settlement import Source, merged, no_rooms, settle
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom, Wall
 
@@ -51,7 +51,7 @@ def read_rmf(path: str | Path, level: str | None = None) -> FloorPlan:
     read = _doors_on_walls(read_level(path, level, remarks), remarks)
     name = read.name
     if not read.walls:
-        lost = "".join(f"; {remark}" for remark in remarks if remark.what in ("vertices", "walls"))
+        lost = "".join(f"; {remark}" for remark in merged(remarks) if remark.what in ("vertices", "walls"))
         raise InvalidInputError(f"no walls on level {name}{lost}", expected="walls that close rooms", where=path)
     closers = _closers(read, remarks)
     lines = [LineString(s) for s in (*read.walls, *(door.segment for door in read.doors), *closers)]

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -76,6 +77,13 @@ def settle(plan: FloorPlan, remarks: Iterable[Remark], source: Source, path: Pat
     said += _unreached(kept)
     said += odd
     return replace(kept, remarks=tuple(merged(said)))
+
+
+def not_in_plan(fields: dict[str, Any], reasons: dict[str, str]) -> list[Remark]:
+    """Count the entries of parts of a file that a plan has no place for, given with the reason."""
+    parts = {name: fields.get(name) for name in reasons}
+    counts = {name: len(part) for name, part in parts.items() if isinstance(part, list | dict) and part}
+    return [Remark(action="dropped", what=name, why=reasons[name], count=count) for name, count in counts.items()]
 
 
 def merged(remarks: Iterable[Remark]) -> list[Remark]:

@@ -17,6 +17,8 @@ from closedrooms.core.names import is_name, shown
 from closedrooms.core.numbers import MAX_DOORS, WIDEST, check_count, is_number, repr_of
 from closedrooms.core.remarks import Remark
 
+# Properties that hold the state of a door.
+STATES = ("state", "status")
 # States of doors that stand open, and of those that do not; any other is told.
 OPEN = ("open", "opened", "false", "0")
 CLOSED = ("closed", "shut", "locked", "true", "1")
@@ -46,7 +48,7 @@ def read_doors(path: Path, *, remarks: list[Remark] | None = None) -> list[Close
 
     One without ``id`` is numbered ``d00``, ``d01``, ... The parts of a Multi geometry are doors of their own. Doors
     whose ``state`` says ``open``, in any case, are left out, as are those that are ``open`` or not ``closed`` by a
-    property of that name.
+    property of that name (or ``status``, ``is_open``, ``is_closed``).
 
     Args:
         path: The file.
@@ -85,8 +87,11 @@ def read_doors(path: Path, *, remarks: list[Remark] | None = None) -> list[Close
 
 def _is_open(properties: dict[str, Any]) -> bool:
     """Check whether the properties of a door say that it stands open."""
-    words = [str(properties.get(name, "")).strip().lower() for name in ("state", "open", "closed")]
-    return words[0] in OPEN or words[1] in {"true", "1", "yes"} or words[2] in {"false", "0", "no"}
+    states, yes, no = (
+        {str(properties.get(name, "")).strip().lower() for name in names}
+        for names in (STATES, ("open", "is_open"), ("closed", "is_closed"))
+    )
+    return bool(states & {*OPEN} or yes & {"true", "1", "yes"} or no & {"false", "0", "no"})
 
 
 def _bent(features: Sequence[GeoFeature], names: Sequence[str]) -> list[Remark]:
@@ -192,7 +197,7 @@ def _door(name: str, geometry: BaseGeometry, properties: dict[str, Any], path: P
         raise InvalidInputError(
             f"door {name!r} of width {repr_of(width)}", expected=f"metres above 0, at most {WIDEST:g}", where=path
         )
-    state = shown(properties.get("state") or "closed", longest=60)
+    state = shown(next((properties[key] for key in STATES if properties.get(key)), "closed"), longest=60)
     if isinstance(geometry, Point):
         return ClosedDoor(name, (geometry.x, geometry.y), None, width, state)
     if isinstance(geometry, LineString) and not geometry.is_ring:

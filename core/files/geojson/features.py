@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.geojson.geometry import LISTS, geometry_from, geometry_json
+from closedrooms.core.files.geojson.geometry import LISTS, geometry_from, geometry_json, has_open_ring
 from closedrooms.core.files.incoming import read_json, reading
 from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.names import shown
@@ -19,7 +19,8 @@ from closedrooms.core.remarks import Remark
 GeoFeature = tuple[BaseGeometry, dict[str, Any]]
 MAX_FEATURES = 1_000_000
 # Properties that editors and drivers spell in capitals (shapefiles, GDAL), by how they are spelt here.
-SPELT = ("id", "state", "width", "open", "closed")
+SPELT = ("id", "state", "status", "width", "open", "closed", "is_open", "is_closed")
+METRES = ("m", "metre", "metres", "meter", "meters")
 DEGREES = ("CRS84", "4326", "4979", "WGS84", "WGS 84")
 
 
@@ -51,7 +52,7 @@ def read_features(
     Args:
         path: The file.
         what: What it should be, for the message.
-        remarks: Told what was skipped.
+        remarks: Told what was skipped or closed.
 
     Raises:
         InvalidInputError: No GeoJSON, a feature without a valid geometry (named by its number), units other than
@@ -62,7 +63,7 @@ def read_features(
     if features is None:
         kind = data.get("type") if isinstance(data, dict) else type(data).__name__
         raise InvalidInputError(f"no FeatureCollection but {repr_of(kind)}", expected=what, where=path)
-    if data.get("units", "m") != "m":
+    if data.get("units", "m") not in METRES:
         raise InvalidInputError(f"units {repr_of(data['units'])}", expected="metres in the map frame ('m')", where=path)
     check_count(len(features), MAX_FEATURES, "features", path)
     if remarks is not None:
@@ -74,7 +75,13 @@ def read_features(
         why = "they have no geometry (null or empty)" if null > 1 else "it has no geometry (null or empty)"
         remarks.append(Remark(action="dropped", what="features" if null > 1 else "feature", why=why, count=null))
     with reading(path, what):
-        return [read_feature(number, feature, path) for number, feature in enumerate(features) if not _is_null(feature)]
+        given = [(number, feature) for number, feature in enumerate(features) if not _is_null(feature)]
+        read = [read_feature(number, feature, path) for number, feature in given]
+        unclosed = sum(has_open_ring(feature["geometry"]) for _, feature in given)
+    if unclosed and remarks is not None:
+        why = "the last point is not the first, closed"
+        remarks.append(Remark(action="repaired", what="rings" if unclosed > 1 else "ring", why=why, count=unclosed))
+    return read
 
 
 def _is_null(feature: Any) -> bool:

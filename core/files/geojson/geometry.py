@@ -59,6 +59,14 @@ def _positions(value: Any, depth: int) -> list[Any]:
     return value[:2]
 
 
+def has_open_ring(given: Any) -> bool:
+    """Check whether a geometry that was read is an area with a ring whose last point is not its first."""
+    if given["type"] == "GeometryCollection":
+        return any(map(has_open_ring, given["geometries"]))
+    areas = {"Polygon": [given["coordinates"]], "MultiPolygon": given["coordinates"]}.get(given["type"], [])
+    return any(ring[0][:2] != ring[-1][:2] for rings in areas for ring in rings if ring)
+
+
 def repaired_areas(geometry: BaseGeometry) -> BaseGeometry:
     """Make an invalid polygon valid and keep its areas."""
     valid = shapely.get_parts(shapely.make_valid(geometry))

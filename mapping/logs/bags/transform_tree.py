@@ -62,6 +62,8 @@ class TransformTree:
 
     def __init__(self) -> None:
         self._links: dict[tuple[str, str], _Link] = {}
+        self.changed: dict[str, None] = {}
+        """Frames whose static transform was published with different values, in order; the last ones count."""
 
     def __bool__(self) -> bool:
         return bool(self._links)
@@ -75,6 +77,8 @@ class TransformTree:
         if link is None or (static and not link.static):
             link = self._links[key] = _Link(matrix, static)
         elif static:
+            if not np.allclose(link.matrix, matrix, atol=STEADY):
+                self.changed[key[1]] = None
             link.matrix = matrix
         if static or link.static:
             return

@@ -331,3 +331,41 @@ def test_a_door_with_a_bend_and_one_on_another_are_told(tmp_path: Path) -> None:
     remarks: list[Remark] = []
     assert [door.id for door in read_doors(path, remarks=remarks)] == ["bent", "straight", "a", "b"]
     assert [(remark.action, remark.names) for remark in remarks] == [("guessed", ("bent",)), ("guessed", ("b",))]
+
+
+@pytest.mark.parametrize(("opened", "noun"), [(0, None), (1, "ring"), (2, "2 rings")])
+def test_rings_that_are_not_closed_are_closed_and_said(tmp_path: Path, opened: int, noun: str | None) -> None:
+    square = [[0, 0], [4, 0], [4, 3], [0, 3], [0, 0]]
+    geometries = [
+        {"type": "Polygon", "coordinates": [square[:-1] if opened > 0 else square]},
+        {"type": "MultiPolygon", "coordinates": [[square[:-1] if opened > 1 else [[*p, 1.0] for p in square]]]},
+    ]
+    features = [{"type": "Feature", "geometry": g, "properties": {"doors": []}} for g in geometries]
+    remarks: list[Remark] = []
+    rooms = read_rooms(collection(tmp_path / "r", *features), remarks=remarks)
+    assert [room.polygon.area for room in rooms] == [12.0, 12.0]
+    said = [] if noun is None else [f"repaired {noun}: the last point is not the first, closed"]
+    assert [str(remark) for remark in remarks] == said
+    assert not any(remark.loss for remark in remarks)
+
+
+@pytest.mark.parametrize("key", ["status", "is_open", "IS_OPEN", "is_closed", "Status"])
+def test_doors_that_are_open_by_another_property_are_left_out_and_said(tmp_path: Path, key: str) -> None:
+    words = {"status": ("open", "closed"), "is_open": (True, False), "is_closed": (0, 1)}[key.lower()]
+    features = [point(0, 0, id="a", **{key: words[0]}), point(3, 0, id="b", **{key: words[1]})]
+    doors, remarks = told(collection(tmp_path / "d", *features))
+    assert [door.id for door in doors] == ["b"]
+    assert remarks == ["dropped 1 door (a): the file says open"]
+
+
+@pytest.mark.parametrize(
+    ("units", "read"), [("m", True), ("meters", True), ("metre", True), ("cm", False), ([], False)]
+)
+def test_units_are_metres_in_any_spelling(tmp_path: Path, units: object, read: bool) -> None:
+    path = tmp_path / "d.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "units": units, "features": [point(0, 0, id="a")]}))
+    if read:
+        assert len(read_doors(path)) == 1
+    else:
+        with pytest.raises(InvalidInputError, match="units"):
+            read_doors(path)

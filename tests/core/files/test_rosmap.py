@@ -342,7 +342,7 @@ def test_a_jpeg_keeps_its_unknown_space_and_says_so(tmp_path: Path, quality: int
     saved[13:67, 13:97] = 254
     saved[30:32, 13:60] = 0
     Image.fromarray(saved).save(tmp_path / "map.jpg", quality=quality)
-    (tmp_path / "map.yaml").write_text("image: map.jpg\nresolution: 0.05\norigin: [0, 0, 0]\nfree_thresh: 0.196\n")
+    (tmp_path / "map.yaml").write_text(f"image: map.jpg\n{HEAD}")
     read = read_ros_map(tmp_path / "map.yaml")
     cells = read.grid.cells[::-1]
     assert (cells[saved == 205] == UNKNOWN).mean() > 0.98
@@ -350,7 +350,7 @@ def test_a_jpeg_keeps_its_unknown_space_and_says_so(tmp_path: Path, quality: int
     assert (cells[saved == 0] == OCCUPIED).all()
     assert [(remark.action, remark.names) for remark in read.remarks] == [("guessed", ("map.jpg",))]
     Image.fromarray(saved).save(tmp_path / "map.png")
-    (tmp_path / "map.yaml").write_text("image: map.png\nresolution: 0.05\norigin: [0, 0, 0]\nfree_thresh: 0.196\n")
+    (tmp_path / "map.yaml").write_text(f"image: map.png\n{HEAD}")
     assert not read_ros_map(tmp_path / "map.yaml").remarks
 
 
@@ -379,3 +379,78 @@ def test_a_yaw_in_degrees_and_an_inverted_picture_are_told(tmp_path: Path) -> No
     assert told(("0.0, 0.0, 0.0", "0.0, 0.0, 90.0")) == [("guessed", "yaw of the map")]
     assert told(("0.0, 0.0, 0.0", "0.0, 0.0, 6.283185307179586")) == []
     assert told(("negate: 0", "negate: 1")) == [("guessed", "cells")]
+
+
+@pytest.mark.parametrize(
+    ("left_out", "taken"),
+    [
+        (("occupied_thresh",), "occupied_thresh 0.65"),
+        (("free_thresh",), "free_thresh 0.196"),
+        (("negate",), "negate 0"),
+        (("negate", "free_thresh", "occupied_thresh"), "negate 0, free_thresh 0.196, occupied_thresh 0.65"),
+    ],
+)
+def test_meanings_of_greys_that_a_file_leaves_open_are_said(
+    tmp_path: Path, left_out: tuple[str, ...], taken: str
+) -> None:
+    head = "".join(line for line in HEAD.splitlines(keepends=True) if not line.startswith(left_out))
+    read = read_ros_map(save(tmp_path, np.array([[0, 205, 254]], dtype=np.uint8), head))
+    assert [str(remark) for remark in read.remarks] == [f"guessed meaning of greys: not in the file; taken: {taken}"]
+    assert not any(remark.loss for remark in read.remarks)
+    assert read.grid.cells.tolist() == [[OCCUPIED, UNKNOWN, FREE]]
+
+
+def test_a_whole_description_and_a_raw_one_leave_nothing_to_guess(tmp_path: Path) -> None:
+    pixels = np.array([[0, 205, 254]], dtype=np.uint8)
+    assert read_ros_map(save(tmp_path, pixels, HEAD)).remarks == ()
+    pixels = np.array([[0, 100, 255]], dtype=np.uint8)
+    raw = "resolution: 0.05\norigin: [-1.0, 2.0, 0.0]\n"
+    assert read_ros_map(save(tmp_path, pixels, raw, mode="raw")).remarks == ()
+
+
+@pytest.mark.parametrize("origin", ["[-1.0, 2.0]", "[-1.0, 2.0, .nan]"])
+def test_a_yaw_that_a_file_leaves_open_is_said(tmp_path: Path, origin: str) -> None:
+    head = HEAD.replace("[-1.0, 2.0, 0.0]", origin)
+    read = read_ros_map(save(tmp_path, np.array([[0, 205, 254]], dtype=np.uint8), head))
+    assert [str(remark) for remark in read.remarks] == ["guessed yaw of the map: no number in the file, 0 was taken"]
+    assert not read.turned
+
+
+@pytest.mark.parametrize(
+    ("mode", "free_thresh", "negate", "grey", "said", "loss"),
+    [
+        ("trinary", "0.25", "0", 205, "205 means unknown, though free_thresh 0.25 makes it free", False),
+        ("trinary", "0.25", "1", 50, "50 means unknown, though free_thresh 0.25 makes it free", False),
+        ("trinary", "0.25", "0", 204, None, False),
+        ("trinary", "0.19", "0", 205, None, False),
+        ("scale", "0.196", "0", 205, "205, unknown in the mode trinary, is nearly free in the mode scale", False),
+        ("scale", "0.196", "0", 128, None, False),
+        ("raw", "0.196", "0", 205, "greys from 101 to 254 mean nothing in the mode raw (trinary?); unknown", True),
+        ("raw", "0.196", "0", 255, None, False),
+    ],
+)
+def test_greys_that_other_programs_take_for_something_else_are_counted_and_said(
+    tmp_path: Path, mode: str, free_thresh: str, negate: str, grey: int, said: str | None, loss: bool
+) -> None:
+    pixels = np.full((4, 6), 100, dtype=np.uint8)
+    pixels[1, :3] = grey
+    head = HEAD.replace("0.196", free_thresh).replace("negate: 0", f"negate: {negate}")
+    remarks = read_ros_map(save(tmp_path, pixels, head, mode=mode)).remarks
+    assert [(said in remark.why, remark.count, remark.loss) for remark in remarks if said] == (
+        [(True, 3, loss)] if said else []
+    )
+    assert said or not remarks
+
+
+def test_greys_under_transparent_pixels_are_not_counted(tmp_path: Path) -> None:
+    pixels = np.full((4, 6, 4), 205, dtype=np.uint8)
+    pixels[..., 3] = 0
+    pixels[0] = (254, 254, 254, 255)
+    assert read_ros_map(save(tmp_path, pixels, HEAD, mode="scale")).remarks == ()
+
+
+@pytest.mark.parametrize(("resolution", "said"), [("0.5", False), ("0.6", True), ("5", True)])
+def test_cells_too_coarse_for_a_door_are_said(tmp_path: Path, resolution: str, said: bool) -> None:
+    head = HEAD.replace("resolution: 0.05", f"resolution: {resolution}")
+    read = read_ros_map(save(tmp_path, np.full((4, 6), 254, dtype=np.uint8), head))
+    assert ["centimetres?" in remark.why for remark in read.remarks] == ([True] if said else [])

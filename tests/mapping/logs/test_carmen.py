@@ -444,3 +444,9 @@ def test_a_mark_of_the_encoding_costs_no_line(tmp_path: Path) -> None:
     path = tmp_path / "run.log"
     path.write_text("\n".join([flaser(0.0), flaser(0.1)]), encoding="utf-8-sig")
     assert len(read_run(path).scans) == 2
+
+
+def test_a_log_with_a_rear_laser_only_says_why_it_is_refused(tmp_path: Path) -> None:
+    lines = [flaser(0.1 * i, stamp=10.0 + i).replace("FLASER", "RLASER") for i in range(3)]
+    with pytest.raises(InvalidInputError, match=r"dropped 3 RLASER scans: they say neither where the laser sits"):
+        read_run(write(tmp_path, *lines))

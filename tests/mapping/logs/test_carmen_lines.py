@@ -59,6 +59,8 @@ def test_the_words_of_each_kind_of_line() -> None:
         "ODOM 1.0 nan 0.5 0 0 0 1 host 1",
         "ODOM x 2.0 0.5 0 0 0 1 host 1",
         "FLASER 3 4.0 5.0 1 2 3 4 5 6 11.5 host 12.5",
+        "FLASER 1 4.0 5.0 1 2 3 4 5 6 11.5 host 12.5",
+        "FLASER 1 4.0 5.0 1 2 3 4 5 6 11.5 10.0.0.1 12.5",
         "FLASER 0 1 2 3 4 5 6 11.5 host 12.5",
         "FLASER 2 4.0 5.0 1 2 3 4 5 inf 11.5 host 12.5",
         "FLASER 2 4.0 5.0 1 2 3 4 5 6 nan host 12.5",

@@ -10,6 +10,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.formats.houseexpo import read_houseexpo
 from closedrooms.worlds.geometry import wall_area
+from closedrooms.worlds.library import load_world
 from closedrooms.worlds.outline import leaks
 from closedrooms.worlds.plan import FloorPlan
 
@@ -88,3 +89,20 @@ def test_a_room_whose_box_lies_in_a_smaller_one_is_named(tmp_path: Path) -> None
     path.write_text(json.dumps({"verts": [[0, 0], [8, 0], [8, 4], [0, 4]], "room_category": boxes}))
     (remark,) = [remark for remark in read_houseexpo(path).remarks if remark.loss]
     assert (remark.what, remark.names, remark.why) == ("rooms", ("bath",), "their boxes lie in those of smaller rooms")
+
+
+def test_floor_that_no_box_covers_and_categories_without_a_list_are_said(tmp_path: Path) -> None:
+    plan = read(tmp_path, SQUARE, Bedroom=[[0, 0, 4, 8]], Kitchen=[[6, 0, 10, 8]], Bath={"0": [0, 0, 1, 1]}, Hall=None)
+    said = {remark.what: remark for remark in plan.remarks}
+    assert (said["corridors"].action, said["corridors"].count, said["corridors"].loss) == ("guessed", 1, False)
+    assert "16.0 square metres that no box covers" in said["corridors"].why
+    assert (said["rooms"].action, said["rooms"].names, said["rooms"].loss) == ("dropped", ("Bath",), True)
+    whole = read(tmp_path, SQUARE, Bedroom=[[0, 0, 4, 8]], Kitchen=[[4, 0, 10, 8]])
+    assert [remark.what for remark in whole.remarks] == ["doors"]
+
+
+def test_a_list_of_homes_is_refused_by_what_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "homes.json"
+    path.write_text(json.dumps([{"verts": SQUARE, "room_category": {}}] * 2))
+    with pytest.raises(InvalidInputError, match="a list of 2 homes; expected one HouseExpo home a file"):
+        load_world(str(path))

@@ -48,7 +48,10 @@ def test_boxes_are_cut_smallest_first_and_what_is_left_is_corridor(tmp_path: Pat
     assert rooms["bedroom"].symmetric_difference(box(0, 0, 4, 6) - box(3, 4, 6, 6)).area < 1e-6
     assert rooms["corridor"].area == pytest.approx(60 - 6 - 22)
     assert {wall.thickness for wall in plan.walls} == {0.1}
-    assert {(r.action, r.what, r.count) for r in plan.remarks} == {("guessed", "doors", len(plan.doors))}
+    assert {(r.action, r.what, r.count) for r in plan.remarks} == {
+        ("guessed", "doors", len(plan.doors)),
+        ("guessed", "corridors", 1),
+    }
 
 
 @pytest.mark.parametrize(("width", "corridor"), [(0.5, False), (0.59, False), (0.65, True)])
@@ -61,7 +64,7 @@ def test_strips_narrower_than_a_door_are_given_to_the_room_beside(width: float, 
     assert not hidden
     assert shapely.union_all(polygons).area == pytest.approx(home.area, abs=0.02)
     assert [(r.action, r.what, r.count) for r in remarks] == (
-        [] if corridor else [("repaired", "gaps between boxes", 1)]
+        [("guessed", "corridors", 1)] if corridor else [("repaired", "gaps between boxes", 1)]
     )
     if not corridor:
         assert sorted(p.area for p in polygons) == pytest.approx([12.0, 12.0 + 3.0 * width], abs=0.02)

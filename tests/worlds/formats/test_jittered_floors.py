@@ -93,6 +93,26 @@ def test_walls_cover_every_edge_of_every_room_at_any_angle(
     check_floor(read_kth(path))
 
 
+@settings(max_examples=8, deadline=None)
+@given(degrees=st.floats(0.0, 360.0), jitter=st.floats(0.0, 0.05), seed=st.integers(0, 10_000))
+@example(degrees=90.0, jitter=0.05, seed=1)
+@example(degrees=0.0, jitter=0.02, seed=0)
+def test_doors_stay_where_they_are_drawn_however_the_hand_trembles(
+    tmp_path_factory: pytest.TempPathFactory, degrees: float, jitter: float, seed: int
+) -> None:
+    path = tmp_path_factory.mktemp("floor") / "floor.xml"
+    path.write_text(floor_xml(math.radians(degrees), jitter, seed))
+    plan = read_kth(path)
+    check_floor(plan)
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    for number in range(4):
+        x, y = number * (4.0 + GAP) + 1.5 + DOOR / 2, GAP / 2
+        drawn = (c * x - s * y, s * x + c * y)
+        # The border lies on one side of the wall; corners stray by three standard deviations.
+        assert min(math.dist(door.midpoint, drawn) for door in plan.doors) < GAP / 2 + 3 * jitter + 0.02
+    assert not [remark for remark in plan.remarks if remark.what == "doors"]
+
+
 def test_a_wall_that_is_missing_from_a_plan_lets_a_robot_out(tmp_path: Path) -> None:
     from dataclasses import replace
 
@@ -161,3 +181,11 @@ def test_gaps_between_rooms_close_at_any_angle(tmp_path: Path) -> None:
         offices = [room_interior(plan, room.id) for room in plan.rooms if room.label == "kontor"]
         apart = sorted(a.distance(b) for n, a in enumerate(offices) for b in offices[n + 1 :])[:3]
         assert apart == pytest.approx([0.15] * 3, abs=0.03)
+
+
+def test_coordinates_that_are_no_numbers_are_the_reason(tmp_path: Path) -> None:
+    path = tmp_path / "floor.xml"
+    head, mark, rest = floor_xml(0.0, 0.0, 0).partition("/>")
+    path.write_text(head + mark + rest.replace(".", ","))
+    with pytest.raises(InvalidInputError, match="with their contour lines have no four numbers"):
+        read_kth(path)

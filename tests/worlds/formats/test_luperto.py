@@ -109,3 +109,16 @@ def test_all_floors_of_the_collection_are_read_and_can_be_used(shared: Path) -> 
     assert len(paths) == 42
     for path in paths:
         check_floor(path)
+
+
+def test_a_scale_without_a_unit_is_taken_as_centimetres_and_said(fixtures: Path, tmp_path: Path) -> None:
+    text = (fixtures / "luperto_small.xml").read_text()
+    path = tmp_path / "plan.xml"
+    for unit in ("", "<um></um>"):
+        path.write_text(text.replace("<um>cm</um>", unit))
+        plan = read_luperto(path)
+        assert [str(remark) for remark in plan.remarks if remark.what == "scale"] == [
+            "guessed scale: its length has no unit (um); taken as centimetres"
+        ]
+        assert {room.label: room.polygon.area for room in plan.rooms}["classroom"] == pytest.approx(5.4 * 7.2, rel=0.01)
+    assert not [remark for remark in read_luperto(fixtures / "luperto_small.xml").remarks if remark.what == "scale"]

@@ -12,7 +12,7 @@ from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan
 
 
-def scale(pixels: object = 10, real: object = 100, unit: str | None = None) -> str:
+def scale(pixels: object = 10, real: object = 100, unit: str | None = "cm") -> str:
     um = "" if unit is None else f"<um>{unit}</um>"
     return (
         f"<scale><represented_distance><value>{pixels}</value></represented_distance>"

@@ -10,7 +10,8 @@ from shapely.geometry import LineString, box
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.formats.settlement import Source, merged, no_rooms, settle
+from closedrooms.worlds.formats.settlement import Source, merged, no_rooms, not_in_plan, settle
+from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom, Wall
 
 FILE = Path("floor.xml")
@@ -198,3 +199,25 @@ def test_a_door_that_another_wall_stands_before_is_no_door(
     assert plan.doors == (() if blocked else (door,))
     told = [(remark.names, remark.loss) for remark in plan.remarks if remark.what == "doors"]
     assert told == ([(("d0",), True)] if blocked else [])
+
+
+def test_parts_of_a_file_that_a_plan_has_no_place_for_are_counted() -> None:
+    reasons = {"models": "furniture", "lifts": "no cabins", "lanes": "none"}
+    fields = {"models": [{}, {}], "lifts": {"a": {}}, "lanes": [], "walls": [1]}
+    assert not_in_plan(fields, reasons) == [
+        Remark(action="dropped", what="models", why="furniture", count=2),
+        Remark(action="dropped", what="lifts", why="no cabins", count=1),
+    ]
+    assert not_in_plan({"models": 3, "lifts": None}, reasons) == []
+
+
+def test_furniture_and_lifts_of_other_programs_are_said(tmp_path: Path) -> None:
+    fixtures = Path(__file__).parents[2] / "fixtures"
+    world = tmp_path / "world.yaml"
+    tables = "locations:\n  - {category: table, parent: hub}\n  - {category: desk, parent: hub}\n"
+    world.write_text((fixtures / "pyrobosim_small.yaml").read_text() + tables)
+    building = tmp_path / "b.building.yaml"
+    building.write_text((fixtures / "rmf_small.building.yaml").read_text() + "lifts:\n  l1: {}\n")
+    for path, level, what, count in ((world, None, "locations", 2), (building, "L1", "lifts", 1)):
+        said = [remark for remark in load_world(str(path), level=level).remarks if remark.what == what]
+        assert [(remark.action, remark.count, remark.loss) for remark in said] == [("dropped", count, False)]

@@ -515,3 +515,65 @@ def test_scans_well_before_the_first_odometry_do_not_take_it(new_bag: Callable[[
     run = read_run(bag.write())
     assert run.odometry[:, 0] == pytest.approx([0.0, 0.0, 0.25])
     assert "dropped 2 scans: before the odometry begins or after it ends" in [str(r) for r in run.remarks]
+
+
+FRONT, REAR = (0.2, 0.05, 0.1), (-0.2, 0.0, 3.0)
+
+
+def with_two_lidars(bag: Any, *known: tuple[str, tuple[float, float, float]]) -> Any:
+    for frame, (x, y, yaw) in known:
+        bag.transform("base_link", frame, (x, y, 0.2), (0.0, 0.0, yaw))
+    for i in range(12):
+        bag.scan(100.0 + 0.1 * i, frame="rear" if i % 3 == 0 else "front")
+    return bag
+
+
+def mounts(run: RecordedRun) -> list[tuple[float, float, float]]:
+    return [scan.robot_T_sensor for scan in run.scans]
+
+
+def test_scans_of_two_lidars_on_one_topic_have_the_mounting_of_their_own_frame(any_bag: Any) -> None:
+    both = with_two_lidars(any_bag.drive(12, scans=False), ("front", FRONT), ("rear", REAR))
+    run = read_run(both.write())
+    assert np.array(mounts(run)) == pytest.approx(np.array([REAR, FRONT, FRONT] * 4))
+    assert run.remarks == ()
+
+
+def test_of_two_lidars_the_mounting_of_one_is_no_help_for_the_other(new_bag: Bags) -> None:
+    path = with_two_lidars(new_bag().drive(12, scans=False), ("front", FRONT)).write()
+    run = read_run(path)
+    assert np.array(mounts(run)) == pytest.approx(np.array([FRONT] * 8))
+    (remark,) = run.remarks
+    assert (remark.action, remark.what, remark.count, remark.loss) == ("dropped", "scans", 4, True)
+    assert "no transform says where rear sits" in remark.why
+    # That of most scans has to be known.
+    rear = with_two_lidars(new_bag().drive(12, scans=False), ("rear", REAR)).write()
+    with pytest.raises(InvalidInputError, match=r"unknown mounting.*base_link to front"):
+        read_run(rear)
+    run = read_run(path, mount=REAR)
+    assert np.array(mounts(run)) == pytest.approx(np.array([REAR, FRONT, FRONT] * 4))
+    (remark,) = run.remarks
+    assert (remark.action, remark.what, remark.loss) == ("guessed", "mountings", False)
+    assert "taken for rear, for the others that of the transforms" in remark.why
+
+
+def test_without_odometry_scans_of_a_second_lidar_are_left_out(new_bag: Bags) -> None:
+    run = read_run(with_two_lidars(new_bag(), ("front", FRONT), ("rear", REAR)).write())
+    assert np.array(mounts(run)) == pytest.approx(np.array([FRONT] * 8))
+    assert len(run.odometry) == 8
+    remark = next(remark for remark in run.remarks if remark.what == "scans")
+    assert (remark.action, remark.count, remark.loss) == ("dropped", 4, True)
+    with pytest.raises(InvalidInputError, match="unknown mounting"):
+        read_run(with_two_lidars(new_bag()).write())
+
+
+@pytest.mark.parametrize(("second", "said"), [((0.3, 0, 0.2), False), ((0.305, 0, 0.2), False), ((0.4, 0, 0.2), True)])
+def test_a_static_transform_that_changes_is_said_and_the_last_one_counts(
+    new_bag: Bags, second: tuple[float, float, float], said: bool
+) -> None:
+    bag = new_bag().drive().transform("base_link", "laser", (0.3, 0.0, 0.2))
+    run = read_run(bag.transform("base_link", "laser", second, stamp=100.5).write())
+    assert run.scans[0].robot_T_sensor == pytest.approx((second[0], 0.0, 0.0))
+    assert [str(remark) for remark in run.remarks] == (
+        ["guessed 1 transforms (laser): published as static with different values; the last are taken"] if said else []
+    )

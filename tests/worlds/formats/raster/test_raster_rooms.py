@@ -4,13 +4,16 @@ import math
 
 import numpy as np
 import pytest
+import shapely
 
 from closedrooms.core.door import ClosedDoor, Segment
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.remarks import Remark
+from closedrooms.core.shapes import cells_inside
 from closedrooms.worlds.formats.raster_rooms import (
     _blocked_share,
     _fault,
+    _outlines,
     _reach,
     _segment,
     find_rooms_and_doors,
@@ -195,3 +198,16 @@ def test_free_space_all_around_a_building_is_no_room_unless_a_door_leads_there(d
     cells[[0, -1]] = cells[:, [0, -1]] = UNKNOWN
     found, _, _, _ = find_rooms_and_doors(OccupancyGrid(GridFrame(CELL, 0.0, 0.0, 30, 30), cells), [], [])
     assert len(found) == 1
+
+
+def test_an_outline_has_the_cells_of_its_label_and_a_corner_only_where_it_turns() -> None:
+    rng = np.random.default_rng(2)
+    labels = np.ones((12, 15), dtype=np.int32)
+    # Specks that touch at no corner: the cells around them are one piece.
+    labels[2:11:3, 2:14:3] = rng.integers(0, 2, (3, 4))
+    labels[0, 3:7] = labels[5:7, 0] = 0
+    frame = GridFrame(0.1, -3.0, 2.0, 12, 15)
+    (outline,) = _outlines(labels, 1, frame)
+    assert (cells_inside(outline, frame) == (labels == 1)).all()
+    assert outline.equals(outline.simplify(0.0))
+    assert shapely.get_num_coordinates(outline) == shapely.get_num_coordinates(outline.simplify(0.0))
