@@ -1,5 +1,6 @@
 """Tables for files and pipes, as rich draws them; to load rich takes longer than most of what they report."""
 
+import textwrap
 from collections.abc import Sequence
 
 
@@ -12,14 +13,17 @@ def draw_plain_table(title: str, rows: Sequence[Sequence[str]], *, width: int) -
         width: Columns of the page.
 
     Returns:
-        Its lines, each with its end; ``None`` for one that rich has to draw: wider than the page, a title wider than
-        the table, letters that may take two columns, no row or an empty column.
+        Its lines, each with its end; ``None`` for one that rich has to draw: wider than the page, a word of the title
+        wider than the table, letters that may take two columns, no row or an empty column.
     """
     head, *body = rows
     widths = [max(map(len, column)) for column in zip(head, *body, strict=True)]
     whole = sum(widths) + 3 * len(widths) + 1
     text = "".join([title, *(cell for row in rows for cell in row)])
-    if not (body and title and all(widths) and len(title) <= whole <= width and text.isascii() and text.isprintable()):
+    titles = textwrap.wrap(title, whole, break_long_words=False, break_on_hyphens=False)
+    if not (body and titles and all(widths) and text.isascii() and text.isprintable()):
+        return None
+    if max(whole, *map(len, titles)) > min(whole, width):
         return None
 
     def line(row: Sequence[str], bar: str) -> str:
@@ -31,7 +35,7 @@ def draw_plain_table(title: str, rows: Sequence[Sequence[str]], *, width: int) -
         return left + middle.join(dash * (size + 2) for size in widths) + right
 
     lines = [
-        title.ljust(whole),
+        *(part.ljust(whole) for part in titles),
         rule("┏", "━", "┳", "┓"),
         line(head, "┃"),
         rule("┡", "━", "╇", "┩"),
