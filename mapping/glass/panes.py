@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from closedrooms.core.arrays import FloatArray, IntArray
+from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.glass.before_glass import before_glass
@@ -49,9 +49,10 @@ SEEN_THROUGH = 1
 DOUBT = 0.34
 """Scans of the wrong kind for each of the right kind from which on a place is no pane."""
 GONE, TURNS = 0.1, 0.25
-"""The same of all places on a short pane together, and the share of its places that must have been hit, gone through
-and hit again. Of 14 panes in runs with glass the first was at most 0.15, nearly always 0, and the second mostly above
-0.39; where somebody had been, in six runs with people, one of the two was on the other side."""
+"""The same of all places on a short pane together (on a longer one 1), and the share of its places that must have
+been hit, gone through and hit again. Of 14 short panes in runs with glass the first was at most 0.15, nearly always 0,
+and the second mostly above 0.39; where somebody had been, in six runs with people, one of the two was on the other
+side. Of 80 longer ones the first was at most 0.34."""
 SOLID = 0.10
 """Distance from a solid surface up to which what was seen through is its noise [m]."""
 CHANGED = 0.10
@@ -200,13 +201,13 @@ class Panes:
             in_turns = length < ALONE and self._all_seen and self._in_turns(line)
             if not long and walls < 2 and in_turns:
                 segment, walls = extend_line(pane, grid, *around, widest, WIDE)
-            alone = (walls and length >= ALONE) or (long and in_turns)
-            if alone or (walls == 2 and (long or in_turns or self._was_open(line))):
+            alone = (walls and length >= ALONE and not self._has_left(line, 1.0)) or (long and in_turns)
+            if alone or (walls == 2 and (in_turns or self._was_open(line))):
                 segments.append(segment)
         return without_covered(np.array(segments).reshape(-1, 2, 2))
 
     def _was_open(self, line: FloatArray) -> bool:
-        """Check that a short pane was gone through before it was hit, and until all has been seen once also after.
+        """Check that a pane was gone through before it was hit, and until all has been seen once also after.
 
         Who stood there at first has left; who has come since may leave.
         """
@@ -232,13 +233,20 @@ class Panes:
 
         Nothing where too much was seen through them near the normal, too: then somebody was there and left.
         """
-        places = self._places[self._asked]
-        on_line = (np.hypot(*(places - line[0]).T) + np.hypot(*(places - line[1]).T)) < math.dist(*line) + DEPTH
-        hit, _, past, _ = self._counts[:, on_line].sum(axis=1)
-        if past > GONE * hit:
+        if self._has_left(line, GONE):
             return NOTHING_SAID, NOTHING_SAID
-        said = self._said.kept(on_line[self._said.places])
+        said = self._said.kept(self._on(line)[self._said.places])
         return said.kept(said.codes == HIT_NEAR), said.kept(said.codes == PAST_OBLIQUE)
+
+    def _has_left(self, line: FloatArray, most: float) -> bool:
+        """Check that all along a line more was seen through near the normal than ``most`` of what was hit there."""
+        hit, _, past, _ = self._counts[:, self._on(line)].sum(axis=1)
+        return bool(past > most * max(hit, 1))
+
+    def _on(self, line: FloatArray) -> BoolArray:
+        """Mark the places that are asked about, shape (n,), on a line."""
+        places = self._places[self._asked]
+        return np.asarray(np.hypot(*(places - line[0]).T) + np.hypot(*(places - line[1]).T) < math.dist(*line) + DEPTH)
 
     def _open_along(self, lines: Sequence[FloatArray], keyframes: Sequence[Keyframe]) -> list[FloatArray]:
         """List for each line the places in it that keyframes went through near its normal, which it tells best."""
