@@ -206,7 +206,7 @@ def join_lines(lines: Sequence[FloatArray], grid: OccupancyGrid, met: FloatArray
     Args:
         lines: Their ends, shape (2, 2) each [m].
         grid: The map.
-        met: Places that return what comes near their normal, on a pane or before a wall, shape (n, 2) [m].
+        met: Places that are met at any angle: on a pane before the end of a wall, shape (n, 2) [m].
     """
     joined: list[FloatArray] = []
     for one in lines:

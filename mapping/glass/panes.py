@@ -187,8 +187,8 @@ class Panes:
         glass = (past <= DOUBT * hit) & (through >= SEEN_THROUGH) & (askew <= DOUBT * through)
         no_pane = (past > 1) & (past > hit)
         may_be, before = places[~no_pane & (through >= SEEN_THROUGH)], sample(self.segments, self._resolution)
-        met = places[past <= DOUBT * hit]
-        lines = join_lines(draw_lines(places[glass], normals[glass], self._resolution), grid, met)
+        walls = places[(past <= DOUBT * hit) & (askew > DOUBT * through)]
+        lines = join_lines(draw_lines(places[glass], normals[glass], self._resolution), grid, walls)
         lengths = [math.dist(*line) + self._resolution for line in lines]  # from middle to middle of whole cells
         reach = [FARTHEST if length >= LENGTH else FRAME for length in lengths]
         turned = [turn_into_walls(line, grid, far) for line, far in zip(lines, reach, strict=True)]
@@ -197,12 +197,12 @@ class Panes:
         for line, length, far, pane, against in zip(lines, lengths, reach, turned, opened, strict=True):
             long, widest = length >= LENGTH, WIDE if last else FRAME
             around = may_be, before, against, self._driven
-            segment, walls = extend_line(pane, grid, *around, widest if long else FRAME, far)
+            segment, ends = extend_line(pane, grid, *around, widest if long else FRAME, far)
             in_turns = length < ALONE and self._all_seen and self._in_turns(line)
-            if not long and walls < 2 and in_turns:
-                segment, walls = extend_line(pane, grid, *around, widest, WIDE)
-            alone = (walls and length >= ALONE and not self._has_left(line, 1.0)) or (long and in_turns)
-            if alone or (walls == 2 and (in_turns or self._was_open(line))):
+            if not long and ends < 2 and in_turns:
+                segment, ends = extend_line(pane, grid, *around, widest, WIDE)
+            alone = (ends and length >= ALONE and not self._has_left(line, 1.0)) or (long and in_turns)
+            if alone or (ends == 2 and (in_turns or self._was_open(line))):
                 segments.append(segment)
         return without_covered(np.array(segments).reshape(-1, 2, 2))
 
