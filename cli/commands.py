@@ -19,6 +19,7 @@ from closedrooms.cli.command_list import overview, wants_overview
 from closedrooms.cli.usage import UsageError
 from closedrooms.core.errors import ClosedroomsError, OutputError, reason
 from closedrooms.core.files.unfinished import remove_unfinished
+from closedrooms.core.runtime.late_modules import process_is_ours
 from closedrooms.core.runtime.packages import missing_package, require
 from closedrooms.core.runtime.stopping import (
     SIGNALS,
@@ -68,6 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _own_process() -> None:
     """Make this process the program's: signals, closed streams, no modules from the current directory."""
     leave_at_once()
+    process_is_ours()
     for descriptor, mode in enumerate(("r", "w", "w")):
         try:
             os.fstat(descriptor)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -25,20 +26,26 @@ gone: the place of somebody who was seen from ten keyframes, and from four not, 
 NOISE = 0.10
 """Distance around a cell in which these are counted [m]."""
 SAME_WALL = 0.20
-"""A scan that met something this near to a place [m] did not go through what was seen there from the other side: of a
-wall that was seen from both, each with a pose of its own error, the faces lie behind each other, and either scan ends
-at the other."""
+"""Within this distance of where its crossed space ends [m] a scan did not go through what was seen: of a wall that was
+seen from both sides, each with a pose of its own error, the faces lie behind each other, and either scan ends at the
+other; and who looks along a wall past a face that lies a little too far out sees it in few places only."""
+SAME_SIDE = 0.5
+"""Product of the mean directions from which a place was hit, and was missed by scans that end nearby, from which on
+both saw it from the same side: of a wall whose two faces fell on one cell both directions are mixed, and short."""
 AnyInts = npt.NDArray[np.int64] | npt.NDArray[np.int32]
 LatticeWindow = tuple[int, int, int, int]
 """First row and column in the arrays, and number of rows and columns."""
+Counts = np.ndarray[Any, np.dtype[Any]]
+WindowCells = tuple[IntArray, tuple[int, int]]
+"""Cells of a window, flat, and its rows and columns."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sides:
-    """From where the cells were seen that one scan hit, and those that it crossed beside these.
+    """From where the cells were seen that one scan hit, and those near the end of what it crossed.
 
     Attributes:
-        beside: The crossed ones, as flat indices in the window of the scan.
+        beside: The latter, as flat indices in the window of the scan.
         towards: Direction of the viewpoint from the hit cells and then from these, rows and columns, shape (2, n), to
             an eighth of a turn: -1, 0 or 1 each.
     """
@@ -57,7 +64,7 @@ class Imprint:
         shape: Rows and columns of the window.
         misses: Which cells were crossed: the window's mask, eight cells a byte.
         hits: Cells that were hit, as flat indices in the window, each once.
-        sides: What was crossed beside them, and from where.
+        sides: From where they were seen, and what was crossed near its end.
     """
 
     row: int
@@ -91,16 +98,18 @@ class EvidenceGrid:
         self._config, self._draws = config, draws
         self._lattice = Lattice(config.resolution)
         self._noise = math.ceil(NOISE / config.resolution)
-        span = 2 * math.ceil(SAME_WALL / config.resolution) + 1
-        self._same_wall = np.ones((span, span), dtype=np.uint8)
+        same_wall = math.ceil(SAME_WALL / config.resolution)
+        self._same_wall = np.ones((2 * same_wall + 1, 2 * same_wall + 1), dtype=np.uint8)
+        # How far around it counts matter to how a cell is drawn.
+        self._reach = self._noise + same_wall
         shape = self._lattice.frame.shape
         self._hits = np.zeros(shape, dtype=np.int32)
         # Whole numbers, exact up to 2^24: OpenCV adds a mask to floats five times as quickly as to integers.
         self._misses = np.zeros(shape, dtype=np.float32)
-        # Of the misses, those of scans that met something nearby.
+        # Of the misses, those of scans whose crossed space ends nearby.
         self._beside = np.zeros(shape, dtype=np.int16)
-        # Sums of the directions (rows, columns) from which each cell was hit, and missed by scans that met something
-        # nearby, to eighths of a turn.
+        # Sums of the directions (rows, columns) from which each cell was hit, and missed by scans that end nearby, to
+        # eighths of a turn.
         self._hit_from = [np.zeros(shape, dtype=np.int16) for _ in range(2)]
         self._beside_from = [np.zeros(shape, dtype=np.int16) for _ in range(2)]
         self._cells: CellArray = np.full(shape, UNKNOWN, dtype=np.int8)
@@ -190,10 +199,8 @@ class EvidenceGrid:
         self._dirty = window if self._dirty is None else _union(self._dirty, window)
 
     def _sides_of(self, mask: Mask, flat: AnyInts, viewpoint: tuple[float, float]) -> Sides:
-        """Find from where a scan saw the cells that it hit (``flat``), and what it crossed (``mask``) beside them."""
-        met = np.zeros_like(mask)
-        met.reshape(-1)[flat] = 1
-        near = cv2.bitwise_and(mask, cv2.dilate(met, self._same_wall))
+        """Find from where a scan saw what it hit (``flat``), and what it crossed (``mask``) near the end of that."""
+        near = cv2.subtract(mask, cv2.erode(mask, self._same_wall))
         beside = np.flatnonzero(near.view(np.bool_))
         cells = np.concatenate((flat, beside))
         rows = cells // mask.shape[1]
@@ -249,7 +256,7 @@ class EvidenceGrid:
             return self._grid
         if self._dirty is not None:
             # What is drawn of a cell depends on those around it.
-            window = self._wider(self._dirty, self._noise)
+            window = self._wider(self._dirty, self._reach)
             rows, cols = _slices(window)
             misses, (stands, hits) = self._misses[rows, cols], self._standing(window)
             most, (most_hits, most_misses) = (int(hits.max(initial=0)), int(misses.max())), self._percent.shape
@@ -314,39 +321,56 @@ class EvidenceGrid:
         beside = cv2.dilate(solid, np.ones((span, span), dtype=np.uint8))
         return row + lattice.row0, col + lattice.col0, np.greater(through, beside.view(np.bool_), out=through)
 
-    def _standing(self, window: LatticeWindow) -> tuple[IntArray, IntArray]:
+    def _standing(self, window: LatticeWindow) -> tuple[IntArray, Counts]:
         """List the cells of a window, flat, in which something was hit that has not gone since, and those hits.
 
         The noise of a wall was gone through, too, often, but the wall beside it was not: what counts are the hits
         around a cell, and how many of them were gone through as often.
         """
-        around = self._wider(window, self._noise)
+        around = self._wider(window, self._reach)
         # Few cells were hit: what is asked of those is not computed for the others.
         met = np.flatnonzero(self._hits[_slices(around)] > 0)
         at, rows, cols = self._flat(met, around)
-        hits, misses, beside = (counts.reshape(-1).take(at) for counts in (self._hits, self._misses, self._beside))
+        hits, misses, beside = self._hits.reshape(-1)[at], self._misses.reshape(-1)[at], self._beside.reshape(-1)[at]
         # Who ended just behind what was seen from the same side went through its place.
         (hit_row, hit_col), (row, col) = (
             [sums.reshape(-1).take(at).astype(np.int32) for sums in both]
             for both in (self._hit_from, self._beside_from)
         )
-        same_side = hit_row * row + hit_col * col > 0
-        through = misses - np.where(same_side, np.int16(0), beside)
-        shape, span = around[2:], (2 * self._noise + 1, 2 * self._noise + 1)
-        twice = np.zeros(shape, dtype=np.uint8)
-        twice.reshape(-1)[met] = through >= GONE
-        near = cv2.dilate(twice, np.ones(span, dtype=np.uint8)).reshape(-1).take(met)
+        same_side = hit_row * row + hit_col * col > SAME_SIDE * (hits * beside)
+        cells = (met, around[2:])
+        faded = self._crossed_again(cells, hits, misses - np.where(same_side, np.int16(0), beside))
+        # That leaves standing what they ended at: two faces seen along their wall from one end take each other away.
+        config = self._config
+        solid = hits.astype(np.float32) * np.float32(config.log_odds_hit) > misses * np.float32(config.log_odds_miss)
+        faded &= self._near(cells, ~faded & solid, self._same_wall)
+        faded |= self._crossed_again(cells, hits, misses - beside)
+        stands = ~faded | (misses <= 0.0)
+        rows += around[0] - window[0]
+        cols += around[1] - window[1]
+        stands &= (rows >= 0) & (rows < window[2]) & (cols >= 0) & (cols < window[3])
+        return (rows * window[3] + cols)[stands], hits[stands]
+
+    def _crossed_again(self, cells: WindowCells, hits: Counts, through: Counts) -> BoolArray:
+        """Mark the cells around which enough of the hits were gone through afterwards, of counts of each."""
+        (met, shape), span = cells, 2 * self._noise + 1
         sums = []
         for counts in (np.minimum(hits, through), hits):
             # Of whole numbers of 16 bits in half the time that single precision takes.
             whole = np.zeros(shape, dtype=np.int16)
             whole.reshape(-1)[met] = counts
-            sums.append(cv2.boxFilter(whole, cv2.CV_32F, span, normalize=False).reshape(-1).take(met))
-        stands = (near == 0) | (sums[0] < GONE_SHARE * sums[1]) | (misses <= 0.0)
-        rows += around[0] - window[0]
-        cols += around[1] - window[1]
-        stands &= (rows >= 0) & (rows < window[2]) & (cols >= 0) & (cols < window[3])
-        return (rows * window[3] + cols)[stands], hits[stands]
+            sums.append(cv2.boxFilter(whole, cv2.CV_32F, (span, span), normalize=False).reshape(-1).take(met))
+        enough: BoolArray = sums[0] >= GONE_SHARE * sums[1]
+        return enough & self._near(cells, through >= GONE, np.ones((span, span), dtype=np.uint8))
+
+    @staticmethod
+    def _near(cells: WindowCells, marked: BoolArray, reach: Mask) -> BoolArray:
+        """Mark the cells around which one is marked."""
+        met, shape = cells
+        mask = np.zeros(shape, dtype=np.uint8)
+        mask.reshape(-1)[met] = marked
+        near: BoolArray = cv2.dilate(mask, reach).reshape(-1).take(met) > 0
+        return near
 
     def _wider(self, window: LatticeWindow, reach: int) -> LatticeWindow:
         """Widen a window by ``reach`` cells to all sides, as far as the arrays go."""

@@ -15,6 +15,7 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.beams import Beams, clean, hit_points, matched_range, thin_points
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.door_fusion import fuse_doors
+from closedrooms.mapping.glass.leaks import without_leaks
 from closedrooms.mapping.glass.met_surfaces import Glimpse
 from closedrooms.mapping.glass.panes import Panes
 from closedrooms.mapping.graph.keyframe import Keyframe
@@ -66,6 +67,7 @@ class Mapper:
         self._corrected = self._finished = False
         self._glimpsed = Pose2()
         self._panes = Panes(self._config.resolution)
+        self._without_leaks: tuple[OccupancyGrid, OccupancyGrid] | None = None
         self._pose = Pose2()
         self._prediction = MotionPrediction(self._config.recovery, self._events)
         self._motion = UncertainMotion()
@@ -365,6 +367,15 @@ class Mapper:
 
     def grid(self) -> OccupancyGrid:
         """Draw the map so far, from the keyframes' present poses."""
+        grid = self._draw_with_panes()
+        if not len(self._panes.segments):
+            return grid
+        if self._without_leaks is None or self._without_leaks[0] is not grid:
+            places = np.array([(keyframe.pose.x, keyframe.pose.y) for keyframe in self.keyframes])
+            self._without_leaks = grid, without_leaks(grid, places)
+        return self._without_leaks[1]
+
+    def _draw_with_panes(self) -> OccupancyGrid:
         grid = self._draw()
         new = len(self.keyframes) - self._looked
         if not self._config.glass or new < (1 if self._finished else LOOK):

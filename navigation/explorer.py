@@ -11,7 +11,7 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.navigation.config import RobotNavigation
 from closedrooms.navigation.decider import Decider, Situation
-from closedrooms.navigation.driving.met_obstacles import barrier, touching_points
+from closedrooms.navigation.driving.met_obstacles import barrier, touching_points, unmapped_points
 from closedrooms.navigation.driving.path_check import fits_along
 from closedrooms.navigation.frontiers import still_unknown
 from closedrooms.navigation.goal_search import Goal, GoalSearch
@@ -53,6 +53,7 @@ class Explorer(Decider):
         self._facing_since: float | None = None
         self._chances = CHANCES
         self._waits_until = -math.inf
+        self._held_at: Pose2 | None = None
 
     @property
     def frontiers(self) -> FloatArray:
@@ -81,14 +82,25 @@ class Explorer(Decider):
 
     def _get_stuck(self, now: Situation) -> None:
         """Note obstacles where the robot is held up, across the path when that happens again and again."""
+        if self._driver.recoveries == 1:
+            self._held_at = now.pose
+        self._search.map.update(now.grid())
+        unmapped = unmapped_points(now.pose, now.scan, self._search.map.costmap)
         self._search.map.add_obstacles(touching_points(now.pose, now.scan, self.config, now.bumps))
-        if self._driver.recoveries % HELD_UP == 0:
+        if len(unmapped):
+            self._search.map.add_obstacles(unmapped)
+            self._excuse()
+        elif self._driver.recoveries % HELD_UP == 0:
             # What the scan does not show (glass, a sill) holds the robot: what lies behind is reached another way,
             # or not at all, and the search goes on elsewhere.
             self._search.map.add_obstacles(barrier(now.pose, self._driver.ahead(SAME_PLACE), self.config))
-        self.goal = None
-        if self._driver.recoveries > self.config.max_recoveries:
-            self._second_chance(now.stamp)
+        goal, self.goal = self.goal, None
+        if self._driver.recoveries <= self.config.max_recoveries or self._second_chance(now.stamp):
+            return
+        if goal is not None and self._held_at is not None and self._held_at.distance(now.pose) > SAME_PLACE:
+            # It is not the robot that cannot move, but this goal that it does not get to.
+            self._search.put_off(goal.frontier)
+            self._driver.recoveries = 0
 
     def _check(self, pose: Pose2, grid: OccupancyGrid, now: float) -> None:
         """Drop a goal that has become known; plan anew where the path is blocked or something nearer has turned up."""
@@ -168,6 +180,13 @@ class Explorer(Decider):
         """Forget goal and path."""
         self.goal, self._facing_since, self._switches = None, None, 0
         self._driver.stop()
+
+    def _excuse(self) -> None:
+        """Count neither the goal nor the recovery: nothing had shown that the path was blocked."""
+        goal, self._driver.recoveries = self.goal, 0
+        if goal is not None:
+            near = [math.dist(goal.place, place) < SAME_PLACE for place, _ in self._chosen]
+            self._chosen = [(place, n - at) for (place, n), at in zip(self._chosen, near, strict=True)]
 
     def _count(self, place: Point) -> int:
         """Count how often this place has been chosen, this time included."""

@@ -27,8 +27,12 @@ def cut_dashes(shape: BaseGeometry, dash: float) -> Iterator[FloatArray]:
         ends = np.minimum(starts + step, along[-1])
         heads, tails = (_points_at(corners, along, places) for places in (starts, ends))
         first, last = np.searchsorted(along, starts, side="right"), np.searchsorted(along, ends, side="left")
-        for head, tail, low, high in zip(heads, tails, first.tolist(), last.tolist(), strict=True):
-            yield np.concatenate([[head], corners[low:high], [tail]])
+        straight = np.stack((heads, tails), axis=1)
+        for number, (low, high) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
+            if low >= high:
+                yield straight[number]
+            else:
+                yield np.concatenate([heads[number : number + 1], corners[low:high], tails[number : number + 1]])
 
 
 def _points_at(corners: FloatArray, along: FloatArray, places: FloatArray) -> FloatArray:

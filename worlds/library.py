@@ -210,7 +210,7 @@ def _is_luperto(path: Path, head: str) -> bool:
 
 def _is_houseexpo(path: Path, head: str) -> bool:
     del path
-    return head.lstrip().startswith("{") and any(key in head for key in ('"verts"', '"room_category"'))
+    return head.lstrip().startswith(("{", "[")) and any(key in head for key in ('"verts"', '"room_category"'))
 
 
 def _is_json(path: Path, head: str) -> bool:

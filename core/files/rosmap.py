@@ -118,15 +118,17 @@ def write_raw_map(stem: Path, grid: OccupancyGrid, *, map_T_grid: Pose2 = IDENTI
     Raises:
         OutputError: The folder cannot be written.
     """
-    _write(stem, grid, np.arange(256).astype(np.uint8), "raw", map_T_grid)
+    _write(stem, grid, None, "raw", map_T_grid)
 
 
-def _write(stem: Path, grid: OccupancyGrid, shades: npt.NDArray[np.uint8], mode: str, map_T_grid: Pose2) -> None:
-    """Write the picture, whose greys are the ``shades`` of the cells' bytes, and the YAML of a map."""
+def _write(stem: Path, grid: OccupancyGrid, shades: npt.NDArray[np.uint8] | None, mode: str, map_T_grid: Pose2) -> None:
+    """Write the picture, whose greys are the ``shades`` of the cells' bytes or these themselves, and the YAML."""
     import cv2
 
     frame, picture = grid.frame, stem.with_name(stem.name + ".png")
-    pixels = cv2.LUT(np.ascontiguousarray(grid.cells[::-1].view(np.uint8)), shades)
+    pixels = grid.cells[::-1].view(np.uint8).copy()
+    if shades is not None:
+        cv2.LUT(pixels, shades, dst=pixels)
     # Runs of one grey are what a map is made of.
     settings = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE]
     settings += [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]

@@ -7,9 +7,7 @@ folder ``.old`` what was there until a moment ago: it goes back where nothing ha
 import contextlib
 import hashlib
 import os
-import platform
 import re
-import secrets
 import shutil
 import time
 from collections.abc import Iterator
@@ -29,7 +27,7 @@ def part_of_file(path: Path) -> Path:
 
 def part_of_folder(folder: Path, suffix: str = "part") -> Path:
     """Compose a new hidden name beside a folder, without making anything."""
-    return folder.with_name(f".{short_name(folder.name)}.{secrets.token_hex(4)}.{suffix}")
+    return folder.with_name(f".{short_name(folder.name)}.{os.urandom(4).hex()}.{suffix}")
 
 
 @contextlib.contextmanager
@@ -98,7 +96,7 @@ def _remove(path: Path, target: Path) -> None:
 
 def _machine() -> str:
     """Identify this machine among those that may share a file system: process numbers are its own."""
-    return hashlib.sha256(platform.node().encode()).hexdigest()[:8]
+    return hashlib.sha256(os.uname().nodename.encode()).hexdigest()[:8]
 
 
 def _is_own(path: Path) -> bool:

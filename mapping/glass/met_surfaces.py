@@ -8,12 +8,12 @@ import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.pose import Pose2
-from closedrooms.mapping.glass.scan_view import faces
+from closedrooms.mapping.glass.scan_view import MOST_APART, faces
 from closedrooms.mapping.lattice import Lattice, grown
 
 FIRST_POINTS = 65_536
 """Points for which there is room at first; twice as much whenever it is full."""
-NO_POINT: FloatArray = np.full((1, 2), np.nan)
+NO_POINTS: FloatArray = np.full((MOST_APART, 2), np.nan)
 """What stands between the points of two scans."""
 
 
@@ -164,8 +164,8 @@ class MetSurfaces:
         ends = np.searchsorted(numbers, [*self._firsts[1:], self._points])
         begins = np.concatenate(([0], ends[:-1]))
         turns, places, towards = np.empty(len(numbers)), np.empty((len(numbers), 2)), np.empty((len(numbers), 2))
-        # Scans one after the other, a row of NaN behind each.
-        at, scans, begin = np.empty(len(numbers), dtype=np.int64), [NO_POINT], 1
+        # Scans one after the other, rows of NaN behind each.
+        at, scans, begin = np.empty(len(numbers), dtype=np.int64), [NO_POINTS], MOST_APART
         for k in np.flatnonzero(ends > begins).tolist():
             glimpse, pose = self._glimpses[k]
             mine = slice(begins[k], ends[k])
@@ -175,8 +175,8 @@ class MetSurfaces:
             towards[mine] = points - glimpse.origin
             places[mine] = pose.transform(glimpse.keyframe_T_robot.transform(points))
             turns[mine] = glimpse.keyframe_T_robot.theta + pose.theta
-            scans += [glimpse.points, NO_POINT]
-            begin += len(glimpse.points) + 1
+            scans += [glimpse.points, NO_POINTS]
+            begin += len(glimpse.points) + MOST_APART
         normals, incidence = faces(np.concatenate(scans), at, towards)
         angles = np.arctan2(normals[:, 1], normals[:, 0]) + turns
         return places, np.where(incidence < limit, angles, np.nan)

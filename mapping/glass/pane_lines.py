@@ -9,9 +9,10 @@ import numpy as np
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.grid import OccupancyGrid, is_occupied
 
-ALONE, LENGTH, SHORT = 0.75, 0.45, 0.15
+ALONE, LENGTH, SHORT = 0.75, 0.45, 0.09
 """Shortest run of places that is a pane with a solid wall at one end, between two (a person is 0.4 m wide), and there
-where it was open before [m]. Where no wall is it is what somebody who walked was seen along."""
+where it was open before [m]. Where no wall is it is what somebody who walked was seen along, unless it was hit, gone
+through and hit again."""
 FEWEST = 4
 """Fewest places of a pane."""
 THICK = 0.12
@@ -64,10 +65,13 @@ def extend_line(
     ends, walls = [], 0
     for end, direction in ((line[0], -along), (line[1], along)):
         places = end + steps[:, None] * direction
-        against = _within(step, places, no_pane) | _within(BODY, places, driven)
+        against = _within(1.5 * step, places, no_pane) | _within(BODY, places, driven)
         on_pane, as_before = _within(step, places, may_be), _within(step, places, before)
-        beside = places[:, None] + np.array([-step, 0.0, step])[:, None] * across
-        at_wall = np.asarray(_solid(grid, beside).any(axis=1))
+        aside = _across(step)
+        solid_beside = _solid(grid, places[:, None] + aside[:, None] * across)
+        # Where the pane ends, a wall may stand behind it; further on it is in line.
+        counts = (np.abs(aside) < 1.5 * step) | (steps[:, None] < FRAME)
+        at_wall = np.asarray((solid_beside & counts).any(axis=1))
         solid, wall = 0.0, False
         for number, t in enumerate(steps.tolist()):
             if t - solid > widest or against[number]:
@@ -83,10 +87,15 @@ def extend_line(
     return np.array(ends), walls
 
 
-def turn_into_walls(line: FloatArray, grid: OccupancyGrid, reach: float) -> FloatArray:
-    """Turn a pane about its middle so that most of what lies beyond its ends is solid wall.
+def _across(step: float) -> FloatArray:
+    """List how far aside of a pane what is in line with it may be [m]: a wall may end at its back."""
+    return np.asarray(np.arange(-round(THICK / step), round(THICK / step) + 1) * step, dtype=np.float64)
 
-    It stands in one, and places within half a metre do not tell its direction to a cell two metres on.
+
+def turn_into_walls(line: FloatArray, grid: OccupancyGrid, reach: float) -> FloatArray:
+    """Turn a pane about its middle, and shift it by up to a cell, so that most of what lies beyond its ends is wall.
+
+    It stands in a wall, and places within half a metre do not tell its direction to a cell two metres on.
 
     Args:
         line: Its ends as they were hit, shape (2, 2) [m].
@@ -94,7 +103,7 @@ def turn_into_walls(line: FloatArray, grid: OccupancyGrid, reach: float) -> Floa
         reach: How far beyond its ends is looked at [m].
 
     Returns:
-        Its ends, shape (2, 2) [m], a cell from where they were at most: as they were where no turn is better.
+        Its ends, shape (2, 2) [m], two cells from where they were at most: as they were where no turn is better.
     """
     step = grid.frame.resolution
     middle, half = line.mean(axis=0), math.dist(*line) / 2.0
@@ -106,9 +115,10 @@ def turn_into_walls(line: FloatArray, grid: OccupancyGrid, reach: float) -> Floa
     across = np.array([-along[1], along[0]])
     directions = np.cos(turns)[:, None] * along + np.sin(turns)[:, None] * across
     beyond = half + np.arange(step, reach + step / 2.0, step)
-    solid = _solid(grid, middle + np.concatenate((-beyond, beyond))[:, None] * directions[:, None])
-    best = directions[np.argmax(solid.sum(axis=1))]
-    return np.asarray(middle + np.outer([-half, half], best))
+    middles = middle + np.array([0.0, -step, step])[:, None] * across
+    places = middles[:, None, None] + np.concatenate((-beyond, beyond))[:, None] * directions[:, None]
+    shift, turn = np.divmod(np.argmax(_solid(grid, places).sum(axis=2)), len(directions))
+    return np.asarray(middles[shift] + np.outer([-half, half], directions[turn]))
 
 
 def _solid(grid: OccupancyGrid, places: FloatArray) -> BoolArray:
@@ -186,24 +196,23 @@ def draw_lines(places: FloatArray, normals: FloatArray, resolution: float) -> li
         left &= ~chosen
         groups = _groups(places[chosen], resolution)
         for number in np.unique(groups):
-            line = _line(places[chosen][groups == number], angles[chosen][groups == number])
-            if line is not None:
-                lines.append(line)
+            lines += _lines(places[chosen][groups == number], angles[chosen][groups == number])
     return lines
 
 
-def join_lines(lines: Sequence[FloatArray], grid: OccupancyGrid) -> list[FloatArray]:
-    """Join lines that go on in each other where something solid stands between them: a wall behind a pane parts it.
+def join_lines(lines: Sequence[FloatArray], grid: OccupancyGrid, met: FloatArray) -> list[FloatArray]:
+    """Join lines that go on in each other where something stands between them: a wall behind a pane parts it.
 
     Args:
         lines: Their ends, shape (2, 2) each [m].
         grid: The map.
+        met: Places that return what comes near their normal, on a pane or before a wall, shape (n, 2) [m].
     """
     joined: list[FloatArray] = []
     for one in lines:
         line, number = one, 0
         while number < len(joined):
-            both = _joint(line, joined[number], grid)
+            both = _joint(line, joined[number], grid, met)
             if both is None:
                 number += 1
             else:
@@ -213,8 +222,11 @@ def join_lines(lines: Sequence[FloatArray], grid: OccupancyGrid) -> list[FloatAr
     return joined
 
 
-def _joint(a: FloatArray, b: FloatArray, grid: OccupancyGrid) -> FloatArray | None:
-    """Draw one line through two with something solid between them, ``None`` where they are not in line or none is."""
+def _joint(a: FloatArray, b: FloatArray, grid: OccupancyGrid, met: FloatArray) -> FloatArray | None:
+    """Draw one line through two with something between them, ``None`` where they are not in line or nothing is.
+
+    A wall that ends behind the pane is a cell or two from the line that the pane was met in, and not solid in it.
+    """
     way = b.mean(axis=0) - a.mean(axis=0)
     far = math.hypot(*way)
     if far > (math.dist(*a) + math.dist(*b)) / 2.0 + FRAME + THICK:
@@ -228,8 +240,8 @@ def _joint(a: FloatArray, b: FloatArray, grid: OccupancyGrid) -> FloatArray | No
         return None
     step = grid.frame.resolution
     between = a.mean(axis=0) + np.arange(begin, end, step)[:, None] * along
-    beside = np.arange(-round(THICK / step), round(THICK / step) + 1) * step
-    if not _solid(grid, between[:, None] + beside[:, None] * across).any():
+    solid = _solid(grid, between[:, None] + _across(step)[:, None] * across).any()
+    if not solid and not _within(THICK, between, met).all():
         return None
     return np.asarray(ends[[np.argmin(t), np.argmax(t)]])
 
@@ -242,6 +254,20 @@ def _groups(places: FloatArray, resolution: float) -> IntArray:
     mask[cells[:, 0], cells[:, 1]] = 1
     _, labels = cv2.connectedComponents(cv2.dilate(mask, np.ones((5, 5), dtype=np.uint8)), connectivity=8)
     return np.asarray(labels)[cells[:, 0], cells[:, 1]].astype(np.int64)
+
+
+def _lines(places: FloatArray, angles: FloatArray) -> list[FloatArray]:
+    """Draw the line through places, or one along each face of a thick pane that was met on both."""
+    middle = places.mean(axis=0)
+    _, spread, axes = np.linalg.svd(places - middle, full_matrices=False)
+    parts = [np.ones(len(places), dtype=np.bool_)]
+    if spread[-1] / math.sqrt(len(places)) > THICK:
+        front = (places - middle) @ axes[-1] < 0.0
+        parts = [front, ~front]
+        if max(float(np.std((places[part] - middle) @ axes[-1])) for part in parts) > THICK / 2.0:
+            return []
+    found = (_line(places[part], angles[part]) for part in parts)
+    return [line for line in found if line is not None]
 
 
 def _line(places: FloatArray, angles: FloatArray) -> FloatArray | None:

@@ -21,9 +21,12 @@ ROUNDING = 1e-6
 """Angle that no rounding reaches [rad]."""
 TURN = 8.0
 """Angle that keeps the directions of one scan from those of the next [rad]: more than a turn, and exact."""
-FACE_REACH = 12
+FACE_REACH, FACE_FAR = 12, 1.0
 """Points to either side through which the direction of a surface is drawn: at 1 m, half a degree apart and with 2 cm of
-noise, they tell it to 4 degrees."""
+noise, they tell it to 4 degrees. Nearer than that [m] they stand closer, and so many are left out between them as keep
+them as far apart."""
+MOST_APART = 4
+"""The most of that: every fourth point."""
 FACE_GAP = 0.25
 """Step between neighbouring points that ends a surface [m]."""
 
@@ -134,7 +137,8 @@ def faces(points: FloatArray, at: IntArray, towards: FloatArray) -> tuple[FloatA
     """Find the direction in which the surface at some points of scans faces, and the angle at which it was met.
 
     Args:
-        points: In beam order, robot frame, shape (n, 2) [m]; between one scan and the next stands a row of NaN.
+        points: In beam order, robot frame, shape (n, 2) [m]; between one scan and the next stand
+            ``MOST_APART`` rows of NaN.
         at: Which of them, shape (k,).
         towards: From the sensor to each of these, shape (k, 2) [m].
 
@@ -142,7 +146,8 @@ def faces(points: FloatArray, at: IntArray, towards: FloatArray) -> tuple[FloatA
         Unit normals, robot frame, shape (k, 2), of either sign, NaN where too little is seen; incidence against them,
         shape (k,) [rad], 0 to a right angle.
     """
-    x, y, on_surface = _stretches(points, at)
+    away = np.maximum(np.hypot(*towards.T), 1e-9)
+    x, y, on_surface = _stretches(points, at, np.clip(np.ceil(FACE_FAR / away), 1, MOST_APART).astype(np.int64))
     number = np.count_nonzero(on_surface, axis=1)
     x, y = np.where(on_surface, x, 0.0), np.where(on_surface, y, 0.0)
     sums = np.stack([terms.sum(axis=1) for terms in (x, y, x * x, y * y, x * y)])
@@ -153,15 +158,24 @@ def faces(points: FloatArray, at: IntArray, towards: FloatArray) -> tuple[FloatA
     # The larger of the two variances must clearly be so: else it is a blob, or a corner.
     clear = (number >= 5) & ((xx + yy) / 2.0 - spread < 0.1 * ((xx + yy) / 2.0 + spread))
     across = np.column_stack((-np.sin(along), np.cos(along)))
-    met = np.abs((towards * across).sum(axis=1)) / np.maximum(np.hypot(*towards.T), 1e-9)
+    met = np.abs((towards * across).sum(axis=1)) / away
     incidence = np.arccos(np.minimum(met, 1.0))
     return np.where(clear[:, None], across, np.nan), np.where(clear, incidence, np.nan)
 
 
-def _stretches(points: FloatArray, at: IntArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Collect the neighbours of points, x and y from those, and mark those on the same surface, (k, m) each."""
+def _stretches(points: FloatArray, at: IntArray, apart: IntArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Collect the neighbours of points, ``apart`` from each other, from those, and mark those on the same surface.
+
+    Args:
+        points: In beam order, shape (n, 2) [m].
+        at: Which of them, shape (k,).
+        apart: Every how manieth neighbour, for each of these, shape (k,).
+
+    Returns:
+        Their x and y [m] and the marks, shape (k, m) each.
+    """
     steps = np.arange(-FACE_REACH, FACE_REACH + 1)
-    places = at[:, None] + steps
+    places = at[:, None] + apart[:, None] * steps
     x, y = (axis.take(places, mode="clip") for axis in points.T.copy())
     # From each neighbour to the next, further out: where that is too far, the surface has ended.
     joined = np.hypot(x[:, 1:] - x[:, :-1], y[:, 1:] - y[:, :-1]) <= FACE_GAP

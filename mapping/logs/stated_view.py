@@ -61,7 +61,7 @@ def find_view_factor(scans: Sequence[LaserScan], odometry: FloatArray) -> float 
     factors = [view / stated for view in views if stated > 0.0 and abs(view / stated - 1.0) > LEAST_CHANGE]
     turns = pairs_that_move(odometry, TURNING, farthest=MOST_MOTION)
     ways = pairs_that_move(odometry, DRIVING, farthest=np.inf)
-    if min(len(turns), len(ways)) < LEAST_PAIRS:
+    if not factors or min(len(turns), len(ways)) < LEAST_PAIRS:
         return None
 
     def score(factor: float, pairs: list[tuple[int, int]]) -> FloatArray:

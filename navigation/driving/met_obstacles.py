@@ -9,10 +9,15 @@ from closedrooms.core.arrays import FloatArray
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import RobotNavigation
-from closedrooms.navigation.driving.path_follower import near_points
+from closedrooms.navigation.driving.costmap import Costmap
+from closedrooms.navigation.driving.path_follower import near_points, points_within
 
 # Scan points this close to the footprint of a stuck robot are what holds it [m].
 TOUCHING = 0.12
+# Up to here a stuck robot looks for what its map does not show [m].
+LOOK = 3.0
+# A scan point this near to an obstacle that is known is part of it [m]: poses that do not agree thicken walls so far.
+MAPPED = 0.2
 # Distance between the obstacles that stand for an unseen barrier [m]: a map cell.
 BARRIER_STEP = 0.05
 
@@ -23,6 +28,16 @@ def touching_points(pose: Pose2, scan: LaserScan, config: RobotNavigation, bumps
     felt = config.robot.radius * np.column_stack((np.cos(bumps), np.sin(bumps)))
     seen = points[np.hypot(*points.T) < config.required_clearance + TOUCHING]
     return pose.transform(np.concatenate((seen, felt.reshape(-1, 2))))
+
+
+def unmapped_points(pose: Pose2, scan: LaserScan, costmap: Costmap) -> FloatArray:
+    """Find what the scan shows around a stuck robot where its costmap is free, map frame, shape (n, 2) [m].
+
+    A wall that the map has lost is gone round then, not run against at one place after the other.
+    """
+    points = pose.transform(points_within(scan, LOOK))
+    unmapped: FloatArray = points[costmap.clearance_at(points) >= MAPPED]
+    return unmapped
 
 
 def barrier(pose: Pose2, ahead: FloatArray, config: RobotNavigation) -> FloatArray:

@@ -133,13 +133,17 @@ def horizon(config: RobotNavigation) -> float:
 
 
 def near_points(scan: LaserScan, config: RobotNavigation) -> FloatArray:
-    """Select what the scan shows close to the robot, robot frame, shape (n, 2) [m].
+    """Select what the scan shows close to the robot, as :func:`points_within` does."""
+    return points_within(scan, horizon(config))
+
+
+def points_within(scan: LaserScan, reach: float) -> FloatArray:
+    """Select what the scan shows up to ``reach`` [m], at most ``FAR``, from the sensor, robot frame, shape (n, 2) [m].
 
     A median over five beams leaves out lone outliers and halves the noise: the nearest of a hundred noisy points would
     otherwise always lie too close.
     """
     ranges = np.where(scan.ranges < FAR, scan.ranges, FAR).astype(np.float32)
-    reach = horizon(config)
     if float(ranges.min()) >= reach:
         return np.empty((0, 2))
     smooth = cv2.medianBlur(np.concatenate((ranges[-2:], ranges, ranges[:2]))[None, :], 5)[0, 2:-2]
@@ -171,19 +175,33 @@ def free_distance(points_robot: FloatArray, v: float, w: float, config: RobotNav
         path = np.column_stack((signed, np.zeros_like(signed)))
     else:
         path = np.column_stack((np.sin(curvature * signed), 1.0 - np.cos(curvature * signed))) / curvature
-    now = math.sqrt(float(np.einsum("ij,ij->i", points_robot, points_robot).min()))
+    now = _nearest(points_robot)
     offset = path[:, None, :] - points_robot[None, :, :]
     gaps = np.sqrt(np.einsum("ijk,ijk->ij", offset, offset).min(axis=1))
     # Where the robot already is inside the margin it may still drive as long as it does not get closer.
-    limit = min(config.robot.radius + 0.3 * config.clearance_margin, now - 0.005)
+    limit = min(_least_gap(config), now - 0.005)
     hit = np.flatnonzero(gaps < limit)
     return float(steps[hit[0]] - 0.05) if len(hit) else reach
+
+
+def _nearest(points_robot: FloatArray) -> float:
+    """Measure how far the nearest of some points is [m]."""
+    return math.sqrt(float(np.einsum("ij,ij->i", points_robot, points_robot).min()))
+
+
+def _least_gap(config: RobotNavigation) -> float:
+    """Compute the distance from the robot's centre to a point at which it would touch it, margin included [m]."""
+    return config.robot.radius + 0.3 * config.clearance_margin
 
 
 def limit_speed(command: Steering, points_robot: FloatArray, config: RobotNavigation) -> Steering:
     """Slow a command down on its arc to stop before what the scan shows; turning in place is always possible."""
     if command.v <= 0.0:
         return command
-    distance = free_distance(points_robot, command.v, command.w, config)
+    reach = horizon(config) - config.required_clearance
+    # No arc comes nearer to a point than its length: far from all of them nothing is laid out step by step.
+    sure = min(_nearest(points_robot) - _least_gap(config) - 0.06, reach) if len(points_robot) else reach
+    far = sure > 0.0 and math.sqrt(2.0 * config.deceleration * sure) >= command.v
+    distance = sure if far else free_distance(points_robot, command.v, command.w, config)
     v = min(command.v, math.sqrt(2.0 * config.deceleration * distance))
     return Steering(v, command.w * v / command.v, command.progress, command.remaining)

@@ -15,7 +15,7 @@ from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.navigation.config import RobotNavigation
 from closedrooms.navigation.decider import Decider, Situation
 from closedrooms.navigation.driving.costmap import NavigationMap
-from closedrooms.navigation.driving.met_obstacles import touching_points
+from closedrooms.navigation.driving.met_obstacles import touching_points, unmapped_points
 from closedrooms.navigation.driving.path_back import cells_near, path_back
 from closedrooms.navigation.driving.path_check import fits_along
 from closedrooms.navigation.driving.planner import plan_path, reachable_cells
@@ -156,6 +156,7 @@ class TourFollower(Decider):
 
     def _get_stuck(self, now: Situation) -> None:
         """Note an obstacle, and count an attempt at the vertex as failed."""
+        self._map.add_obstacles(unmapped_points(now.pose, now.scan, self._map.costmap))
         self._map.add_obstacles(touching_points(now.pose, now.scan, self.config, now.bumps))
         self._goal, self._going_back = None, False
         self._attempts += 1

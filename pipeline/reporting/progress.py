@@ -8,11 +8,14 @@ from types import TracebackType
 from typing import Any, Protocol, Self
 
 from closedrooms.core.names import shown
+from closedrooms.pipeline.reporting.plain_table import draw_plain_table
 
 # Off a terminal, how often a long stage says how far it is [s].
 EVERY = 30.0
 # A table may name a thousand doors [characters].
 LONGEST_CELL = 10_000
+# Columns of a table where there is no terminal.
+OFF_TERMINAL = 120
 
 
 class Progress(Protocol):
@@ -75,7 +78,7 @@ def _duration(seconds: float) -> str:
 
 
 class Terminal:
-    """Progress and tables by rich; a context manager that owns the live display.
+    """Progress and tables, by rich where there is a terminal; a context manager that owns the live display.
 
     On a terminal a bar with the time left, elsewhere a line for each stage and every 30 s how far it is.
 
@@ -132,37 +135,37 @@ class Terminal:
                 sys.stderr.flush()
 
     def table(self, title: str, rows: Iterable[Sequence[str]]) -> None:
-        """Print a table; the first row is its head."""
-        from rich.table import Table
-        from rich.text import Text
-
-        head, *body = [list(row) for row in rows]
-        table = Table(title=Text(shown(title)), title_justify="left", header_style="bold")
-        for number, name in enumerate(head):
-            table.add_column(name, justify="left" if number == 0 else "right", overflow="fold")
-        for row in body:
-            # As text: rich reads brackets in a plain string as its markup.
-            table.add_row(*(Text(shown(cell, longest=LONGEST_CELL)) for cell in row))
-        self._print(table)
-
-    def say(self, line: str) -> None:
-        """Print one plain line."""
-        self._print(shown(line, longest=LONGEST_CELL), markup=False, highlight=False, soft_wrap=True)
-
-    def _print(self, what: Any, **how: Any) -> None:
-        """Print by rich, 120 columns wide where there is no terminal.
+        """Print a table; the first row is its head.
 
         Raises:
             BrokenPipeError: Nobody reads any more.
         """
+        title = shown(title)
+        head, *body = [[shown(cell, longest=LONGEST_CELL) for cell in row] for row in rows]
+        if not sys.stdout.isatty() and (sys.stdout.encoding or "").lower().startswith("utf"):
+            plain = draw_plain_table(title, [head, *body], width=OFF_TERMINAL)
+            if plain is not None:
+                sys.stdout.write(plain)
+                return
         from rich.console import Console
+        from rich.table import Table
+        from rich.text import Text
 
-        # A colon on either side makes no emoji: their table takes as long to be loaded as ours to be printed.
-        out = Console(file=sys.stdout, soft_wrap=False, width=None if sys.stdout.isatty() else 120, emoji=False)
+        # As text: rich reads brackets in a plain string as its markup.
+        table = Table(title=Text(title), title_justify="left", header_style="bold")
+        for number, name in enumerate(head):
+            table.add_column(Text(name), justify="left" if number == 0 else "right", overflow="fold")
+        for row in body:
+            table.add_row(*map(Text, row))
+        out = Console(file=sys.stdout, width=None if sys.stdout.isatty() else OFF_TERMINAL)
         try:
-            out.print(what, **how)
+            out.print(table)
         except SystemExit as stop:  # what rich makes of it
             raise BrokenPipeError("nobody reads") from stop
+
+    def say(self, line: str) -> None:
+        """Print one plain line."""
+        sys.stdout.write(shown(line, longest=LONGEST_CELL) + "\n")
 
 
 def _bars() -> Any:

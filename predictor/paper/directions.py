@@ -6,6 +6,7 @@ import numpy as np
 
 from closedrooms.core.arrays import FloatArray, IntArray
 from closedrooms.predictor.config import DirectionsConfig
+from closedrooms.predictor.paper.clusterers import sklearn_cluster
 from closedrooms.predictor.paper.segments import angles_of, lengths_of
 
 # What lies in a direction [rad]: three steps of the Hough transform.
@@ -85,8 +86,6 @@ def _find_modes(angles: FloatArray, weights: FloatArray, bandwidth: float) -> Fl
     A kernel of the whole bandwidth has a mode of its own in the middle between two wings, where no wall runs; half of
     it has not. Of modes closer than the bandwidth that with most wall in its very direction stays.
     """
-    from sklearn.cluster import MeanShift
-
     if angles.size == 0:
         return np.zeros(0)
     degree = np.radians(1.0)
@@ -97,7 +96,7 @@ def _find_modes(angles: FloatArray, weights: FloatArray, bandwidth: float) -> Fl
     counts = np.ceil(POINTS * total / total.sum()).astype(np.int64)
     # Twice the angle, so that 0 and 180 degrees are one place of a circle.
     places = np.column_stack((np.cos(2.0 * centres), np.sin(2.0 * centres)))
-    shift = MeanShift(bandwidth=2.0 * np.sin(bandwidth / 2.0), seeds=places, cluster_all=False)
+    shift = sklearn_cluster().MeanShift(bandwidth=2.0 * np.sin(bandwidth / 2.0), seeds=places, cluster_all=False)
     found = shift.fit(np.repeat(places, counts, axis=0)).cluster_centers_
     points = np.arctan2(found[:, 1], found[:, 0]) / 2.0 % np.pi
     mass = (np.abs(angle_between(angles[None, :], points[:, None])) <= NARROW) @ weights

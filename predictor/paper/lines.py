@@ -9,6 +9,7 @@ import shapely
 
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.predictor.config import LinesConfig
+from closedrooms.predictor.paper.clusterers import sklearn_cluster
 from closedrooms.predictor.paper.directions import Directions, angle_between
 
 LineKind = Literal["wall", "border", "split"]
@@ -92,11 +93,12 @@ def _chain(ends: FloatArray, reach: float) -> IntArray:
         ends: Along and across, shape (k, 2, 2).
         reach: Largest distance to the next [m].
     """
-    from scipy.sparse import coo_array
-    from sklearn.cluster import DBSCAN
-
     if not len(ends):
         return np.zeros(0, dtype=np.int64)
+    # Ahead of what else takes scipy: it leaves much of that out.
+    cluster = sklearn_cluster()
+    from scipy.sparse import coo_array
+
     low, high = ends[..., 0].min(axis=1), ends[..., 0].max(axis=1)
     across = ends[..., 1].mean(axis=1)
     # Only what a tree finds is measured: a table of all pairs fills the memory.
@@ -108,7 +110,7 @@ def _chain(ends: FloatArray, reach: float) -> IntArray:
     near = distance <= reach
     pairs = coo_array((distance[near], (i[near], j[near])), shape=(len(ends),) * 2).tocsr()
     # Every segment is dense by itself, so that clusters are what hangs together.
-    return np.asarray(DBSCAN(eps=reach, min_samples=1, metric="precomputed").fit(pairs).labels_, dtype=np.int64)
+    return np.asarray(cluster.DBSCAN(eps=reach, min_samples=1, metric="precomputed").fit(pairs).labels_, dtype=np.int64)
 
 
 def _covered(ends: FloatArray) -> float:

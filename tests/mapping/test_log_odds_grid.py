@@ -1,3 +1,5 @@
+import math
+
 import cv2
 import numpy as np
 import pytest
@@ -155,22 +157,56 @@ def test_a_wall_stays_with_its_noise_however_often_that_is_missed() -> None:
     assert grid.occupied[rows, cols].all()
 
 
+ALONG = np.arange(40) * 0.05 - 0.98
+
+
+def face_seen(evidence: EvidenceGrid, x: float, viewpoint: tuple[float, float], times: int, *, every: int = 1) -> None:
+    """Let scans end at a face of 2 m at x, all before which they cross, and meet it in every so-manieth point."""
+    face = np.column_stack((np.full(40, x), ALONG))
+    far = x + math.copysign(3.0, viewpoint[0] - x)
+    outline = np.vstack((face, [(far, ALONG[-1]), (far, ALONG[0])]))
+    for _ in range(times):
+        evidence.add(Beams(face[::every], outline, np.array(viewpoint)), Pose2())
+
+
+def is_closed(evidence: EvidenceGrid) -> bool:
+    """Whether something stands near x = 2 m at every y."""
+    grid = evidence.grid()
+    band = np.column_stack((np.repeat(np.arange(1.52, 2.53, 0.05), 36), np.tile(ALONG[2:-2], 21)))
+    rows, cols = grid.frame.to_cells(band).T
+    return bool(grid.occupied[rows, cols].reshape(21, 36).any(axis=0).all())
+
+
 @pytest.mark.parametrize("apart", [0.05, 0.1, 0.15])
+@pytest.mark.parametrize("away", [(3.0, 0.0), (0.5, -9.0)])
 def test_a_wall_seen_from_both_sides_stays_though_each_scan_ends_beyond_the_face_that_the_other_saw(
-    apart: float,
+    apart: float, away: tuple[float, float]
 ) -> None:
     evidence = EvidenceGrid(MapperConfig())
-    y = np.arange(40) * 0.05 - 0.98
-    faces = {side: np.column_stack((np.full(40, 2.02 + side * apart / 2), y)) for side in (1, -1)}
-    for side, face in faces.items():
+    for side in (1, -1):
         # The room to the left ends at the face to the right, and the other way round: the poses do not agree.
-        outline = np.vstack((face, [(2.02 - 3.0 * side, y[-1]), (2.02 - 3.0 * side, y[0])]))
-        for _ in range(6):
-            evidence.add(Beams(face, outline, np.array([2.02 - 3.0 * side, 0.0])), Pose2())
+        face_seen(evidence, 2.02 + side * apart / 2, (2.02 - side * away[0], away[1]), 6)
+    assert is_closed(evidence)
+
+
+def test_a_wall_stays_whose_faces_fall_on_each_other_however_many_more_scans_saw_the_one() -> None:
+    evidence = EvidenceGrid(MapperConfig())
+    face_seen(evidence, 2.02, (-1.0, 0.0), 6)
+    face_seen(evidence, 2.02, (5.0, 0.0), 7)
+    face_seen(evidence, 1.87, (5.0, 0.0), 7)
+    assert is_closed(evidence)
     grid = evidence.grid()
-    band = np.column_stack((np.repeat(np.arange(1.52, 2.53, 0.05), 36), np.tile(y[2:-2], 21)))
-    rows, cols = grid.frame.to_cells(band).T
-    assert grid.occupied[rows, cols].reshape(21, 36).any(axis=0).all()
+    rows, cols = grid.frame.to_cells(np.column_stack((np.full(36, 2.02), ALONG[2:-2]))).T
+    assert grid.occupied[rows, cols].all()
+
+
+def test_scans_along_a_wall_that_meet_it_in_few_places_do_not_erase_the_face_that_others_saw() -> None:
+    evidence = EvidenceGrid(MapperConfig())
+    face_seen(evidence, 2.02, (-1.0, 0.0), 6)
+    face_seen(evidence, 2.12, (1.5, -9.0), 12, every=32)
+    grid = evidence.grid()
+    rows, cols = grid.frame.to_cells(np.column_stack((np.full(36, 2.02), ALONG[2:-2]))).T
+    assert grid.occupied[rows, cols].all()
 
 
 @pytest.mark.parametrize("before", [0.1, 0.15])

@@ -228,6 +228,26 @@ def test_a_robot_as_wide_as_the_doors_is_planned_for_as_it_is() -> None:
     assert known[0.42] < known[0.3]
 
 
+def test_a_wall_that_the_map_has_lost_is_gone_round() -> None:
+    # Two halls of 10 x 3 m, joined by a door at their left end, a room behind the further one at its right end. Both
+    # halls are known, and the wall between them is free on the map: scans from poses that do not agree erased it.
+    walls = np.ones((190, 220), dtype=np.uint8)
+    walls[10:70, 10:210] = walls[73:133, 10:210] = walls[136:180, 150:210] = 0
+    walls[70:73, 14:34] = walls[133:136, 170:190] = 0
+
+    class Forgetful(CellMapper):
+        def grid(self) -> OccupancyGrid:
+            self._cells[68:75, 10:210] = 0
+            return super().grid()
+
+    world, mapper = CellWorld(walls, (9.0, 2.0)), Forgetful(walls.shape)
+    mapper._cells[:136] = np.where(walls[:136] > 0, 100, 0)
+    # Two bumps at one place would be too many.
+    result = explore(world, mapper, NavigationConfig(time_limit=200.0, max_recoveries=1))
+    assert result.status == "complete"
+    assert mapper.grid().known[136:180, 150:210].mean() > 0.98
+
+
 def test_a_robot_that_cannot_move_ends_as_stuck() -> None:
     world = CellWorld(building(), START)
     world.jammed = True

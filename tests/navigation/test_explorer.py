@@ -1,6 +1,7 @@
 """When an exploration keeps, drops and changes its goal: with a search and a driver that do as they are told."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from closedrooms.core.robot import RobotConfig
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
 from closedrooms.navigation.decider import Situation
+from closedrooms.navigation.driving.costmap import NavigationMap
 from closedrooms.navigation.driving.planner import PlannedPath
 from closedrooms.navigation.explorer import CHANCES, HELD_UP, SAME_PLACE, SETTLE, WAIT, Explorer
 from closedrooms.navigation.goal_search import Goal
@@ -37,8 +39,11 @@ def goal(x: float, y: float = 2.0, *, cost: float | None = None, frontier: np.nd
     return Goal((x, y), frontier, PlannedPath(np.array([(HERE.x, HERE.y), (x, y)]), length if cost is None else cost))
 
 
-class Map:
+class Map(NavigationMap):
+    """Notes what is added."""
+
     def __init__(self) -> None:
+        super().__init__(CONFIG)
         self.obstacles: list[np.ndarray] = []
 
     def add_obstacles(self, points: np.ndarray) -> None:
@@ -360,7 +365,14 @@ def test_while_it_looks_the_path_and_other_goals_do_not_matter() -> None:
     assert search.count == 1
 
 
-def stuck(explorer: Explorer, driver: Any, recoveries: int, stamp: float) -> None:
+def stuck(
+    explorer: Explorer,
+    driver: Any,
+    recoveries: int,
+    stamp: float,
+    scan: LaserScan | None = None,
+    pose: Pose2 = HERE,
+) -> None:
     """Let the driver find that it is stuck, something pressing from ahead."""
 
     def command(*_: Any) -> tuple[float, float]:
@@ -368,7 +380,8 @@ def stuck(explorer: Explorer, driver: Any, recoveries: int, stamp: float) -> Non
         return (0.0, 0.0)
 
     driver.command = command
-    explorer.command(at(stamp, bumps=(0.0,)))
+    now = at(stamp, bumps=(0.0,))
+    explorer.command(replace(now, scan=now.scan if scan is None else scan, pose=pose))
 
 
 @pytest.mark.parametrize("recoveries", range(1, 2 * HELD_UP + 1))
@@ -399,3 +412,30 @@ def test_a_robot_that_is_held_up_too_often_gets_another_chance_where_something_m
     stuck(explorer, driver, recoveries, 0.1)
     assert explorer.status == status
     assert driver.recoveries == (0 if recoveries > CONFIG.max_recoveries and again else recoveries)
+
+
+def test_a_bump_that_shows_what_the_map_does_not_counts_neither_as_recovery_nor_as_attempt() -> None:
+    attempts = CONFIG.max_attempts + 2
+    search = Search(*[goal(5.0) for _ in range(attempts)], None)
+    explorer, driver = exploring(search)
+    for attempt in range(attempts):
+        driver.state, driver.command = "driving", lambda *_: (0.5, 0.0)
+        assert explorer.command(at(float(attempt))) == (0.5, 0.0)
+        # A wall 1 m ahead, in what the map shows as free, farther along each time.
+        scan = LaserScan(np.full(8, 0.6 + 0.45 * attempt), -math.pi, math.pi / 4, 20.0, stamp=attempt + 0.1)
+        stuck(explorer, driver, CONFIG.max_recoveries + 1, attempt + 0.1, scan)
+        assert (explorer.status, driver.recoveries) == (None, 0)
+    assert search.put == []
+
+
+@pytest.mark.parametrize(("moved", "status"), [(SAME_PLACE - 0.01, "stuck"), (SAME_PLACE + 0.01, None)])
+def test_a_goal_that_it_never_gets_to_is_put_off_by_a_robot_that_can_move(moved: float, status: str | None) -> None:
+    search = Search(goal(5.0))
+    explorer, driver = exploring(search)
+    explorer.command(at(0.0))
+    stuck(explorer, driver, 1, 0.1)
+    explorer.goal = goal(5.0)
+    driver.state = "driving"
+    stuck(explorer, driver, CONFIG.max_recoveries + 1, 9.0, pose=Pose2(HERE.x, HERE.y + moved, 0.0))
+    assert explorer.status == status
+    assert [points.tolist() for points in search.put] == ([] if status else [FRONTIER.tolist()])

@@ -44,6 +44,8 @@ def read_houseexpo(path: str | Path) -> FloorPlan:
     """
     path = Path(path)
     data = read_json(path, what=WHAT)
+    if isinstance(data, list):
+        raise InvalidInputError(f"a list of {len(data)} homes", expected="one HouseExpo home a file", where=path)
     remarks: list[Remark] = []
     outline = _outline(data, path, remarks)
     boxes = _boxes(data, path, remarks)

@@ -113,7 +113,7 @@ def _outline(space: Any, name: str, metres: float, remarks: list[Remark]) -> Pol
         points += [p for p in (a, b) if not points or math.dist(p, points[-1]) > 1e-6]
     polygon = Polygon(points) if len(set(points)) >= 3 else None
     if polygon is None:
-        why = "their contour has fewer than 3 points"
+        why = "their contour lines have no four numbers" if broken else "their contour has fewer than 3 points"
         remarks.append(Remark(action="dropped", what="rooms", why=why, names=(name,), loss=True))
         return None
     if not polygon.is_valid:

@@ -1,6 +1,7 @@
 """Floor plans as JSON, the project's own format."""
 
 import json
+import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,7 +12,7 @@ from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import read_json
 from closedrooms.core.files.outgoing import write_bytes
-from closedrooms.core.names import is_name, is_path
+from closedrooms.core.names import is_name, is_path, shown
 from closedrooms.core.numbers import is_number, repr_of
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.formats.settlement import Source, settle
@@ -25,6 +26,10 @@ FORMAT, VERSION = "closedrooms-plan", 1
 WHAT = "a floor plan (JSON)"
 # A plan with more elements than this is refused before shapes are built.
 MAX_ELEMENTS = 100_000
+# What a plan has.
+PARTS = ("format", "version", "name", "units", "start", "meta", "rooms", "walls", "doors", "openings", "furniture")
+# No heading in radians is larger, but one in degrees is.
+LARGEST_HEADING = 2.0 * math.pi + 0.1
 # Longest name of a plan [characters].
 MAX_NAME = 200
 
@@ -121,7 +126,7 @@ def plan_from(data: Any, path: Path) -> FloorPlan:
     if data.get("units", "m") != "m":
         raise InvalidInputError(f"a plan in {data['units']!r}", expected="metres ('m')", where=path)
     reader = _Reader(path)
-    remarks: list[Remark] = []
+    remarks = [*_unknown_parts(data), *_odd_heading(data.get("start"))]
     plan = FloorPlan(
         name=_plan_name(data.get("name") or path.stem, path),
         rooms=tuple(
@@ -138,6 +143,21 @@ def plan_from(data: Any, path: Path) -> FloorPlan:
         meta=data["meta"] if isinstance(data.get("meta"), dict) else {},
     )
     return settle(plan, remarks, Source(rooms=len(plan.rooms), door_widths=[d.width for d in plan.doors]), path)
+
+
+def _unknown_parts(data: dict[str, Any]) -> list[Remark]:
+    """Name the parts that a plan does not have: a part of a wrong name is lost."""
+    names = tuple(shown(name, longest=40) for name in data if name not in PARTS)
+    why = "a plan has none of this name"
+    return [Remark(action="dropped", what="parts", why=why, names=names, count=len(names))] if names else []
+
+
+def _odd_heading(start: Any) -> list[Remark]:
+    """Warn of a heading that is more than a turn."""
+    if not (isinstance(start, list) and len(start) == 3 and is_number(start[2]) and abs(start[2]) > LARGEST_HEADING):
+        return []
+    why = f"{start[2]:g} is more than a turn (degrees?); taken as radians"
+    return [Remark(action="guessed", what="heading of the start", why=why)]
 
 
 def _plan_name(value: Any, path: Path) -> str:

@@ -56,7 +56,7 @@ def read_pyrobosim(path: str | Path) -> FloorPlan:
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise InvalidInputError(f"two rooms named {twice!r}", expected="names used once", where=path)
-    wall = _wall_width(rows)
+    wall = _wall_width(rows, remarks)
     # Footprints are free floor: the walls' centre lines lie half a wall further out.
     footprints = _placed_footprints(rows, names, path)
     footprints, inner = cut_out_inner_rooms(footprints, apart=wall)
@@ -219,10 +219,15 @@ def _yaw(w: float, x: float, y: float, z: float, *, what: str, path: Path) -> fl
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-def _wall_width(rows: list[dict[str, Any]]) -> float:
+def _wall_width(rows: list[dict[str, Any]], remarks: list[Remark]) -> float:
     """Find the thinnest wall of the rooms: walls between rooms are shared here [m]."""
     widths = [row["wall_width"] for row in rows if isinstance(row.get("wall_width"), int | float)]
-    return float(min((width for width in widths if 0.05 <= width <= 1.0), default=WALL))
+    wall = float(min((width for width in widths if 0.05 <= width <= 1.0), default=WALL))
+    others = sum(row.get("wall_width", WALL) != wall for row in rows)
+    if others:
+        why = f"rooms share their walls here: all are {wall:g} m thick, the thinnest from 0.05 to 1 m"
+        remarks.append(Remark(action="repaired", what="wall widths of rooms", why=why, count=others))
+    return wall
 
 
 def _points(value: Any, what: str, path: Path) -> list[Point]:

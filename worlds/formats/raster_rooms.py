@@ -46,8 +46,8 @@ def find_rooms_and_doors(
             remarks.append(Remark(action="dropped", what="doors", why=why, names=(given[number].id,), loss=True))
             del segments[number]
         shut = _shut(grid, [_to_jambs(segment, grid) for segment in segments.values()])
-        rooms, labels = _rooms(grid, shut)
-        made = {n: _door(given[n], segment, labels, grid.frame, rooms) for n, segment in segments.items()}
+        labels = _labels(grid, shut)
+        made = {n: _door(given[n], segment, labels, grid.frame) for n, segment in segments.items()}
         bad = {n: door for n, door in made.items() if isinstance(door, str)}
         if not bad:
             break
@@ -58,6 +58,8 @@ def find_rooms_and_doors(
         why = f"below {SMALLEST} square metres each, no rooms"
         remarks.append(Remark(action="dropped", what="free cells", why=why, count=tiny))
     doors = [door for door, _ in placed]
+    outlines = _outlines(labels, int(labels.max()), grid.frame)
+    rooms = [PlanRoom(_room_id(number), "room", outline) for number, outline in enumerate(outlines, 1)]
     outside = _outside(labels, rooms, doors)
     if outside is not None:
         why = f"{outside.polygon.area:.1f} square metres reach all four edges of the map, without a door: the outside"
@@ -81,8 +83,8 @@ def _outside(labels: Labels, rooms: Sequence[PlanRoom], doors: Sequence[PlanDoor
     return next((room for room in found if room.id not in entered), None)
 
 
-def _rooms(grid: OccupancyGrid, shut: BoolArray) -> tuple[list[PlanRoom], Labels]:
-    """Find connected free areas with all doors shut, and the number of the room (from 1) of each cell."""
+def _labels(grid: OccupancyGrid, shut: BoolArray) -> Labels:
+    """Find connected free areas with all doors shut: the number of the room (from 1) of each cell."""
     import cv2
 
     free = (grid.free & ~shut).astype(np.uint8)
@@ -91,11 +93,13 @@ def _rooms(grid: OccupancyGrid, shut: BoolArray) -> tuple[list[PlanRoom], Labels
     large = [component for component in range(1, count) if sizes[component] >= SMALLEST]
     number = np.zeros(count, dtype=np.int32)
     number[large] = np.arange(1, len(large) + 1)
-    labels = number[found]
-    rooms = [
-        PlanRoom(f"r{n:02d}", "room", polygon) for n, polygon in enumerate(_outlines(labels, len(large), grid.frame))
-    ]
-    return rooms, labels
+    labels: Labels = number[found]
+    return labels
+
+
+def _room_id(number: int) -> str:
+    """Name a room by its number, from 1."""
+    return f"r{number - 1:02d}"
 
 
 def _outlines(labels: Labels, count: int, frame: GridFrame) -> list[Polygon]:
@@ -206,7 +210,6 @@ def _door(
     segment: Segment,
     labels: Labels,
     frame: GridFrame,
-    rooms: Sequence[PlanRoom],
 ) -> tuple[PlanDoor, Piece] | str:
     """Fit a door between the free areas on both sides in its stretch of wall, or say what is wrong."""
     a, b = np.array(segment[0]), np.array(segment[1])
@@ -230,7 +233,7 @@ def _door(
     thickness = sides[0][0] + sides[1][0] + frame.resolution
     (x0, y0), (x1, y1) = ((round(float(x), 4), round(float(y), 4)) for x, y in (a + shift, b + shift))
     placed = ((x0, y0), (x1, y1))
-    pair = (rooms[sides[0][1] - 1].id, rooms[sides[1][1] - 1].id)
+    pair = (_room_id(sides[0][1]), _room_id(sides[1][1]))
     return PlanDoor(door.id, placed, pair), (placed, round(thickness, 4))
 
 

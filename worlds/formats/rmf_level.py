@@ -177,9 +177,13 @@ def _scale(data: dict[str, Any], fields: dict[str, Any], path: Path, remarks: li
 
     Where they disagree it is their median: one that was mistyped does not count then.
     """
-    for name, level in [("", fields), *((n, f) for n, f in data["levels"].items() if isinstance(f, dict))]:
+    others = [(n, f) for n, f in data["levels"].items() if isinstance(f, dict) and f is not fields]
+    for name, level in [("", fields), *others]:
         values = [_measured(row, _rows(level, "vertices", path)) for row in _rows(level, "measurements", path)]
         usable = [value for value in values if value is not None]
+        if len(usable) < len(values):
+            why = "no distance between two vertices"
+            remarks.append(Remark(action="dropped", what="measurements", why=why, count=len(values) - len(usable)))
         if not usable:
             continue
         shared = 1.0 if level is fields else _by_fiducials(fields, level, path)
@@ -193,7 +197,10 @@ def _scale(data: dict[str, Any], fields: dict[str, Any], path: Path, remarks: li
             remarks.append(Remark(action="guessed", what="scale", why=why))
             return statistics.median(usable)
         return sum(usable) / len(usable)
-    raise InvalidInputError("a building without measurements", expected="a measured distance for scale", where=path)
+    broken = "".join(f"; {remark}" for remark in remarks if remark.what == "measurements")
+    raise InvalidInputError(
+        f"a building without measurements{broken}", expected="a measured distance for scale", where=path
+    )
 
 
 def _by_fiducials(level: dict[str, Any], other: dict[str, Any], path: Path) -> float | None:
@@ -213,7 +220,7 @@ def _measured(row: Any, vertices: list[Any]) -> float | None:
     """Compute the scale that a measurement gives [m a pixel], ``None`` where it is broken."""
     try:
         a, b = vertices[row[0]], vertices[row[1]]
-        value = float(row[2]["distance"][1]) / math.dist((float(a[0]), float(a[1])), (float(b[0]), float(b[1])))
+        value = float(_value(row, "distance")) / math.dist((float(a[0]), float(a[1])), (float(b[0]), float(b[1])))
     except (IndexError, KeyError, TypeError, ValueError, OverflowError, ZeroDivisionError):
         return None
     return value if math.isfinite(value) and value > 0.0 else None
@@ -241,9 +248,19 @@ def _segment(row: Any, vertices: Sequence[Point | None]) -> Segment | None:
 def _parameter(row: Any, key: str) -> str:
     """Read a typed parameter ``{key: [type, value]}`` of a wall or door; empty without one."""
     try:
-        return str(row[2][key][1]).strip()
+        return str(_value(row, key)).strip()
     except (IndexError, KeyError, TypeError):
         return ""
+
+
+def _value(row: Any, key: str) -> Any:
+    """Look up a parameter: the editor writes ``[type, value]``, people the value.
+
+    Raises:
+        IndexError: There are none; KeyError or TypeError, where there is no such one.
+    """
+    given = row[2][key]
+    return given[1] if isinstance(given, list) else given
 
 
 def _is_seen_through(row: Any) -> bool:

@@ -105,7 +105,8 @@ def _resolved(messages: BagMessages, options: BagOptions, remarks: list[Remark])
     frames = Counter(clean_name(message.header.frame_id) for message, _ in messages.scans)
     lidar = frames.most_common(1)[0][0]
     track, base, found = _motion(messages, lidar, options)
-    mounts, mount_remarks = _mounts(messages.tree, base, list(frames), options, measured=track is not None)
+    ordered = [frame for frame, _ in frames.most_common()]
+    mounts, mount_remarks = _mounts(messages.tree, base, ordered, options, measured=track is not None)
     scan_times = Times(*np.array([(stamp_of(message), at) for message, at in messages.scans]).T)
     times = None if track is None else Times(track[:, 0], track[:, 1])
     stamps, odometry_stamps, clock_remarks = scan_and_odometry_times(scan_times, times)
@@ -161,11 +162,16 @@ def _run(
     """Put the scans that have odometry together."""
     scans, rows, broken, echoes, measured, beyond = [], [], 0, 0, 0, 0
     mended: Counter[str] = Counter()
+    unplaced: Counter[str] = Counter()
     for row, i in enumerate(np.flatnonzero(known).tolist()):
         message = messages.scans[i][0]
+        frame = clean_name(message.header.frame_id)
+        if frame not in mounts:
+            unplaced[frame] += 1
+            continue
         try:
             ranges, dropped = ranges_of(message)
-            scan = scan_of(message, ranges, mounts[clean_name(message.header.frame_id)], float(sweeps[i]))
+            scan = scan_of(message, ranges, mounts[frame], float(sweeps[i]))
             repair = sector_of(message, ranges.size)[2]
         except InvalidInputError:
             broken += 1
@@ -176,6 +182,9 @@ def _run(
         mended.update([repair] if repair else [])
         scans.append(scan)
         rows.append(row)
+    for frame, count in unplaced.items():
+        why = f"no transform says where {frame or 'a lidar without a frame'} sits on the robot"
+        remarks.append(Remark(action="dropped", what="scans", why=why, count=count, loss=True))
     if broken:
         why = "no finite angles, no ranges, or no sense in their limits"
         remarks.append(Remark(action="dropped", what="scans", why=why, count=broken, loss=True))
@@ -246,6 +255,19 @@ def _mounts(
     """Find where each frame of the scans sits on the robot.
 
     Without odometry it does not matter for the map; the lidar is taken to be the robot where nobody says more.
+
+    Args:
+        tree: The transforms.
+        base: Frame of the robot.
+        frames: Of the scans, the one of most scans first.
+        options: The mounting, where it was given.
+        measured: Whether there is odometry.
+
+    Returns:
+        The mountings that are known.
+
+    Raises:
+        InvalidInputError: That of most scans is not.
     """
     if options.mount is not None or options.upside_down:
         given = Mount(Pose2(*(options.mount or (0.0, 0.0, 0.0))), options.upside_down)
@@ -260,7 +282,10 @@ def _mounts(
         if frame and found is not None and found != clean_name(frame):
             why = f"{frame} is not among the transforms; taken to be {found}"
             remarks.append(Remark(action="guessed", what="frame", why=why))
-    mounts = {frame: tree.mount(base or "", frame) for frame in frames}
+    mounts = {frames[0]: tree.mount(base or "", frames[0])}
+    for frame in frames[1:]:
+        with contextlib.suppress(InvalidInputError):
+            mounts[frame] = tree.mount(base or "", frame)
     for frame, mount in mounts.items():
         if mount.tilt > LEVEL:
             why = f"{frame} is tilted by {math.degrees(mount.tilt):.0f} degrees; taken to be level"

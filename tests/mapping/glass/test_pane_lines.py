@@ -10,6 +10,7 @@ from closedrooms.core.grid import FREE, OCCUPIED, GridFrame, OccupancyGrid
 from closedrooms.mapping.glass.pane_lines import (
     MOST_TURNED,
     THICK,
+    draw_lines,
     join_lines,
     sample,
     turn_into_walls,
@@ -42,6 +43,18 @@ def test_a_pane_is_turned_into_the_line_of_the_walls_beside_it(heading: float, s
     assert np.allclose(found.mean(axis=0), 0.0)
     assert math.isclose(math.dist(*found), 2.0 * half)
     assert np.hypot(*(found - ends).T).max() <= 0.1
+
+
+@given(st.floats(-math.pi, math.pi), st.sampled_from([-0.05, 0.05]), st.floats(0.1, 0.6))
+def test_a_pane_that_was_met_a_cell_beside_the_wall_is_shifted_into_it(
+    heading: float, aside: float, half: float
+) -> None:
+    along, across = np.array([math.cos(heading), math.sin(heading)]), np.array([-math.sin(heading), math.cos(heading)])
+    ends = np.outer([-half, half], along) + aside * across
+    found = turn_into_walls(ends, walls(heading, half + 0.05), reach=1.5)
+    beyond = found.mean(axis=0) + np.outer([-half - 1.0, half + 1.0], (found[1] - found[0]) / (2.0 * half))
+    # A wall of one cell, slanted, fills a cell to either side.
+    assert np.abs(beyond @ across).max() <= 0.08
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(0.075, 0.6))
@@ -89,23 +102,27 @@ def test_places_along_panes_are_near_each_other_and_reach_both_ends(ends: list[t
     st.floats(-math.pi, math.pi),
     st.tuples(st.floats(0.15, 1.5), st.floats(0.1, 0.6), st.floats(0.15, 1.5)),
     st.floats(-0.25, 0.25),
-    st.booleans(),
+    st.sampled_from(["nothing", "a wall", "a wall behind a thick pane"]),
     st.permutations([0, 1]),
 )
 def test_panes_in_line_are_one_where_a_wall_between_them_parts_it(
-    heading: float, lengths: tuple[float, float, float], aside: float, wall: bool, order: list[int]
+    heading: float, lengths: tuple[float, float, float], aside: float, between: str, order: list[int]
 ) -> None:
     first, gap, second = lengths
     turn = np.array([[math.cos(heading), math.sin(heading)], [-math.sin(heading), math.cos(heading)]])
     cells = np.full(FRAME.shape, FREE, dtype=np.int8)
-    if wall:
+    wall, met = between != "nothing", np.zeros((0, 2))
+    if between == "a wall":
         # It ends just behind the pane.
         rows, cols = FRAME.to_cells(np.column_stack((np.zeros(100), np.linspace(0.04, 1.5, 100))) @ turn).T
         cells[rows, cols] = OCCUPIED
+    elif wall:
+        # The pane before it is met, and nothing else to either side of the line.
+        met = np.column_stack((np.linspace(-gap / 2, gap / 2, 20), np.zeros(20))) @ turn
     grid = OccupancyGrid(FRAME, cells)
     one = np.array([[-first - gap / 2, 0.0], [-gap / 2, 0.0]]) @ turn
     other = np.array([[gap / 2, aside], [gap / 2 + second, aside]]) @ turn
-    found = join_lines([[one, other][k] for k in order], grid)
+    found = join_lines([[one, other][k] for k in order], grid, met)
     # Clearly in line: they lie so far from the line through their middles at most.
     if wall and gap < 0.5 and abs(aside) < 0.05:
         assert len(found) == 1
@@ -119,4 +136,16 @@ def test_panes_side_by_side_and_across_stay_two() -> None:
     grid = OccupancyGrid(FRAME, np.full(FRAME.shape, OCCUPIED, dtype=np.int8))
     line = np.array([[0.0, 0.0], [1.0, 0.0]])
     for other in ([[0.0, 0.3], [1.0, 0.3]], [[1.3, -0.5], [1.3, 0.5]], [[1.2, 0.3], [2.2, 0.3]]):
-        assert len(join_lines([line, np.array(other)], grid)) == 2
+        assert len(join_lines([line, np.array(other)], grid, np.zeros((0, 2)))) == 2
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(0.05, 0.6))
+def test_both_faces_of_a_pane_are_in_line_however_thick_it_is(heading: float, thickness: float) -> None:
+    along, across = np.array([math.cos(heading), math.sin(heading)]), np.array([-math.sin(heading), math.cos(heading)])
+    t = np.arange(-1.0, 1.01, 0.05)
+    places = np.concatenate([t[:, None] * along + side * thickness / 2.0 * across for side in (-1.0, 1.0)])
+    found = draw_lines(places, np.broadcast_to(across, places.shape), 0.05)
+    assert 1 <= len(found) <= 2
+    for line in found:
+        assert np.abs(np.sort(line @ along) - [-1.0, 1.0]).max() < 0.02
+        assert np.abs(line @ across).max() < thickness / 2.0 + 1e-6

@@ -331,3 +331,35 @@ def test_beams_end_at_the_nearest_pane_that_they_went_through(seed: int) -> None
                 expected[k] = away
     found = before_glass(Beams(ends, ends, origin), pose, panes)
     assert np.hypot(*(found.outline - origin).T) == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_pane_behind_an_open_door_goes_on_to_the_wall() -> None:
+    # The leaf hides all but its first third from the front; beams slip in between from the side.
+    pane, leaf = (3.0, 6.0, 4.2, 6.0), (3.4, 5.55, 4.3, 5.55)
+    route = [(1.5, 3.0), (3.1, 4.6), (3.1, 5.3), (2.0, 3.5), (3.1, 5.2), (5.5, 3.0)]
+    grid, map_T_world = mapped(GlassWorld([*walls_beside(pane), leaf], pane), route)
+    assert known_share(grid, map_T_world, ROOM_BEHIND) < 0.01
+    assert occupied_share(grid, map_T_world, pane) > 0.9
+
+
+def test_a_pane_of_half_a_metre_beside_a_doorway_is_one_once_it_was_passed_again() -> None:
+    pane = (3.0, 6.0, 3.6, 6.0)
+    grid, map_T_world = mapped(GlassWorld(HALL, pane), [*ROUTE, (7.0, 4.6), (1.0, 4.6)])
+    assert occupied_share(grid, map_T_world, pane) > 0.9
+    assert occupied_share(grid, map_T_world, (3.9, 6.0, 4.8, 6.0)) == 0.0
+
+
+def test_who_stood_between_walls_at_first_and_left_is_no_pane() -> None:
+    # Half a metre wide, seen from the front; afterwards only at an angle.
+    before = [(2.0, 3.0), (4.0, 3.0), (4.0, 4.8)]
+    route = [*before, (2.0, 4.6), (1.0, 5.6), (7.0, 5.6)]
+    gap = walls_beside((3.6, 6.0, 4.4, 6.0))
+    there, gone = (SegmentWorld(walls) for walls in ([*gap, (3.75, 6.0, 4.25, 6.0)], gap))
+    count = len(there.drive(before, beams=720).scans)
+    first, second = there.drive(route, beams=720), gone.drive(route, beams=720)
+    mapper = Mapper()
+    scans = [*first.scans[:count], *second.scans[count:]]
+    for scan, odometry in zip(scans, second.odometry, strict=True):
+        mapper.process(scan, Pose2(*odometry))
+    mapper.finish()
+    assert occupied_share(mapper.grid(), Pose2(2.0, 3.0, 0.0).inverse(), (3.85, 6.0, 4.15, 6.0)) == 0.0

@@ -196,3 +196,16 @@ def test_as_many_points_are_looked_at_as_a_face_reaches() -> None:
         bent[kink:, 0] += 0.5 * (np.arange(80 - kink) + 1) * 0.05
         normals, _ = faces(bent, np.array([40]), np.array([(3.0, 0.0)]))
         assert (abs(float(normals[0, 1])) > 0.02) == turned
+
+
+@pytest.mark.parametrize("distance", [0.3, 0.5, 1.0])
+def test_a_wall_in_front_of_the_sensor_faces_it_despite_noise_though_its_points_stand_close(distance: float) -> None:
+    # Half a degree apart, with 1 cm of noise, as far askew as glass returns anything.
+    rng = np.random.default_rng(0)
+    points = wall(0.4, distance, spread=math.radians(20.0), count=81)
+    ranges = np.hypot(*points.T)
+    points *= ((ranges + rng.normal(0.0, 0.01, 81)) / ranges)[:, None]
+    at = np.arange(25, 56)
+    normals, _ = faces(points, at, points[at])
+    off = np.abs(np.abs(np.arctan2(normals[:, 1], normals[:, 0]) - 0.4 + math.pi / 2) % math.pi - math.pi / 2)
+    assert np.mean(off < math.radians(20.0)) > 0.9

@@ -61,3 +61,9 @@ def test_without_turns_or_without_odometry_nothing_is_concluded(office: Any) -> 
     drive = office.drive(TOUR, seed=4, view=math.pi, **NOISE)
     alone = RecordedRun(tuple(stated_as(drive.scans, 1.5)), np.zeros((len(drive.scans), 3)), has_odometry=False)
     assert with_fitting_view(alone) is alone
+
+
+def test_scans_of_one_beam_have_no_view(office: Any) -> None:
+    drive = office.drive(TOUR, seed=4, view=math.pi, **NOISE)
+    scans = [replace(scan, ranges=scan.ranges[:1]) for scan in drive.scans]
+    assert find_view_factor(scans, drive.odometry) is None

@@ -1,4 +1,4 @@
-"""What a robot that cannot go on puts into its costmap: what it touches, and a barrier where it was held up."""
+"""What a robot that cannot go on puts into its costmap: what it touches, what it sees, and a barrier."""
 
 import math
 
@@ -7,11 +7,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.robot import RobotConfig
 from closedrooms.core.scan import LaserScan
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.navigation.driving.met_obstacles import BARRIER_STEP, TOUCHING, barrier, touching_points
+from closedrooms.navigation.driving.costmap import NavigationMap
+from closedrooms.navigation.driving.met_obstacles import (
+    BARRIER_STEP,
+    LOOK,
+    MAPPED,
+    TOUCHING,
+    barrier,
+    touching_points,
+    unmapped_points,
+)
 
 CONFIG = NavigationConfig().for_robot(RobotConfig())
 METRES = st.floats(-20.0, 20.0)
@@ -55,3 +65,25 @@ def test_what_touches_is_what_stands_close_to_the_footprint_and_what_presses() -
     felt = touching_points(pose, LaserScan(np.full(8, 3.0), -math.pi, math.pi / 4, 20.0), CONFIG, (0.0, math.pi / 2))
     radius = CONFIG.robot.radius
     assert np.allclose(felt, [(1.0, 2.0 + radius), (1.0 - radius, 2.0)])
+
+
+def test_what_is_seen_where_the_costmap_is_free_is_found_once() -> None:
+    # A room of 6 x 6 m around the robot; a wall at x = 1 m, of which the map shows the part above y = 0 a little off.
+    cells = np.full((120, 120), FREE, dtype=np.int8)
+    cells[60:, 82] = OCCUPIED
+    cells[:, :50] = UNKNOWN
+    known = NavigationMap(CONFIG)
+    known.update(OccupancyGrid(GridFrame(0.05, -3.0, -3.0, 120, 120), cells))
+    pose, angles = Pose2(0.0, 0.0, math.pi), np.linspace(-math.pi, math.pi, 720, endpoint=False)
+    with np.errstate(divide="ignore"):
+        ranges = np.where(np.cos(angles) < -1e-3, -1.0 / np.cos(angles), np.inf)
+    ranges[340:380] = 2.5  # behind the robot, where nothing is known
+    scan = LaserScan(ranges, -math.pi, 2 * math.pi / 720, 20.0)
+    found = unmapped_points(pose, scan, known.costmap)
+    assert found[:, 0] == pytest.approx(np.ones(len(found)), abs=0.05)
+    reach = math.sqrt(LOOK**2 - 1.0)
+    assert found[:, 1].min() == pytest.approx(-reach, abs=0.2)
+    assert found[:, 1].max() == pytest.approx(-MAPPED, abs=0.1)
+    known.add_obstacles(found)
+    known.update(OccupancyGrid(GridFrame(0.05, -3.0, -3.0, 120, 120), cells))
+    assert len(unmapped_points(pose, scan, known.costmap)) == 0

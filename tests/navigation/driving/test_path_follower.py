@@ -229,3 +229,18 @@ def test_an_obstacle_at_once_ahead_leaves_no_speed() -> None:
     wall = np.array([(0.24, y) for y in np.arange(-1.0, 1.0, 0.02)])
     slow = limit_speed(Steering(0.5, 0.2, 1.0, 2.0), wall, CONFIG)
     assert (slow.v, slow.w) == (0.0, 0.0)
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.15, 2.5), st.floats(-3.1, 3.1)), max_size=6),
+    st.floats(0.01, 1.5),
+    st.floats(-2.0, 2.0),
+)
+def test_speed_is_that_of_the_whole_arc_however_far_the_points_are(
+    places: list[tuple[float, float]], v: float, w: float
+) -> None:
+    points = np.array([(r * math.cos(a), r * math.sin(a)) for r, a in places]).reshape(-1, 2)
+    room = free_distance(points, v, w, CONFIG)
+    slow = limit_speed(Steering(v, w, 1.0, 2.0), points, CONFIG)
+    assert slow.v == min(v, math.sqrt(2.0 * CONFIG.deceleration * room))
+    assert slow.w == w * slow.v / v

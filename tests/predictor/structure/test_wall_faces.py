@@ -68,7 +68,24 @@ def test_the_free_space_of_a_slanted_wall_lies_across_it(degrees):
 
 
 @pytest.mark.parametrize(
-    "cut", [lambda m: m, lambda m: m.T, lambda m: m[:, ::-1], lambda m: m[2:7, 3:9].T, lambda m: m[::2, ::3]]
+    "cut",
+    [
+        lambda m: m,
+        lambda m: m.T,
+        lambda m: m[:, ::-1],
+        lambda m: m[2:7, 3:9].T,
+        lambda m: m[::2, ::3],
+        lambda m: m[::-1],
+        lambda m: m[2:9, 3:8][::-1, ::-1],
+        lambda m: m.T[:, ::-1],
+        lambda m: m.T[::-1],
+        lambda m: m.T[2:9, 3:8][::-1, ::-1],
+        lambda m: m[::2, ::-3],
+        lambda m: m[3:4, ::-1],
+        lambda m: m[:, 5:6][::-1, ::-1],
+        lambda m: m[2:7, 3:3].T,
+        lambda m: np.broadcast_to(m[0], (4, 30))[:, ::-1],
+    ],
 )
 def test_a_mask_is_laid_out_row_after_row_and_stays_the_same(cut):
     mask = np.random.default_rng(0).random((20, 30)) < 0.5

@@ -10,6 +10,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.formats.houseexpo import read_houseexpo
 from closedrooms.worlds.geometry import wall_area
+from closedrooms.worlds.library import load_world
 from closedrooms.worlds.outline import leaks
 from closedrooms.worlds.plan import FloorPlan
 
@@ -98,3 +99,10 @@ def test_floor_that_no_box_covers_and_categories_without_a_list_are_said(tmp_pat
     assert (said["rooms"].action, said["rooms"].names, said["rooms"].loss) == ("dropped", ("Bath",), True)
     whole = read(tmp_path, SQUARE, Bedroom=[[0, 0, 4, 8]], Kitchen=[[4, 0, 10, 8]])
     assert [remark.what for remark in whole.remarks] == ["doors"]
+
+
+def test_a_list_of_homes_is_refused_by_what_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "homes.json"
+    path.write_text(json.dumps([{"verts": SQUARE, "room_category": {}}] * 2))
+    with pytest.raises(InvalidInputError, match="a list of 2 homes; expected one HouseExpo home a file"):
+        load_world(str(path))

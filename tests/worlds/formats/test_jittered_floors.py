@@ -181,3 +181,11 @@ def test_gaps_between_rooms_close_at_any_angle(tmp_path: Path) -> None:
         offices = [room_interior(plan, room.id) for room in plan.rooms if room.label == "kontor"]
         apart = sorted(a.distance(b) for n, a in enumerate(offices) for b in offices[n + 1 :])[:3]
         assert apart == pytest.approx([0.15] * 3, abs=0.03)
+
+
+def test_coordinates_that_are_no_numbers_are_the_reason(tmp_path: Path) -> None:
+    path = tmp_path / "floor.xml"
+    head, mark, rest = floor_xml(0.0, 0.0, 0).partition("/>")
+    path.write_text(head + mark + rest.replace(".", ","))
+    with pytest.raises(InvalidInputError, match="with their contour lines have no four numbers"):
+        read_kth(path)

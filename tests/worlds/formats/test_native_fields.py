@@ -137,3 +137,15 @@ def test_names_and_lists_may_be_so_long_and_no_longer(
     monkeypatch.setattr(native, "MAX_ELEMENTS", 3)
     with pytest.raises(InvalidInputError, match="rooms r: no polygon; expected a list of points"):
         read(tmp_path, small, **bare)
+
+
+def test_parts_of_other_names_and_headings_in_degrees_are_said(small: FloorPlan, tmp_path: Path) -> None:
+    def said(**changes: Any) -> list[str]:
+        return [str(remark) for remark in read(tmp_path, small, **changes).remarks]
+
+    assert said() == []
+    assert said(openigs=[{}], author="a") == ["dropped 2 parts (openigs, author): a plan has none of this name"]
+    assert said(start=[3.0, 1.0, 6.3]) == []
+    for heading in (90, -180.0):
+        (remark,) = said(start=[3.0, 1.0, heading])
+        assert remark.startswith(f"guessed heading of the start: {heading:g} is more than a turn (degrees?)")

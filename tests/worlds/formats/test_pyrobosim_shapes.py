@@ -9,6 +9,7 @@ import yaml
 from shapely.geometry import Polygon, box
 
 from closedrooms.core.errors import InvalidInputError
+from closedrooms.core.remarks import Remark
 from closedrooms.worlds.formats import pyrobosim
 from closedrooms.worlds.formats.pyrobosim import (
     _centre_line,
@@ -139,11 +140,19 @@ def test_the_yaw_of_a_tilted_turn() -> None:
 
 
 def test_the_thinnest_wall_that_is_one_is_taken() -> None:
-    for widths, wall in (
-        ([], 0.2), ([0.3], 0.3), ([0.3, 0.1, 0.2], 0.1), ([0.05], 0.05), ([1.0], 1.0), ([0.04, 1.1], 0.2),
-        (["x", None], 0.2),
+    for widths, wall, others in (
+        ([], 0.2, 0), ([0.3], 0.3, 0), ([0.3, 0.1, 0.2], 0.1, 2), ([0.05], 0.05, 0), ([1.0], 1.0, 0),
+        ([0.04, 1.1], 0.2, 2), (["x", None], 0.2, 2), ([0.2, 0.2], 0.2, 0),
     ):  # fmt: skip
-        assert _wall_width([{"wall_width": width} for width in widths]) == wall
+        remarks: list[Remark] = []
+        assert _wall_width([{"wall_width": width} for width in widths], remarks) == wall
+        assert [(remark.action, remark.count) for remark in remarks] == ([("repaired", others)] if others else [])
+    remarks = []
+    # What a room does not say is the width that pyrobosim gives it.
+    assert _wall_width([{}, {"wall_width": 0.3}], remarks) == 0.3
+    assert [remark.count for remark in remarks] == [1]
+    assert _wall_width([{}, {"wall_width": 0.2}], remarks) == 0.2
+    assert len(remarks) == 1
 
 
 def test_footprints_are_free_floor_between_walls(tmp_path: Path) -> None:

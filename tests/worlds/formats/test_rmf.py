@@ -216,3 +216,15 @@ def test_a_level_without_measurements_is_scaled_by_the_fiducials_it_shares(tmp_p
     plan = read(tmp_path, data, "L2")
     assert sorted(round(room.polygon.area) for room in plan.rooms) == [30, 50]
     assert ["fiducials" in remark.why for remark in plan.remarks if remark.what == "scale"] == [True]
+
+
+def test_parameters_are_read_as_the_editor_writes_them_and_as_people_do(tmp_path: Path) -> None:
+    data = building(coordinate_system="reference_image")
+    data["levels"]["L1"]["measurements"] = [[0, 1, {"distance": 20.0}]]
+    data["levels"]["L1"]["doors"][0][2]["type"] = "sliding"
+    plan = read(tmp_path, data)
+    assert plan.doors[0].kind == "sliding"
+    assert sorted(room.polygon.area for room in plan.rooms) == pytest.approx([120.0, 200.0])
+    data["levels"]["L1"]["measurements"] = [[0, 1, {"distance": [3, "far"]}]]
+    with pytest.raises(InvalidInputError, match=r"without measurements; dropped measurements: no distance between two"):
+        read(tmp_path, data)

@@ -177,7 +177,7 @@ def test_the_mean_of_the_measurements_is_taken(second: float, told: bool) -> Non
     }
     remarks: list[Remark] = []
     assert _scale({"levels": {"L1": fields}}, fields, FILE, remarks) == pytest.approx((5.0 + second) / 100.0)
-    assert len(remarks) == told
+    assert [(remark.what, remark.count) for remark in remarks] == [("measurements", 1), *[("scale", 1)] * told]
     bare: dict[str, Any] = {"vertices": [[0, 0]]}
     remarks = []
     scale = _scale(

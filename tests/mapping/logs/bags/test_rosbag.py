@@ -541,8 +541,15 @@ def test_scans_of_two_lidars_on_one_topic_have_the_mounting_of_their_own_frame(a
 
 def test_of_two_lidars_the_mounting_of_one_is_no_help_for_the_other(new_bag: Bags) -> None:
     path = with_two_lidars(new_bag().drive(12, scans=False), ("front", FRONT)).write()
-    with pytest.raises(InvalidInputError, match=r"unknown mounting.*base_link to rear"):
-        read_run(path)
+    run = read_run(path)
+    assert np.array(mounts(run)) == pytest.approx(np.array([FRONT] * 8))
+    (remark,) = run.remarks
+    assert (remark.action, remark.what, remark.count, remark.loss) == ("dropped", "scans", 4, True)
+    assert "no transform says where rear sits" in remark.why
+    # That of most scans has to be known.
+    rear = with_two_lidars(new_bag().drive(12, scans=False), ("rear", REAR)).write()
+    with pytest.raises(InvalidInputError, match=r"unknown mounting.*base_link to front"):
+        read_run(rear)
     run = read_run(path, mount=REAR)
     assert np.array(mounts(run)) == pytest.approx(np.array([REAR, FRONT, FRONT] * 4))
     (remark,) = run.remarks
