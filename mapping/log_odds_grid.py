@@ -7,6 +7,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from closedrooms.core.arrays import BoolArray, CellArray, FloatArray, IntArray, Mask
 from closedrooms.core.grid import UNKNOWN, OccupancyGrid
@@ -31,11 +32,26 @@ other; and who looks along a wall past a face that lies a little too far out see
 SAME_SIDE = 0.5
 """Product of the mean directions from which a place was hit, and was missed by scans that end nearby, from which on
 both saw it from the same side: of a wall whose two faces fell on one cell both directions are mixed, and short."""
+AnyInts = npt.NDArray[np.int64] | npt.NDArray[np.int32]
 LatticeWindow = tuple[int, int, int, int]
 """First row and column in the arrays, and number of rows and columns."""
 Counts = np.ndarray[Any, np.dtype[Any]]
 WindowCells = tuple[IntArray, tuple[int, int]]
 """Cells of a window, flat, and its rows and columns."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sides:
+    """From where the cells were seen that one scan hit, and those near the end of what it crossed.
+
+    Attributes:
+        beside: The latter, as flat indices in the window of the scan.
+        towards: Direction of the viewpoint from the hit cells and then from these, rows and columns, shape (2, n), to
+            an eighth of a turn: -1, 0 or 1 each.
+    """
+
+    beside: npt.NDArray[np.int32]
+    towards: npt.NDArray[np.int8]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,15 +64,20 @@ class Imprint:
         shape: Rows and columns of the window.
         misses: Which cells were crossed: the window's mask, eight cells a byte.
         hits: Cells that were hit, as flat indices in the window, each once.
-        viewpoint: Of the scan: row and column in the window.
+        sides: From where they were seen, and what was crossed near its end.
     """
 
     row: int
     col: int
     shape: tuple[int, int]
     misses: Mask
-    hits: IntArray
-    viewpoint: tuple[float, float]
+    hits: npt.NDArray[np.int32]
+    sides: Sides
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the arrays [bytes]."""
+        return sum(array.nbytes for array in (self.misses, self.hits, self.sides.beside, self.sides.towards))
 
 
 class EvidenceGrid:
@@ -107,16 +128,18 @@ class EvidenceGrid:
 
     def add_all(self, scans: Sequence[tuple[Beams, Pose2]], *, sign: int = 1) -> None:
         """Count scans in or out again, each as by :meth:`add`; the arrays grow once for all."""
-        for drawn in self._draw(scans):
-            self._count(*drawn, sign)
+        for window, mask, hits, viewpoint in self._draw(scans):
+            sides = self._sides_of(mask, hits, viewpoint) if self._draws else None
+            self._count(window, mask, hits, sides, sign)
 
     def imprint(self, beams: Beams, map_T_robot: Pose2) -> Imprint | None:
         """Find what :meth:`add` would count, for :meth:`count_imprint`; ``None`` for a scan that crossed nothing."""
         for (row, col, rows, cols), mask, hits, viewpoint in self._draw([(beams, map_T_robot)]):
             lattice = self._lattice
             hits.sort()
-            once = hits[np.diff(hits, prepend=-1) > 0]  # sooner than np.unique
-            return Imprint(row + lattice.row0, col + lattice.col0, (rows, cols), np.packbits(mask), once, viewpoint)
+            once = hits[np.diff(hits, prepend=-1) > 0].astype(np.int32)  # sooner than np.unique
+            sides = self._sides_of(mask, once, viewpoint)
+            return Imprint(row + lattice.row0, col + lattice.col0, (rows, cols), np.packbits(mask), once, sides)
         return None
 
     def count_imprint(self, imprint: Imprint, *, sign: int = 1) -> None:
@@ -124,7 +147,7 @@ class EvidenceGrid:
         rows, cols = imprint.shape
         mask = np.unpackbits(imprint.misses, count=rows * cols).reshape(rows, cols)
         window = (imprint.row - self._lattice.row0, imprint.col - self._lattice.col0, rows, cols)
-        self._count(window, mask, imprint.hits, imprint.viewpoint, sign)
+        self._count(window, mask, imprint.hits, imprint.sides, sign)
 
     def _draw(
         self, scans: Sequence[tuple[Beams, Pose2]]
@@ -157,14 +180,17 @@ class EvidenceGrid:
             mask.ravel()[flat] = 0
             yield window, mask, flat, (view[0], view[1])
 
-    def _count(
-        self, window: LatticeWindow, mask: Mask, flat: IntArray, viewpoint: tuple[float, float], sign: int
-    ) -> None:
+    def _count(self, window: LatticeWindow, mask: Mask, flat: AnyInts, sides: Sides | None, sign: int) -> None:
         """Add hits (``flat``: indices in the window) and misses (``mask``) of a keyframe, or take them off."""
         # A cell that several beams hit counts once: the same sum is written for each.
-        self._hits.reshape(-1)[self._flat(flat, window)[0]] += sign
-        if self._draws:
-            self._count_sides(window, mask, flat, viewpoint, sign)
+        at = self._flat(flat, window)[0]
+        self._hits.reshape(-1)[at] += sign
+        if sides is not None:
+            beside, towards = self._flat(sides.beside, window)[0], sides.towards if sign > 0 else -sides.towards
+            self._beside.reshape(-1)[beside] += sign
+            for of_hits, of_misses, part in zip(self._hit_from, self._beside_from, towards, strict=True):
+                of_hits.reshape(-1)[at] += part[: len(at)]
+                of_misses.reshape(-1)[beside] += part[len(at) :]
         if sign > 0:
             cv2.accumulate(mask, self._misses[_slices(window)])
         else:
@@ -172,24 +198,24 @@ class EvidenceGrid:
             cv2.subtract(misses, mask, misses, dtype=cv2.CV_32F)
         self._dirty = window if self._dirty is None else _union(self._dirty, window)
 
-    def _count_sides(
-        self, window: LatticeWindow, mask: Mask, flat: IntArray, viewpoint: tuple[float, float], sign: int
-    ) -> None:
-        """Count misses near the end of what was crossed, and from where these and hits were seen, to an eighth turn."""
+    def _sides_of(self, mask: Mask, flat: AnyInts, viewpoint: tuple[float, float]) -> Sides:
+        """Find from where a scan saw what it hit (``flat``), and what it crossed (``mask``) near the end of that."""
         near = cv2.subtract(mask, cv2.erode(mask, self._same_wall))
-        hits = len(flat)
-        at, rows, cols = self._flat(np.concatenate((flat, np.flatnonzero(near.view(np.bool_)))), window)
-        self._beside.reshape(-1)[at[hits:]] += sign
-        away = viewpoint[0] - rows, viewpoint[1] - cols
-        far = np.maximum(np.hypot(*away), 1e-9)
-        for of_hits, of_misses, part in zip(self._hit_from, self._beside_from, away, strict=True):
-            side = (sign * np.rint(part / far)).astype(np.int16)
-            of_hits.reshape(-1)[at[:hits]] += side[:hits]
-            of_misses.reshape(-1)[at[hits:]] += side[hits:]
+        beside = np.flatnonzero(near.view(np.bool_))
+        cells = np.concatenate((flat, beside))
+        rows = cells // mask.shape[1]
+        row, col = viewpoint[0] - rows, viewpoint[1] - (cells - rows * mask.shape[1])
+        row_squared, col_squared = row * row, col * col
+        towards = np.sign(np.stack((row, col))).astype(np.int8)
+        # Less than half of the distance lies along that axis.
+        towards[0, 3.0 * row_squared <= col_squared] = 0
+        towards[1, 3.0 * col_squared <= row_squared] = 0
+        return Sides(beside.astype(np.int32), towards)
 
-    def _flat(self, cells: IntArray, window: LatticeWindow) -> tuple[IntArray, IntArray, IntArray]:
+    def _flat(self, cells: AnyInts, window: LatticeWindow) -> tuple[IntArray, IntArray, IntArray]:
         """Convert flat indices in a window to those in the arrays, and to rows and columns in the window."""
         row, col, _, width = window
+        cells = cells.astype(np.int64, copy=False)
         rows = cells // width  # with the product sooner than np.divmod
         cols = cells - rows * width
         return (rows + row) * self._lattice.cols + (cols + col), rows, cols

@@ -35,9 +35,9 @@ from closedrooms.worlds.geometry import areal
 # A ray counts as ended on an open leaf when it went this far, less so many standard deviations of the range [m]. Rays
 # that ended just before it come along: they are cast anew, which gives what they measured but for the noise.
 NEAR_LEAF, SIGMAS = 0.02, 4.0
-# Most memory of the drawn scans that are remembered, most of them with some doors closed [bytes]: 2,500 scans of
-# school-08, whose maps ask for 24,000. 6,100 of these differ, fewer than 7,200 are drawn; with 500 it would be 17,600.
-KEPT = 64_000_000
+# Most memory of the drawn scans that are remembered, most of them with some doors closed [bytes]: about 2,000 scans of
+# school-08, whose maps ask for 24,000. 6,100 of these differ; with 2,500 fewer than 7,200 are drawn, with 500 17,600.
+KEPT = 104_000_000
 # Of the objects of a drawn scan beside its arrays [bytes].
 OVERHEAD = 2500
 # Scans that are cleaned in one go: less time, the same numbers.
@@ -83,7 +83,7 @@ class _Drawn:
     @property
     def size(self) -> int:
         """How much memory it takes [bytes]."""
-        drawn = 0 if self.imprint is None else self.imprint.misses.nbytes + self.imprint.hits.nbytes
+        drawn = 0 if self.imprint is None else self.imprint.nbytes
         return OVERHEAD + self.scan.ranges.nbytes + drawn
 
 
