@@ -41,6 +41,7 @@ from closedrooms.mapping.logs import RecordedRun, read_run
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
+from closedrooms.mapping.scan_odometry import ScanOdometry
 from closedrooms.mapping.scan_preparation import prepare_scans
 from closedrooms.mapping.trajectory import ate
 
@@ -63,8 +64,11 @@ KISS_VOXEL = 0.5
 def map_run(run: RecordedRun, config: MapperConfig) -> tuple[Mapper, FloatArray]:
     """Map a run: the mapper, and the poses as estimated at the time, shape (scans, 3)."""
     mapper = Mapper(config)
-    taken = zip(run.scans, run.odometry, prepare_scans(run.scans, config), strict=True)
-    online = [mapper.process(scan, Pose2(*pose), prepared=ready).as_tuple() for scan, pose, ready in taken]
+    follower = None if run.has_odometry else ScanOdometry(config)
+    online = []
+    for scan, pose, ready in zip(run.scans, run.odometry, prepare_scans(run.scans, config), strict=True):
+        moved = Pose2(*pose) if follower is None else follower.follow(ready.points, scan.stamp)
+        online.append(mapper.process(scan, moved, prepared=ready).as_tuple())
     mapper.finish()
     mapper.grid()
     return mapper, np.array(online)
