@@ -245,16 +245,7 @@ def directions(angle_min: float, increment: float, beams: int) -> tuple[FloatArr
 
 def thin_points(points: FloatArray, spacing: float, most: int) -> FloatArray:
     """Thin the points of a scan, shape (n, 2), in beam order, to ``most`` at most, about ``spacing`` [m] apart."""
-    if len(points) < 3:
-        return points
-    # As :func:`spaced` does it for many scans at once.
-    x, y = np.ascontiguousarray(points.T)
-    along = np.zeros(len(points))
-    np.cumsum(np.minimum(np.hypot(x[1:] - x[:-1], y[1:] - y[:-1]), spacing), out=along[1:])
-    ticks = np.floor(along / max(spacing, float(along[-1]) / most))
-    keep = np.ones(len(points), dtype=np.bool_)
-    np.greater(ticks[1:], ticks[:-1], out=keep[1:])
-    return points[keep]
+    return points[spaced(points, np.array([len(points)]), spacing, most)]
 
 
 def spaced(points: FloatArray, counts: IntArray, spacing: float, most: int) -> BoolArray:

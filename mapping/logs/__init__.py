@@ -3,7 +3,7 @@
 - ROS bags: ``bags/`` reads and writes them; doors that a person clicked too.
 - CARMEN logs: ``carmen``, ``carmen_lines``, ``carmen_odometry``.
 - NumPy archives: ``npz``.
-- All of them: ``clocks``, ``recorded_odometry``, ``odometry_units``, ``recorded_run``.
+- All of them: ``clocks``, ``recorded_odometry``, ``odometry_units``, ``stated_view``, ``recorded_run``.
 """
 
 from typing import TYPE_CHECKING
