@@ -15,14 +15,12 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.beams import Beams, clean, hit_points, matched_range, thin_points
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.door_fusion import fuse_doors
-from closedrooms.mapping.glass.leaks import without_leaks
 from closedrooms.mapping.glass.met_surfaces import Glimpse
-from closedrooms.mapping.glass.panes import Panes
 from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.graph.keyframe_graph import KeyframeGraph
 from closedrooms.mapping.graph.pose_graph import Edge
 from closedrooms.mapping.local_map import LocalMap
-from closedrooms.mapping.log_odds_grid import EvidenceGrid
+from closedrooms.mapping.map_drawing import MapDrawing
 from closedrooms.mapping.mapping_events import Event, EventLog
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.relocalisation import relocalise
@@ -33,8 +31,6 @@ from closedrooms.mapping.scan_preparation import PreparedScan
 from closedrooms.mapping.sweep_motion import SweepMotion
 from closedrooms.mapping.visibility import conflict
 
-MOVED = (0.015, 0.003)
-"""Correction of a keyframe ([m], [rad]) beyond which it is drawn anew."""
 SCORE_MEMORY = 0.05
 """Weight of the newest match in the usual score."""
 COMPARED_KEYFRAMES = 2
@@ -44,8 +40,6 @@ GOOD_SCORE = 0.75
 GLIMPSE, GLIMPSE_RANGE = 0.06, 1.2
 """Distance between scans whose near surfaces are looked at for glass [m], and up to which those are near [m]: of a pane
 that is 0.3 m away, 0.1 m is in view."""
-LOOK = 4
-"""Keyframes after which it is looked for glass anew."""
 
 
 class Mapper:
@@ -60,14 +54,10 @@ class Mapper:
         self._graph = KeyframeGraph(self._config)
         self._events = EventLog()
         self._hessian: FloatArray = np.zeros((3, 3))
-        self._drawn = self._looked = 0
         self._trusted = True
         self._lost = 0
-        self._evidence = EvidenceGrid(self._config)
-        self._corrected = self._finished = False
+        self._drawing = MapDrawing(self._config)
         self._glimpsed = Pose2()
-        self._panes = Panes(self._config.resolution)
-        self._without_leaks: tuple[OccupancyGrid, OccupancyGrid] | None = None
         self._pose = Pose2()
         self._prediction = MotionPrediction(self._config.recovery, self._events)
         self._motion = UncertainMotion()
@@ -97,7 +87,7 @@ class Mapper:
     @property
     def panes(self) -> FloatArray:
         """Panes of glass found so far, map frame, shape (n, 2, 2) [m]."""
-        return self._panes.segments
+        return self._drawing.panes.segments
 
     @property
     def events(self) -> tuple[Remark, ...]:
@@ -171,7 +161,7 @@ class Mapper:
             points = hit_points(scan, max_range=GLIMPSE_RANGE, motion=motion)
             origin = np.array(scan.robot_T_sensor[:2])
         self._glimpsed = self._pose
-        self._panes.glimpse(Glimpse(latest.index, keyframe_T_robot, points, origin))
+        self._drawing.panes.glimpse(Glimpse(latest.index, keyframe_T_robot, points, origin))
 
     def _sweep_motion(self, scan: LaserScan, odometry: Pose2 | None) -> SweepMotion | None:
         """Find how the robot moved while a sweep was taken, ``None`` where that does not matter or is not known."""
@@ -329,7 +319,7 @@ class Mapper:
 
     def _insert(self, keyframe: Keyframe) -> None:
         """Add a keyframe to graph and local map, and close a loop where there is one."""
-        self._finished = False
+        self._drawing.goes_on()
         if self.keyframes:
             latest = self.keyframes[-1]
             chord = latest.pose.distance(keyframe.pose)
@@ -363,42 +353,11 @@ class Mapper:
         """Move what hangs on the keyframes (the robot's pose, doors, map) with them."""
         self._pose = self.keyframes[-1].pose
         self._local.clear()
-        self._drawn, self._corrected = 0, True
+        self._drawing.poses_moved()
 
     def grid(self) -> OccupancyGrid:
         """Draw the map so far, from the keyframes' present poses."""
-        grid = self._draw_with_panes()
-        if not len(self._panes.segments):
-            return grid
-        if self._without_leaks is None or self._without_leaks[0] is not grid:
-            places = np.array([(keyframe.pose.x, keyframe.pose.y) for keyframe in self.keyframes])
-            self._without_leaks = grid, without_leaks(grid, places)
-        return self._without_leaks[1]
-
-    def _draw_with_panes(self) -> OccupancyGrid:
-        grid = self._draw()
-        new = len(self.keyframes) - self._looked
-        if not self._config.glass or new < (1 if self._finished else LOOK):
-            return grid
-        self._looked = len(self.keyframes)
-        changed = self._panes.update(self.keyframes, self._evidence, moved=self._corrected, last=self._finished)
-        self._corrected = False
-        if not len(changed):
-            return grid
-        for keyframe in self._panes.seen_through(self.keyframes, changed):
-            keyframe.shown = None
-        self._drawn = 0
-        return self._draw()
-
-    def _draw(self) -> OccupancyGrid:
-        moved = [keyframe for keyframe in self.keyframes[self._drawn :] if _outdated(keyframe)]
-        self._evidence.add_all([k.drawn for k in moved if k.drawn is not None], sign=-1)
-        for keyframe, shown in zip(moved, self._panes.shown(self.keyframes, moved), strict=True):
-            keyframe.shown = shown
-            keyframe.drawn = (keyframe.shown, keyframe.pose)
-        self._evidence.add_all([k.drawn for k in moved if k.drawn is not None])
-        self._drawn = len(self.keyframes)
-        return self._evidence.grid()
+        return self._drawing.grid(self.keyframes)
 
     def doors(self) -> list[ClosedDoor]:
         """Fuse the closed doors seen so far, map frame, sorted by id."""
@@ -423,20 +382,4 @@ class Mapper:
 
     def look_for_glass(self) -> None:
         """Look for glass in all that was seen, as if nothing came after, when the map is drawn next."""
-        if not self._config.glass:
-            return
-        self._finished = True
-        self._looked = 0
-        self._panes.start_again()
-        for keyframe in self.keyframes:
-            if keyframe.shown is not keyframe.beams:  # what no pane has cut need not be drawn anew
-                keyframe.shown = None
-        self._drawn = 0
-
-
-def _outdated(keyframe: Keyframe) -> bool:
-    """Check whether a keyframe is not drawn as, and where, it is now."""
-    if keyframe.drawn is None or keyframe.shown is not keyframe.drawn[0]:
-        return True
-    drawn, pose = keyframe.drawn[1], keyframe.pose
-    return drawn.distance(pose) > MOVED[0] or abs(wrap_angle(drawn.theta - pose.theta)) > MOVED[1]
+        self._drawing.look_again(self.keyframes)

@@ -13,7 +13,8 @@ from closedrooms.mapping import mapper as module
 from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.config import MapperConfig, RecoveryConfig
 from closedrooms.mapping.graph.keyframe import Keyframe
-from closedrooms.mapping.mapper import Mapper, _outdated
+from closedrooms.mapping.map_drawing import _outdated
+from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.matching.gauss_newton_matcher import Refined
 from closedrooms.mapping.matching.scan_matcher import Match
 from closedrooms.mapping.motion import UncertainMotion
