@@ -118,9 +118,8 @@ class Panes:
         if len(places):
             self._places = np.concatenate((self._places, places))
             self._normals = np.concatenate((self._normals, normals))
-            self._asked = np.concatenate(
-                (self._asked, np.setdiff1d(find_candidates(self._places, self._resolution), self._asked))
-            )
+            unasked = np.setdiff1d(np.arange(len(self._places)), self._asked)
+            self._asked = np.concatenate((self._asked, find_candidates(self._places, unasked, self._resolution)))
         if not len(self._asked):
             return self.segments[:0]
         self._ask(keyframes)
