@@ -81,6 +81,8 @@ def _own_process() -> None:
     end_in_time(SIGNALS, _leave)
     # Most of what imports make stays: to look through it again and again takes a twentieth of a short command.
     gc.set_threshold(COLLECTED_AT)
+    # Our matrices are small: a second thread of linear algebra waits in a busy loop for a fiftieth of a run's time.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if not sys.warnoptions:
         # What there is to say of an input we say ourselves. Workers inherit the option.
         sys.warnoptions.append("ignore")

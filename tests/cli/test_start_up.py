@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -100,3 +101,19 @@ def test_a_dataset_loads_neither_tours_nor_scipy(tmp_path: Path) -> None:
     # scipy solves the pose graph, where a loop closes; threads are limited by what joblib uses too.
     found = {name for name in loaded(tmp_path, *words) if name.split(".")[0] != "scipy"}
     assert found <= SIMULATION - TOURS | MAPS | UNIQUE | {"pyarrow", "cloudpickle", "threadpoolctl"}
+
+
+@pytest.mark.parametrize(("asked", "expected"), [(None, "1"), ("2", "2")])
+def test_linear_algebra_has_one_thread_unless_the_user_asks_for_more(asked: str | None, expected: str) -> None:
+    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    environment |= {} if asked is None else {"OPENBLAS_NUM_THREADS": asked}
+    code = """
+import atexit, os, sys
+early = "numpy" in sys.modules
+atexit.register(lambda: print("asked", os.environ.get("OPENBLAS_NUM_THREADS"), early, flush=True))
+sys.argv[1:] = ["worlds", "list", "--quiet"]
+from closedrooms.cli import main
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    assert done.stdout.splitlines()[-1] == f"asked {expected} False"
