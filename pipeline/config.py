@@ -53,7 +53,8 @@ class RunConfig:
     """The one seed of the run: which rooms are closed, and every source of noise."""
 
     method: str = DEFAULT_METHOD
-    """How rooms are predicted: ``paper`` is what the authors describe and ran, ``best`` as good as we can."""
+    """How rooms are predicted: ``best``, ``learned``, ``paper`` (as the authors describe and ran it), ``rose``,
+    ``line-of-sight`` or ``geometric``."""
 
     completions: int = 0
     """Tell the cost of coverage as a distribution: from so many completions, drawn from what the rooms may be."""

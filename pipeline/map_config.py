@@ -30,7 +30,8 @@ class PredictConfig:
     """Folder to write."""
 
     method: str = DEFAULT_METHOD
-    """How rooms are predicted: ``paper`` is what the authors describe and ran, ``best`` as good as we can."""
+    """How rooms are predicted: ``best``, ``learned``, ``paper`` (as the authors describe and ran it), ``rose``,
+    ``line-of-sight`` or ``geometric``."""
 
     record: bool = False
     """Write the recording ``run.rrd`` for the rerun viewer."""

@@ -33,7 +33,7 @@ class EvaluateConfig:
     """Folder to write; the same command again goes on where it stopped."""
 
     methods: tuple[str, ...] = COMPARED
-    """What to compare."""
+    """Methods to compare; ``learned`` can be named too."""
 
     workers: int = 2
     """Local processes."""
