@@ -35,7 +35,7 @@ class SharedOptions:
     """Print the result as one JSON object."""
 
     verbose: Annotated[Switch, tyro.conf.arg(aliases=["-v"])] = False
-    """Tell every step and every failure."""
+    """Print every step and every failure."""
 
     quiet: Annotated[Switch, tyro.conf.arg(aliases=["-q"])] = False
     """Print nothing but errors."""

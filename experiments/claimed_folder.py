@@ -1,6 +1,8 @@
 """An output folder that a command fills bit by bit and goes on with."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from closedrooms.core.errors import InvalidInputError, OutputError
 from closedrooms.core.files.incoming import read_json
@@ -37,4 +39,15 @@ def claim_folder(folder: Path, command: str) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot write ({error.strerror}): {folder}") from error
-    write_json(manifest, {"program": PROGRAM, KEY: SCHEMA, "command": command, "files": []})
+    write_manifest(folder, command, {"files": []})
+
+
+def write_manifest(folder: Path, command: str, about: Mapping[str, Any]) -> None:
+    """Write the folder's ``run.json``.
+
+    Args:
+        folder: Claimed by :func:`claim_folder`.
+        command: As the manifest names it.
+        about: What else there is to say.
+    """
+    write_json(folder / MANIFEST, {"program": PROGRAM, KEY: SCHEMA, "command": command, **about})

@@ -197,10 +197,10 @@ class RecoveryConfig:
     """Half width of the window in which a submap is sought in an older one, all headings [m]."""
 
     possible_speed: float = 5.0
-    """Speed beyond which a step of the odometry is none [m/s]: no robot indoors is as fast."""
+    """Speed beyond which a step of the odometry is an error [m/s]: no robot indoors is as fast."""
 
     possible_turn_rate: float = 8.0
-    """Turn rate beyond which a step of the odometry is none [rad/s]."""
+    """Turn rate beyond which a step of the odometry is an error [rad/s]."""
 
     def __post_init__(self) -> None:
         check_magnitudes(self, owner="recovery", positive=())

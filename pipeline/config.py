@@ -35,7 +35,8 @@ class RunConfig:
     """Several seeds, e.g. ``--seeds 0 1 2``: a run of every world for each, in place of ``--seed``."""
 
     close: int | None = None
-    """How many rooms to close, drawn by the seed; 5, or as many as the world has, when no doors are named either."""
+    """How many rooms to close, drawn by the seed; 5, or as many as the world has, if ``--close-doors`` is not given
+    either."""
 
     close_doors: str | None = None
     """Doors to close by name, with commas between them, e.g. ``d03,d07``."""
@@ -53,10 +54,11 @@ class RunConfig:
     """The one seed of the run: which rooms are closed, and every source of noise."""
 
     method: str = DEFAULT_METHOD
-    """How rooms are predicted: ``paper`` is what the authors describe and ran, ``best`` as good as we can."""
+    """How rooms are predicted: ``best``, ``learned``, ``paper`` (as the authors describe and ran it), ``rose``,
+    ``line-of-sight`` or ``geometric``."""
 
     completions: int = 0
-    """Tell the cost of coverage as a distribution: from so many completions, drawn from what the rooms may be."""
+    """Estimate the cost of coverage as a distribution, from so many draws of what the rooms may be; 0 leaves it out."""
 
     drive: bool = False
     """After the prediction, open the doors and drive the tour that was planned on the predicted map."""
@@ -72,7 +74,7 @@ class RunConfig:
     """Open the rerun viewer and stream the recording to it while it is written."""
 
     web: bool = False
-    """The same, served to a browser on this machine: for those without a desktop."""
+    """As ``--live``, served to a browser on this machine; needs no desktop."""
 
     keep_scans: bool = False
     """Write ``scans.npz``: every scan with odometry, estimated and true pose."""

@@ -30,7 +30,8 @@ class PredictConfig:
     """Folder to write."""
 
     method: str = DEFAULT_METHOD
-    """How rooms are predicted: ``paper`` is what the authors describe and ran, ``best`` as good as we can."""
+    """How rooms are predicted: ``best``, ``learned``, ``paper`` (as the authors describe and ran it), ``rose``,
+    ``line-of-sight`` or ``geometric``."""
 
     record: bool = False
     """Write the recording ``run.rrd`` for the rerun viewer."""
@@ -62,7 +63,7 @@ class CoverConfig:
     """Folder to write."""
 
     doors: Path | None = None
-    """Closed doors whose positions the tour shall visit too: GeoJSON in the map frame, metres."""
+    """Closed doors that the tour visits too: GeoJSON in the map frame, metres."""
 
     start: tuple[float, float] | None = None
     """Where the robot is, x and y in the map frame [m]: of several parts that are not connected, its own is covered;
@@ -76,14 +77,14 @@ class CoverConfig:
     driven; ``nav2`` as that and as the waypoints that nav2's panel loads (``waypoints.yaml``)."""
 
     completions: int = 0
-    """Predict the rooms behind ``--doors`` and tell the cost of covering them too, as a distribution: from so many
-    completions of the map, drawn from what the rooms may be."""
+    """Predict the rooms behind ``--doors`` and estimate the cost of covering them too, as a distribution, from so many
+    draws of what the rooms may be; 0 leaves it out."""
 
     method: str = DEFAULT_METHOD
     """How rooms are predicted for ``--completions``."""
 
     seed: int = 0
-    """Of the draws of ``--completions``."""
+    """Seed of the draws of ``--completions``."""
 
     robot_radius: float | None = None
     """Radius of the robot [m] for which every place and path has room; 0.20 m where not given (the same as

@@ -251,7 +251,7 @@ class SimConfig:
     robot_wheels: str | None = None
     """Its driven wheels, names of joints with commas between them; found by themselves where not given."""
     doors: Literal["latched", "unlatched"] = "latched"
-    """Closed doors that are latched open by their motor alone; unlatched ones also when the robot pushes (wheels)."""
+    """How closed doors open: ``latched`` by their motor alone, ``unlatched`` also when the robot (wheels) pushes."""
     glass: float = 0.0
     """Share of the walls, drawn by the seed, that are of glass beside those that the plan says are [0..1]."""
     people: int = 0

@@ -46,7 +46,7 @@ class DatasetConfig:
     """Orders in which the doors of a world are closed one after the other (paper, section 5: 15)."""
 
     max_closed: int = 15
-    """Most closed doors in a world, where it has so many that close a room (paper, table 1: 15)."""
+    """Largest number of closed doors in a map; fewer where a world has fewer rooms to close (paper, table 1: 15)."""
 
     seed: int = 0
     """The one seed: orders of closing, splits and every source of noise."""

@@ -33,7 +33,7 @@ class EvaluateConfig:
     """Folder to write; the same command again goes on where it stopped."""
 
     methods: tuple[str, ...] = COMPARED
-    """What to compare."""
+    """Methods to compare; ``learned`` can be named too."""
 
     workers: int = 2
     """Local processes."""
@@ -48,8 +48,8 @@ class EvaluateConfig:
     """Write each sample's probability of every cell too (``probability.yaml`` and ``.png``), about 20 kB a map."""
 
     completions: int = 0
-    """Also tell the cost of coverage of every sample as a distribution, from so many completions drawn from what the
-    rooms may be, and how often the true cost lies in its interval. Needs no ``tours``."""
+    """Also estimate the cost of coverage of every sample as a distribution, from so many draws of what the rooms may
+    be, and how often the true cost lies in its interval; 0 leaves it out. Works with ``--no-tours`` too."""
 
     worst: int = 12
     """Samples on the contact sheet of the worst cases."""

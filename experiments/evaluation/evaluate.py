@@ -7,12 +7,11 @@ from functools import partial
 from statistics import median
 from typing import Any
 
-from closedrooms.core.files.outgoing import write_json
-from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer, real_path
+from closedrooms.core.files.output_folders import MANIFEST, only_writer, real_path
 from closedrooms.core.remarks import Remark
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
-from closedrooms.experiments.claimed_folder import claim_folder
+from closedrooms.experiments.claimed_folder import claim_folder, write_manifest
 from closedrooms.experiments.evaluation.config import EvaluateConfig
 from closedrooms.experiments.evaluation.samples.listing import find_samples
 from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
@@ -67,8 +66,6 @@ def _evaluate(samples: Sequence[SamplePath], config: EvaluateConfig, progress: P
     seconds = _seconds(scores)
     remarks = _unchecked(samples)
     manifest = {
-        "program": PROGRAM,
-        "command": "evaluate",
         "configuration": resolved(config, leave_out=("datasets", "out", "workers", "scheduler")),
         "paths": {"datasets": [input_path(folder) for folder in config.datasets]},
         "versions": versions(),
@@ -79,7 +76,7 @@ def _evaluate(samples: Sequence[SamplePath], config: EvaluateConfig, progress: P
         "durations": {"prediction_median_s": seconds},
         "files": sorted(path.name for path in config.out.iterdir() if path.name != MANIFEST),
     }
-    write_json(config.out / MANIFEST, manifest)
+    write_manifest(config.out, "evaluate", manifest)
     return Report(
         folder=config.out,
         title=f"{len(samples)} samples",

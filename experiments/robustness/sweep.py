@@ -12,12 +12,12 @@ from pathlib import Path
 from closedrooms.core.errors import InvalidInputError, OutputError, reason
 from closedrooms.core.files.incoming import read_json
 from closedrooms.core.files.outgoing import write_json
-from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer, real_path
+from closedrooms.core.files.output_folders import MANIFEST, only_writer, real_path
 from closedrooms.core.names import file_name
 from closedrooms.core.remarks import Remark
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
-from closedrooms.experiments.claimed_folder import claim_folder
+from closedrooms.experiments.claimed_folder import claim_folder, write_manifest
 from closedrooms.experiments.dataset.variants import given_worlds, remarks_on, world_sources
 from closedrooms.experiments.evaluation.scoring.tours import code_digest
 from closedrooms.experiments.robustness.config import FACTORS, RobustnessConfig
@@ -72,8 +72,6 @@ def _sweep(worlds: dict[str, str], config: RobustnessConfig, progress: Progress,
     progress.stage("report")
     found = write_report(config, rows, failures)
     manifest = {
-        "program": PROGRAM,
-        "command": "robustness",
         "configuration": resolved(config, leave_out=("worlds", "out", "workers", "scheduler")),
         "paths": {"worlds": world_sources(config.worlds)},
         "versions": versions(),
@@ -82,7 +80,7 @@ def _sweep(worlds: dict[str, str], config: RobustnessConfig, progress: Progress,
         "remarks": [remark.as_json() for remark in remarks],
         "files": sorted(path.name for path in config.out.iterdir() if path.name != MANIFEST),
     }
-    write_json(config.out / MANIFEST, manifest)
+    write_manifest(config.out, "robustness", manifest)
     return Report(
         folder=config.out,
         title=f"{len(worlds) - len(failures)} worlds, {config.repetitions} sets of {config.closed} doors each",

@@ -20,22 +20,22 @@ class TrainConfig:
     """Folder to write: the model, its card and curves; the same command again goes on where it stopped."""
 
     epochs: int = 6
-    """Passes over all doors; the rate of learning falls to nothing over them."""
+    """Passes over all doors; over them the learning rate falls to zero."""
 
     patience: int = 3
-    """So many passes in a row that make nothing better on the buildings held out end the training."""
+    """The training ends after so many passes in a row without a gain on the buildings held out."""
 
     held_out: float = 0.2
-    """Share of the buildings that say when to stop."""
+    """Share of the buildings that are not learned from and say when to stop."""
 
     batch: int = 32
-    """Doors learned from at once."""
+    """Batch size [doors]."""
 
     rate: float = 0.003
-    """Largest rate of learning."""
+    """Largest learning rate."""
 
     decay: float = 0.05
-    """Decay of the weights."""
+    """Weight decay."""
 
     threads: int = 2
     """Threads of torch; results repeat for the same number of them."""

@@ -10,12 +10,12 @@ import numpy as np
 
 from closedrooms.core.arrays import IntArray
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.core.files.outgoing import write_bytes, write_json
-from closedrooms.core.files.output_folders import MANIFEST, PROGRAM, only_writer
+from closedrooms.core.files.outgoing import write_bytes
+from closedrooms.core.files.output_folders import only_writer
 from closedrooms.core.random import stream
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
-from closedrooms.experiments.claimed_folder import claim_folder
+from closedrooms.experiments.claimed_folder import claim_folder, write_manifest
 from closedrooms.experiments.evaluation.samples.listing import find_samples
 from closedrooms.experiments.evaluation.scoring.tours import code_digest
 from closedrooms.experiments.training.config import TrainConfig
@@ -94,8 +94,6 @@ def _train(gathered: Gathered, config: TrainConfig, progress: Progress) -> Repor
         "unused_doors": gathered.unused,
     }
     manifest = {
-        "program": PROGRAM,
-        "command": "train",
         "configuration": resolved(config, leave_out=("datasets", "out")),
         "paths": {"datasets": [input_path(dataset) for dataset in config.datasets]},
         "versions": versions(),
@@ -104,7 +102,7 @@ def _train(gathered: Gathered, config: TrainConfig, progress: Progress) -> Repor
         "failures": gathered.failures,
         "files": sorted([MODEL, CARD, TABLE, PICTURE, CHECKPOINT]),
     }
-    write_json(config.out / MANIFEST, manifest)
+    write_manifest(config.out, "train", manifest)
     rows = [("figure", "value"), *((name.replace("_", " "), str(value)) for name, value in figures.items())]
     title = f"{len(fit)} doors of {len(names[0])} buildings"
     return Report(folder=config.out, title=title, rows=rows, failures=gathered.failures, figures=figures)

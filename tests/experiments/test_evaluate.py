@@ -16,6 +16,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import ClosedroomsError
 from closedrooms.core.files.geojson import read_rooms, write_doors, write_rooms
 from closedrooms.core.files.rosmap import read_map, write_map
+from closedrooms.core.files.schema import SCHEMA
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.room import Room
 from closedrooms.experiments.evaluation.config import EvaluateConfig
@@ -66,6 +67,7 @@ def test_writes_tables_pictures_and_the_rooms_of_every_sample(evaluated: Path) -
     tables = {f"{name}.{kind}" for name in names for kind in ("csv", "parquet")}
     pictures = {"iou.png", "reliability.png", "figure-05.png", "figure-07.png", "figure-09.png", "worst.png"}
     assert files == {"run.json", "report.html", *tables, *pictures}
+    assert json.loads((out / "run.json").read_text())["schema"] == SCHEMA
     assert read_rooms(out / "paper" / "house" / "01" / "rooms.geojson")[0].doors == ("d1",)
     assert not (out / "authors" / "house" / "02").exists()
 
