@@ -61,7 +61,8 @@ def sector_of(message: Any, beams: int) -> tuple[float, float, str]:
     if not (math.isfinite(start) and math.isfinite(step) and beams):
         raise InvalidInputError("a scan without angles", expected="finite angles")
     if step != 0.0 and abs(step) * (beams - 1) <= LARGEST_VIEW:
-        return start, step, ""
+        opposite = abs(view + step * (beams - 1)) <= SAME_VIEW * abs(view)
+        return start, step, "the step runs against the last angle; taken as the step says, as RViz does" * opposite
     agree = step != 0.0 and any(abs(step * gaps - view) <= SAME_VIEW * abs(view) for gaps in (beams - 1, beams))
     if agree and math.radians(abs(step)) * (beams - 1) <= LARGEST_VIEW:
         return math.radians(start), math.radians(step), "in degrees"

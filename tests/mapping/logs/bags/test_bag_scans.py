@@ -120,6 +120,9 @@ def test_what_is_too_near_is_no_measurement_and_limits_are_those_of_the_sensor()
         (-1.5, 300.0, 1.5, 301, (-1.5, 0.01, "step")),
         (-1.5, 0.0, 1.5, 301, (-1.5, 0.01, "step")),
         (1.5, 0.0, -1.5, 301, (1.5, -0.01, "step")),
+        # First and last angle that say the other way round.
+        (1.5, 0.01, -1.5, 301, (1.5, 0.01, "runs against")),
+        (-1.5, -0.01, 1.5, 301, (-1.5, -0.01, "runs against")),
     ],
 )
 def test_angles_come_from_what_makes_sense(
