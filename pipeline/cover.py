@@ -19,7 +19,7 @@ from closedrooms.coverage.tour.drivable_path import find_drivable_paths
 from closedrooms.coverage.tour.ros_tour import write_path_message, write_waypoints
 from closedrooms.coverage.tour.tour_features import make_tour_features
 from closedrooms.coverage.tour.tour_planner import plan_coverage
-from closedrooms.pipeline.given_doors import given_doors
+from closedrooms.pipeline.given_doors import given_doors, misplaced_doors
 from closedrooms.pipeline.map_config import CoverConfig
 from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
@@ -47,6 +47,7 @@ def cover_map(config: CoverConfig, *, progress: Progress | None = None) -> Repor
         remarks = list(read.remarks)
         given = given_doors(config.doors, remarks) if config.doors else []
         grid, doors = read.grid, read.doors_on_grid(given)
+        remarks += misplaced_doors(read, doors)
         start = None if config.start is None else _on_grid(read, config.start)
     manifest: dict[str, Any] = {
         "command": "cover",

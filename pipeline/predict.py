@@ -13,7 +13,7 @@ from closedrooms.core.files.rosmap import RosMap, read_ros_map, write_map, write
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.report import Report
 from closedrooms.core.room import Room
-from closedrooms.pipeline.given_doors import given_doors
+from closedrooms.pipeline.given_doors import given_doors, misplaced_doors
 from closedrooms.pipeline.map_config import PredictConfig
 from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
@@ -62,6 +62,7 @@ def predict_map(
         remarks = list(read.remarks)
         given = given_doors(config.doors, remarks) if given is None else given
         grid, doors = read.grid, read.doors_on_grid(given)
+        remarks += misplaced_doors(read, doors)
     manifest: dict[str, Any] = {
         "command": "predict",
         "configuration": resolved(config, leave_out=("map", "doors", "out")),

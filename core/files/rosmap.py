@@ -26,6 +26,8 @@ from closedrooms.core.room import Room
 # 205 is p = 0.196078: a free_thresh of 0.196 keeps it unknown, 0.25 would reload it as free.
 FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
 PIXEL_FREE, PIXEL_UNKNOWN, PIXEL_OCCUPIED = 254, 205, 0
+# Greys so far apart, each of so large a share of a picture, mean different things to whoever drew it.
+APART, MOST_RARE = 16, 0.05
 # Greys of a JPEG that are as far from the usual unknown still mean it: of plans saved at quality 50 and above.
 SPREAD = 24
 # Half the thickness of a thick wall [m], and share of the cells of one kind further inside it from which they are none.
@@ -205,6 +207,10 @@ def read_ros_map(path: Path, *, allow_outside: bool = False) -> RosMap:
     if resolution > COARSE:
         why = f"{resolution:g} m a cell shows no door (centimetres?); taken as metres"
         remarks.append(Remark(action="guessed", what="resolution", why=why))
+    remarks += _merged_greys(counts, table)
+    if 0 < counts.sum() < grid.cells.size and not grid.free.any():
+        why = "no opaque pixel is free; transparent ones are unknown"
+        remarks.append(Remark(action="guessed", what="cells", why=why))
     if _looks_inverted(grid):
         why = "what is free is as thin as walls, what is occupied is wide: an inverted picture (negate)?"
         remarks.append(Remark(action="guessed", what="cells", why=why))
@@ -283,6 +289,23 @@ def _odd_greys(counts: npt.NDArray[np.int64], fields: dict[str, Any], mode: str,
         return []
     why = f"{unknown} means unknown, though free_thresh {free_below:g} makes it free"
     return [Remark(action="guessed", what="cells", why=why, count=count)]
+
+
+def _merged_greys(counts: npt.NDArray[np.int64], table: CellArray) -> list[Remark]:
+    """Say where two greys that somebody told apart are both free, or both occupied: unknown space of another program.
+
+    Args:
+        counts: Opaque pixels of each grey, shape (256,).
+        table: The cell of each grey, shape (256,).
+    """
+    frequent = counts >= max(MOST_RARE * counts.sum(), 1)
+    told = []
+    for cell, name in ((FREE, "free"), (OCCUPIED, "occupied")):
+        greys = np.flatnonzero(frequent & (table == cell))
+        if greys.size and greys[-1] - greys[0] >= APART:
+            why = f"greys {', '.join(map(str, greys))} are all {name} by the thresholds (is one of them unknown?)"
+            told.append(Remark(action="guessed", what="cells", why=why, count=int(counts[greys].sum())))
+    return told
 
 
 def _read_fields(path: Path) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from closedrooms.predictor.best.door_pose import DoorPose, face_door
 from closedrooms.predictor.best.resolution import RESOLUTION
 from closedrooms.predictor.config import BestConfig
 from closedrooms.predictor.paper.initial_layouts import unusable
-from closedrooms.predictor.structure.clutter import free_islands
+from closedrooms.predictor.structure.clutter import free_islands, without_specks
 from closedrooms.predictor.structure.edges import shows_walls
 from closedrooms.predictor.structure.known_window import at_resolution, known_window
 from closedrooms.predictor.structure.wall_directions import find_wall_directions
@@ -63,7 +63,7 @@ def prepare(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config: BestConfig
     window = known_window(grid)
     if window is None:
         return Scene(config, grid, failures={door.id: "the map is all unknown" for door in doors})
-    working = at_resolution(window, RESOLUTION)
+    working = without_specks(at_resolution(window, RESOLUTION))
     del window  # a copy of a large map
     working = free_islands(working, config.clutter_area, [door.midpoint for door in waiting], config.door_reach)
     directions = find_wall_directions(working) if shows_walls(working) else None

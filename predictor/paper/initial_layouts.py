@@ -13,7 +13,7 @@ from closedrooms.predictor.paper.arrangement import Arrangement, build_arrangeme
 from closedrooms.predictor.paper.initial_faces import Entrance, find_entrance, splits_between
 from closedrooms.predictor.paper.unknown_faces import unknown_faces
 from closedrooms.predictor.paper.wall_lines import WallLines, find_structure
-from closedrooms.predictor.structure.clutter import free_islands
+from closedrooms.predictor.structure.clutter import free_islands, without_specks
 from closedrooms.predictor.structure.edges import shows_walls
 from closedrooms.predictor.structure.known_window import at_resolution, known_window
 
@@ -65,7 +65,7 @@ def find_initial_faces(grid: OccupancyGrid, doors: Sequence[ClosedDoor], config:
         return None, {door.id: "the map is all unknown" for door in doors}
     if not window.free.any():
         return None, {door.id: "the map holds no free cell" for door in doors}
-    working = at_resolution(window, config.lines.resolution)
+    working = without_specks(at_resolution(window, config.lines.resolution))
     del window  # a copy of a large map
     working = free_islands(working, config.clutter_area, [door.midpoint for door in waiting], config.door_reach)
     structure = find_structure(working, config) if shows_walls(working) else None

@@ -6,12 +6,14 @@ import numpy as np
 
 from closedrooms.core.arrays import handed_over
 from closedrooms.core.door import Point
-from closedrooms.core.grid import FREE, OccupancyGrid
+from closedrooms.core.grid import FREE, UNKNOWN, OccupancyGrid
 from closedrooms.predictor.structure.known_window import known_window
 from closedrooms.predictor.structure.rose import find_rose
 
 # Walls are thinner than this [m]; tables and cupboards are not, and fill this share of the rectangle around them.
 THIN, FILLED = 0.5, 0.5
+# No robot drove on a piece of floor this small that only unknown space surrounds [m2].
+SPECK = 0.05
 
 
 def filter_clutter(grid: OccupancyGrid) -> OccupancyGrid:
@@ -76,3 +78,26 @@ def free_islands(grid: OccupancyGrid, area: float, doors: Sequence[Point], reach
     cleared = grid.cells.copy()
     cleared[gone[pieces]] = FREE
     return OccupancyGrid(grid.frame, handed_over(cleared))
+
+
+def without_specks(grid: OccupancyGrid) -> OccupancyGrid:
+    """Forget free cells that lie alone in unknown space, and what touches them: stray beams, dust of a picture.
+
+    A room behind a closed door would end at each of them.
+
+    Args:
+        grid: A map.
+    """
+    import cv2
+
+    _, pieces, figures, _ = cv2.connectedComponentsWithStats(grid.known.view(np.uint8), connectivity=8)
+    small = figures[:, cv2.CC_STAT_AREA] * grid.frame.resolution**2 < SPECK
+    small[np.unique(pieces[~grid.known])] = False
+    floor = np.zeros(len(figures), dtype=np.bool_)
+    floor[pieces[grid.free]] = True
+    gone = small & floor
+    if not gone.any():
+        return grid
+    cells = grid.cells.copy()
+    cells[gone[pieces]] = UNKNOWN
+    return OccupancyGrid(grid.frame, handed_over(cells))

@@ -16,7 +16,7 @@ from closedrooms.core.remarks import Remark
 from closedrooms.worlds.formats.portals import Portal, pair_portals, plan_of_portals
 from closedrooms.worlds.formats.room_outlines import GAP, clean_outlines, hull_areas, outline_lines, repaired
 from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
-from closedrooms.worlds.formats.xml_text import attribute, child, children, parse_xml, text
+from closedrooms.worlds.formats.xml_text import attribute, child, children, descendants, parse_xml, text
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
 
 WHAT = "a floor plan (Luperto XML)"
@@ -40,6 +40,9 @@ def read_luperto(path: str | Path, level: str | None = None) -> FloorPlan:
     """
     path = Path(path)
     root = parse_xml(path, what=WHAT)
+    if child(root, "scale") is None and not descendants(root, "space"):
+        kind = shown(root.tag.rpartition("}")[2], longest=40)
+        raise InvalidInputError(f"XML of another kind (<{kind}>)", expected=WHAT, where=path)
     remarks: list[Remark] = []
     metres = _scale(root, path, remarks)
     name, spaces = _floor(root, level, path)

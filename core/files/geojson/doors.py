@@ -1,6 +1,7 @@
 """Closed doors as GeoJSON: Points, or LineStrings from jamb to jamb."""
 
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,9 @@ STATES = ("state", "status")
 # States of doors that stand open, and of those that do not; any other is told.
 OPEN = ("open", "opened", "false", "0")
 CLOSED = ("closed", "shut", "locked", "true", "1")
+# Properties that say what a feature is, and what is no door.
+KINDS = ("type", "kind", "class", "category", "feature_type", "element", "layer")
+OTHERS = re.compile("wall|window|room|furniture|stair|column|pillar")
 # Doors wider than this are no doors, but are often in centimetres [m].
 ODD_WIDTH = 10.0
 # A line that is longer by this share than the distance of its ends has a bend.
@@ -64,6 +68,7 @@ def read_doors(path: Path, *, remarks: list[Remark] | None = None) -> list[Close
         (part, properties) for geometry, properties in read_features(path, what=what, remarks=told)
         for part in parts_of(geometry)
     ]  # fmt: skip
+    features = _without_others(features, told)
     check_count(len(features), MAX_DOORS, "doors", path)
     names = _door_names(features, path, told)
     doors, opened = [], []
@@ -85,11 +90,26 @@ def read_doors(path: Path, *, remarks: list[Remark] | None = None) -> list[Close
     return doors
 
 
+def _without_others(features: list[GeoFeature], remarks: list[Remark]) -> list[GeoFeature]:
+    """Leave out what the file itself calls a wall, a window or a room: editors draw a whole plan into one file."""
+
+    def other(properties: dict[str, Any]) -> str:
+        words = [str(value).lower() for key, value in properties.items() if str(key).lower() in KINDS]
+        found = [match[0] for word in words if "door" not in word for match in [OTHERS.search(word)] if match]
+        return found[0] if found else ""
+
+    kinds = [other(properties) for _, properties in features]
+    if any(kinds):
+        why = f"the file calls them {', '.join(sorted({*kinds} - {''}))}, not doors"
+        remarks.append(Remark(action="dropped", what="features", why=why, count=len(kinds) - kinds.count("")))
+    return [feature for feature, kind in zip(features, kinds, strict=True) if not kind]
+
+
 def _is_open(properties: dict[str, Any]) -> bool:
     """Check whether the properties of a door say that it stands open."""
     states, yes, no = (
         {str(properties.get(name, "")).strip().lower() for name in names}
-        for names in (STATES, ("open", "is_open"), ("closed", "is_closed"))
+        for names in (STATES, ("open", "opened", "is_open"), ("closed", "is_closed"))
     )
     return bool(states & {*OPEN} or yes & {"true", "1", "yes"} or no & {"false", "0", "no"})
 

@@ -1,6 +1,7 @@
 """Features of any geometry in the map frame as GeoJSON (metres, not degrees)."""
 
 import json
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -18,8 +19,8 @@ from closedrooms.core.remarks import Remark
 
 GeoFeature = tuple[BaseGeometry, dict[str, Any]]
 MAX_FEATURES = 1_000_000
-# Properties that editors and drivers spell in capitals (shapefiles, GDAL), by how they are spelt here.
-SPELT = ("id", "state", "status", "width", "open", "closed", "is_open", "is_closed")
+# Properties that others spell in capitals (shapefiles, GDAL), as isOpen or door-state, by how they are spelt here.
+SPELT = ("id", "state", "status", "width", "open", "opened", "closed", "is_open", "is_closed")
 METRES = ("m", "metre", "metres", "meter", "meters")
 DEGREES = ("CRS84", "4326", "4979", "WGS84", "WGS 84")
 
@@ -134,8 +135,14 @@ def read_feature(number: int, feature: Any, path: Path) -> GeoFeature:
         )
     if made.is_empty:
         raise InvalidInputError(f"feature {number} is empty", expected="a geometry in metres", where=path)
-    low = {str(key).lower(): value for key, value in properties.items()}
-    properties = {**properties, **{key: low[key] for key in SPELT if key in low and key not in properties}}
+    plain = {_spelling(str(key)): value for key, value in properties.items()}
+    properties = {**properties, **{key: plain[key] for key in SPELT if key in plain and key not in properties}}
     if properties.get("id") is None and feature.get("id") is not None:
         properties = {**properties, "id": feature["id"]}
     return made, properties
+
+
+def _spelling(key: str) -> str:
+    """Spell the name of a property as here: ``isOpen``, ``Is open``, ``door-state`` and ``doorState`` are one each."""
+    words = re.sub("(?<=[a-z])(?=[A-Z])", "_", key.strip()).lower()
+    return re.sub("[ -]+", "_", words).removeprefix("door_")

@@ -1,6 +1,7 @@
 """Laser scans of a bag as the robot sees them."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ SAME_VIEW = 0.02
 """Share by which last angle less first may miss the beams' steps: headers are rounded."""
 MARKS = 3
 """Different ranges beyond the longest that a sensor may write for "nothing" and errors."""
+NEAR_LIMIT, OFTEN = 0.9, 0.05
+"""From this share of the longest range on, one value that so many of the beams have means "nothing"."""
 SCAN, ECHOES = "sensor_msgs/msg/LaserScan", "sensor_msgs/msg/MultiEchoLaserScan"
 
 
@@ -43,6 +46,14 @@ def count_beyond(ranges: FloatArray, range_max: float) -> int:
     return int(far.size) if np.unique(np.round(far, 1)).size > MARKS else 0
 
 
+def mark_of_nothing(scans: Sequence[LaserScan]) -> float | None:
+    """Find the range just below the longest [m] that a driver writes where a beam met nothing, ``None`` without one."""
+    limit = max((scan.range_max for scan in scans), default=0.0)
+    ranges = np.concatenate([scan.ranges[np.isfinite(scan.ranges)] for scan in scans] or [np.zeros(0)])
+    values, counts = np.unique(ranges[(ranges >= NEAR_LIMIT * limit) & (ranges < limit)], return_counts=True)
+    return float(values[counts.argmax()]) if counts.max(initial=0) > OFTEN * ranges.size else None
+
+
 def sector_of(message: Any, beams: int) -> tuple[float, float, str]:
     """Resolve the angles of a sweep whose header need not make sense: public writers put degrees or a count of steps.
 
@@ -61,7 +72,8 @@ def sector_of(message: Any, beams: int) -> tuple[float, float, str]:
     if not (math.isfinite(start) and math.isfinite(step) and beams):
         raise InvalidInputError("a scan without angles", expected="finite angles")
     if step != 0.0 and abs(step) * (beams - 1) <= LARGEST_VIEW:
-        return start, step, ""
+        opposite = abs(view + step * (beams - 1)) <= SAME_VIEW * abs(view)
+        return start, step, "the step runs against the last angle; taken as the step says, as RViz does" * opposite
     agree = step != 0.0 and any(abs(step * gaps - view) <= SAME_VIEW * abs(view) for gaps in (beams - 1, beams))
     if agree and math.radians(abs(step)) * (beams - 1) <= LARGEST_VIEW:
         return math.radians(start), math.radians(step), "in degrees"

@@ -25,7 +25,14 @@ from closedrooms.mapping.logs.bags.bag_messages import (
     stamp_of,
 )
 from closedrooms.mapping.logs.bags.bag_options import BagOptions
-from closedrooms.mapping.logs.bags.bag_scans import count_beyond, ranges_of, scan_of, sector_of, sweep_of
+from closedrooms.mapping.logs.bags.bag_scans import (
+    count_beyond,
+    mark_of_nothing,
+    ranges_of,
+    scan_of,
+    sector_of,
+    sweep_of,
+)
 from closedrooms.mapping.logs.bags.transform_tree import (
     CORRECTED_FRAMES,
     LEVEL,
@@ -196,6 +203,11 @@ def _run(
     if beyond > MOST_BEYOND * measured:
         why = "beyond the range_max that the scans state, though they differ: a wrong header"
         remarks.append(Remark(action="dropped", what="ranges", why=why, count=beyond, loss=True))
+    nothing = mark_of_nothing(scans)
+    if nothing is not None:
+        scans = [replace(scan, range_max=min(scan.range_max, nothing)) for scan in scans]
+        why = f"{nothing:.6g} m, just below range_max, stands in many beams; taken to mean that they met nothing"
+        remarks.append(Remark(action="guessed", what="ranges", why=why))
     forwards, backwards = forward(stamps[np.flatnonzero(known)[rows]] if rows else np.zeros(0))
     swept = tuple(replace(scan, stamp=float(stamp)) for scan, stamp in zip(scans, forwards, strict=True))
     return RecordedRun(swept, poses[rows].reshape(-1, 3), None, (*remarks, *backwards), has_odometry)

@@ -349,9 +349,12 @@ def test_rings_that_are_not_closed_are_closed_and_said(tmp_path: Path, opened: i
     assert not any(remark.loss for remark in remarks)
 
 
-@pytest.mark.parametrize("key", ["status", "is_open", "IS_OPEN", "is_closed", "Status"])
+@pytest.mark.parametrize(
+    "key", ["status", "is_open", "IS_OPEN", "is_closed", "Status", "isOpen", "Is open", "isClosed", "doorState"]
+)
 def test_doors_that_are_open_by_another_property_are_left_out_and_said(tmp_path: Path, key: str) -> None:
-    words = {"status": ("open", "closed"), "is_open": (True, False), "is_closed": (0, 1)}[key.lower()]
+    kinds = {"status": ("open", "closed"), "open": (True, False), "closed": (0, 1), "state": ("open", "closed")}
+    words = next(words for end, words in kinds.items() if key.lower().endswith(end))
     features = [point(0, 0, id="a", **{key: words[0]}), point(3, 0, id="b", **{key: words[1]})]
     doors, remarks = told(collection(tmp_path / "d", *features))
     assert [door.id for door in doors] == ["b"]
@@ -369,3 +372,18 @@ def test_units_are_metres_in_any_spelling(tmp_path: Path, units: object, read: b
     else:
         with pytest.raises(InvalidInputError, match="units"):
             read_doors(path)
+
+
+@pytest.mark.parametrize("key", ["type", "Category", "layer"])
+def test_what_the_file_calls_a_wall_or_a_room_is_no_door(tmp_path: Path, key: str) -> None:
+    square = [[0, 0], [4, 0], [4, 3], [0, 0]]
+    room = {"type": "Feature", "properties": {key: "Room"}, "geometry": {"type": "Polygon", "coordinates": [square]}}
+    others = [point(0, 0, **{key: "outer_wall"}), room, point(9, 0, **{key: "window"})]
+    honest = [
+        point(1, 0, id="a", **{key: "bathroom door"}),
+        point(5, 0, id="b", **{key: "hinged"}),
+        point(7, 0, id="c"),
+    ]
+    doors, remarks = told(collection(tmp_path / "d", *others, *honest))
+    assert [door.id for door in doors] == ["a", "b", "c"]
+    assert remarks == ["dropped 3 features: the file calls them room, wall, window, not doors"]

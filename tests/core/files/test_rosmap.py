@@ -454,3 +454,31 @@ def test_cells_too_coarse_for_a_door_are_said(tmp_path: Path, resolution: str, s
     head = HEAD.replace("resolution: 0.05", f"resolution: {resolution}")
     read = read_ros_map(save(tmp_path, np.full((4, 6), 254, dtype=np.uint8), head))
     assert ["centimetres?" in remark.why for remark in read.remarks] == ([True] if said else [])
+
+
+@pytest.mark.parametrize(
+    ("greys", "said"),
+    [
+        ((254, 220, 0), "greys 220, 254 are all free"),
+        ((254, 60, 0), "greys 0, 60 are all occupied"),
+        ((254, 255, 0), None),
+        ((254, 205, 0), None),
+        ((254, 127, 0), None),
+    ],
+)
+def test_two_greys_of_one_meaning_are_said(tmp_path: Path, greys: tuple[int, ...], said: str | None) -> None:
+    pixels = np.repeat(np.array(greys, dtype=np.uint8), 20).reshape(6, 10)
+    why = [remark.why for remark in read_ros_map(save(tmp_path, pixels)).remarks]
+    assert len(why) == (said is not None)
+    assert said is None or said in why[0]
+    pixels[pixels == greys[1]] = 254
+    pixels[0, 0] = greys[1]  # some noise is nobody's grey
+    assert read_ros_map(save(tmp_path, pixels)).remarks == ()
+
+
+def test_a_picture_whose_floor_is_transparent_has_no_free_cell_and_says_so(tmp_path: Path) -> None:
+    pixels = np.zeros((6, 10, 4), dtype=np.uint8)
+    pixels[2, :, 3] = 255
+    read = read_ros_map(save(tmp_path, pixels))
+    assert (read.grid.free.any(), int(read.grid.occupied.sum())) == (False, 10)
+    assert [remark.why for remark in read.remarks] == ["no opaque pixel is free; transparent ones are unknown"]

@@ -71,6 +71,8 @@ def test_doors_swing_into_the_room_that_they_close(plan: FloorPlan) -> None:
         ("", "broken XML"),
         ("<building><floor>", "broken XML"),
         ("<building><scale/></building>", "scale of"),
+        ("<sdf version='1.6'><world><mesh><scale>1 1 1</scale></mesh></world></sdf>", "XML of another kind .<sdf>."),
+        ("<svg xmlns='http://www.w3.org/2000/svg'><g/></svg>", "XML of another kind .<svg>."),
         (
             "<building><scale><represented_distance><value>10</value></represented_distance>"
             "<real_distance><value>90</value></real_distance></scale><floor><spaces/></floor></building>",

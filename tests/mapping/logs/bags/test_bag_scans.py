@@ -12,7 +12,15 @@ from hypothesis import strategies as st
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.logs import read_run
-from closedrooms.mapping.logs.bags.bag_scans import ECHOES, SCAN, ranges_of, scan_of, sector_of, sweep_of
+from closedrooms.mapping.logs.bags.bag_scans import (
+    ECHOES,
+    SCAN,
+    mark_of_nothing,
+    ranges_of,
+    scan_of,
+    sector_of,
+    sweep_of,
+)
 from closedrooms.mapping.logs.bags.transform_tree import Mount
 
 AHEAD = Mount(Pose2(), upside_down=False)
@@ -120,6 +128,9 @@ def test_what_is_too_near_is_no_measurement_and_limits_are_those_of_the_sensor()
         (-1.5, 300.0, 1.5, 301, (-1.5, 0.01, "step")),
         (-1.5, 0.0, 1.5, 301, (-1.5, 0.01, "step")),
         (1.5, 0.0, -1.5, 301, (1.5, -0.01, "step")),
+        # First and last angle that say the other way round.
+        (1.5, 0.01, -1.5, 301, (1.5, 0.01, "runs against")),
+        (-1.5, -0.01, 1.5, 301, (-1.5, -0.01, "runs against")),
     ],
 )
 def test_angles_come_from_what_makes_sense(
@@ -170,3 +181,18 @@ def test_ranges_beyond_a_wrong_range_max_are_a_loss(new_bag: Any, far: Any, lost
         bag.odometry(100.0 + 0.1 * i, 0.05 * i).scan(100.0 + 0.1 * i, ranges, limits=(0.1, 2.0))
     told = [(remark.what, remark.count) for remark in read_run(bag.write()).remarks if remark.loss]
     assert told == ([("ranges", 5 * 90)] if lost else [])
+
+
+@pytest.mark.parametrize(
+    ("far", "beams", "mark"),
+    [(9.95, 20, 9.95), (9.1, 20, 9.1), (9.95, 3, None), (10.0, 20, None), (8.9, 20, None), (math.inf, 20, None)],
+)
+def test_a_value_just_below_the_longest_that_many_beams_have_means_nothing(
+    far: float, beams: int, mark: float | None
+) -> None:
+    ranges = np.linspace(1.0, 5.0, 100)
+    ranges[:beams] = far
+    ranges[-1] = 9.97  # a wall beyond
+    sweep = scan_of(message(0.0, 0.01, 100, limits=(0.1, 10.0)), ranges, AHEAD)
+    assert mark_of_nothing([sweep, sweep]) == mark
+    assert mark_of_nothing([]) is None
