@@ -174,8 +174,8 @@ def importers() -> list[Importer]:
     from closedrooms.worlds.formats.luperto import read_luperto
     from closedrooms.worlds.formats.native import read_plan
     from closedrooms.worlds.formats.pyrobosim import read_pyrobosim
+    from closedrooms.worlds.formats.raster.rosmap import read_raster
     from closedrooms.worlds.formats.rmf import read_rmf
-    from closedrooms.worlds.formats.rosmap import read_raster
 
     return [
         Importer("picture", "a picture of a map (PNG or PGM)", _is_picture, lambda path, _: read_raster(path)),

@@ -15,10 +15,10 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.yaml_text import parse_yaml
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.formats.hallways import Hallway, JoinedRooms, extend_into_rooms
-from closedrooms.worlds.formats.portals import plan_of_portals
-from closedrooms.worlds.formats.room_outlines import cut_out_inner_rooms
-from closedrooms.worlds.formats.settlement import Source, not_in_plan, settle
+from closedrooms.worlds.formats.import_checks import Source, not_in_plan, settle
+from closedrooms.worlds.formats.rooms_only.hallways import Hallway, JoinedRooms, extend_into_rooms
+from closedrooms.worlds.formats.rooms_only.portals import plan_of_portals
+from closedrooms.worlds.formats.rooms_only.room_outlines import cut_out_inner_rooms
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
 from closedrooms.worlds.wall_assembly import clean_coverage
 

@@ -143,7 +143,7 @@ def test_rooms_of_an_absurd_size_are_said_too(tmp_path: Path) -> None:
 
 
 def test_what_the_plan_lost_of_the_files_walls_is_measured(tmp_path: Path) -> None:
-    from closedrooms.worlds.formats.settlement import Source, settle
+    from closedrooms.worlds.formats.import_checks import Source, settle
 
     path = tmp_path / "floor.xml"
     path.write_text(floor_xml(0.0, 0.0, 0))

@@ -23,8 +23,8 @@ from closedrooms.sim.physics_world import PhysicsWorld
 from closedrooms.sim.robot.differential_drive import Drive
 from closedrooms.sim.solids import upright
 from closedrooms.worlds.extrusion import extrude
-from closedrooms.worlds.formats import raster_walls, rosmap
-from closedrooms.worlds.formats.rosmap import _differences, read_raster
+from closedrooms.worlds.formats.raster import raster_walls, rosmap
+from closedrooms.worlds.formats.raster.rosmap import _differences, read_raster
 from closedrooms.worlds.geometry import room_interior
 from closedrooms.worlds.outline import leaks
 from closedrooms.worlds.plan import FloorPlan

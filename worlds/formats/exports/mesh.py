@@ -12,7 +12,7 @@ from closedrooms.core.names import xml_text
 from closedrooms.worlds.boxes import BoxLeaf, box_leaves
 from closedrooms.worlds.door_hinges import without_entrances
 from closedrooms.worlds.extrusion import WALL_HEIGHT, extrude
-from closedrooms.worlds.formats.sdf import CLEARANCE, DOOR_HEIGHT, FURNITURE_HEIGHT, LEAF_MASS, OPEN
+from closedrooms.worlds.formats.exports.sdf import CLEARANCE, DOOR_HEIGHT, FURNITURE_HEIGHT, LEAF_MASS, OPEN
 from closedrooms.worlds.formats.xml_text import number_text
 from closedrooms.worlds.geometry import areal, wall_area
 from closedrooms.worlds.plan import FloorPlan

@@ -12,7 +12,7 @@ from closedrooms.core.door import ClosedDoor, Point, Segment
 from closedrooms.core.grid import GridFrame, OccupancyGrid
 from closedrooms.core.remarks import Remark
 from closedrooms.core.shapes import fill_shape
-from closedrooms.worlds.formats.raster_walls import Labels, Piece, box_corners, find_boxes
+from closedrooms.worlds.formats.raster.raster_walls import Labels, Piece, box_corners, find_boxes
 from closedrooms.worlds.geometry import GAP_MARGIN, largest_part, rectangles
 from closedrooms.worlds.plan import PlanDoor, PlanRoom
 

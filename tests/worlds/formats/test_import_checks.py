@@ -10,7 +10,7 @@ from shapely.geometry import LineString, box
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.formats.settlement import Source, merged, no_rooms, not_in_plan, settle
+from closedrooms.worlds.formats.import_checks import Source, merged, no_rooms, not_in_plan, settle
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom, Wall
 

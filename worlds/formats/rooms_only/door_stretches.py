@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry import LineString, Polygon
 
 from closedrooms.core.door import Point
-from closedrooms.worlds.formats.portals import FITS, Portal
+from closedrooms.worlds.formats.rooms_only.portals import FITS, Portal
 from closedrooms.worlds.plan import PlanRoom
 
 # Corners of a border that lie further from the straight line than this are not from drawing by hand [m].

@@ -5,7 +5,7 @@ import shapely
 from shapely.geometry import Polygon, box
 
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.formats.room_outlines import (
+from closedrooms.worlds.formats.rooms_only.room_outlines import (
     clean_outlines,
     cut_out_inner_rooms,
     hull_areas,

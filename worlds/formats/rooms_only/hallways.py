@@ -10,7 +10,7 @@ from shapely.geometry import LineString, Polygon
 
 from closedrooms.core.arrays import FloatArray
 from closedrooms.core.door import Point
-from closedrooms.worlds.formats.portals import DeepDoor, Portal
+from closedrooms.worlds.formats.rooms_only.portals import DeepDoor, Portal
 from closedrooms.worlds.geometry import areal
 
 # A hallway with less floor than this between the walls of its rooms is a deep doorway: no robot stands in it [m].

@@ -13,9 +13,9 @@ from closedrooms.core.grid import UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.door_hinges import hung
-from closedrooms.worlds.formats.raster_rooms import find_rooms_and_doors, mark_gaps
-from closedrooms.worlds.formats.raster_walls import check_pieces, trace_walls
-from closedrooms.worlds.formats.settlement import Source, settle
+from closedrooms.worlds.formats.import_checks import Source, settle
+from closedrooms.worlds.formats.raster.raster_rooms import find_rooms_and_doors, mark_gaps
+from closedrooms.worlds.formats.raster.raster_walls import check_pieces, trace_walls
 from closedrooms.worlds.geometry import wall_axes
 from closedrooms.worlds.plan import FloorPlan, Wall
 from closedrooms.worlds.truth import rasterise

@@ -7,7 +7,7 @@ import pytest
 from shapely.geometry import Polygon, box
 
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.formats.portals import DeepDoor, Portal, pair_portals, plan_of_portals
+from closedrooms.worlds.formats.rooms_only.portals import DeepDoor, Portal, pair_portals, plan_of_portals
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
 
 

@@ -6,8 +6,8 @@ import pytest
 import shapely
 from shapely.geometry import Polygon
 
-from closedrooms.worlds.formats.door_stretches import SPARE, STRAY, straight_at_doors
-from closedrooms.worlds.formats.portals import FITS, Portal
+from closedrooms.worlds.formats.rooms_only.door_stretches import SPARE, STRAY, straight_at_doors
+from closedrooms.worlds.formats.rooms_only.portals import FITS, Portal
 from closedrooms.worlds.plan import PlanRoom
 
 Corner = tuple[float, float]

@@ -6,7 +6,7 @@ import pytest
 import shapely
 from shapely.geometry import LineString, Point, Polygon, box
 
-from closedrooms.worlds.formats.hallways import Hallway, JoinedRooms, extend_into_rooms
+from closedrooms.worlds.formats.rooms_only.hallways import Hallway, JoinedRooms, extend_into_rooms
 
 WALL = 0.2
 LEFT = box(0.0, 0.0, 4.0, 4.0)
