@@ -61,11 +61,10 @@ def load_world(name_or_path: str, *, level: str | None = None) -> "FloorPlan":
         InvalidInputError: Neither a name nor a file (the message lists the names), an unknown format, a plan that
             is not valid.
     """
-    from closedrooms.worlds.door_hinges import without_entrances
-    from closedrooms.worlds.outline import without_leaks
+    from closedrooms.worlds.ways_out import wall_up_entrances, wall_up_outline
 
-    plan = without_entrances(read_world(name_or_path, level=level))
-    return plan if name_or_path in bundled_names() else without_leaks(plan)
+    plan = wall_up_entrances(read_world(name_or_path, level=level))
+    return plan if name_or_path in bundled_names() else wall_up_outline(plan)
 
 
 def read_world(name_or_path: str, *, level: str | None = None) -> "FloorPlan":

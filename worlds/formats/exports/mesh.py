@@ -10,12 +10,12 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.names import xml_text
 from closedrooms.worlds.boxes import BoxLeaf, box_leaves
-from closedrooms.worlds.door_hinges import without_entrances
 from closedrooms.worlds.extrusion import WALL_HEIGHT, extrude
 from closedrooms.worlds.formats.exports.sdf import CLEARANCE, DOOR_HEIGHT, FURNITURE_HEIGHT, LEAF_MASS, OPEN
 from closedrooms.worlds.formats.xml_text import number_text
 from closedrooms.worlds.geometry import areal, wall_area
 from closedrooms.worlds.plan import FloorPlan
+from closedrooms.worlds.ways_out import wall_up_entrances
 
 # What a joint may do, far beyond what a robot pushes with [Nm or N, rad/s or m/s].
 EFFORT, VELOCITY = 100.0, 10.0
@@ -32,7 +32,7 @@ def write_obj(path: Path, plan: FloorPlan) -> None:
     """
     import trimesh
 
-    plan = without_entrances(plan)
+    plan = wall_up_entrances(plan)
     walls = wall_area(plan)
     things = areal(shapely.difference(shapely.union_all([thing.polygon for thing in plan.furniture]), walls))
     solids = []
@@ -60,7 +60,7 @@ def write_urdf(path: Path, plan: FloorPlan) -> None:
     path = Path(path)
     mesh = path.with_suffix(".obj")
     write_obj(mesh, plan)
-    plan = without_entrances(plan)
+    plan = wall_up_entrances(plan)
     robot = Element("robot", name="".join(c if c.isalnum() or c in "-_" else "_" for c in plan.name))
     walls = SubElement(robot, "link", name="walls")
     for tag in ("visual", "collision"):

@@ -7,10 +7,10 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.names import xml_text
 from closedrooms.worlds.boxes import Box, BoxLeaf, box_leaves, wall_boxes
-from closedrooms.worlds.door_hinges import without_entrances
 from closedrooms.worlds.extrusion import WALL_HEIGHT
 from closedrooms.worlds.formats.xml_text import number_text
 from closedrooms.worlds.plan import FloorPlan
+from closedrooms.worlds.ways_out import wall_up_entrances
 
 VERSION = "1.9"
 # Leaves stand clear of the floor, the ceiling and their jambs by this, so that they never jam [m].
@@ -32,7 +32,7 @@ def write_sdf(path: Path, plan: FloorPlan) -> None:
     Raises:
         OutputError: The folder cannot be written.
     """
-    plan = without_entrances(plan)
+    plan = wall_up_entrances(plan)
     root = Element("sdf", version=VERSION)
     world = SubElement(root, "world", name="".join(c if c.isalnum() or c in "-_" else "_" for c in plan.name))
     _light(world)

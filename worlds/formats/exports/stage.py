@@ -11,11 +11,11 @@ from closedrooms.core.grid import GridFrame
 from closedrooms.core.names import shown, stage_text
 from closedrooms.core.pose import Pose2
 from closedrooms.worlds.boxes import box_leaves, open_leaf
-from closedrooms.worlds.door_hinges import without_entrances
 from closedrooms.worlds.geometry import wall_area
 from closedrooms.worlds.plan import FloorPlan, Furniture
 from closedrooms.worlds.start_pose import start_pose
 from closedrooms.worlds.truth import rasterise
+from closedrooms.worlds.ways_out import wall_up_entrances
 
 # Metres a pixel of the bitmap.
 RESOLUTION = 0.02
@@ -38,7 +38,7 @@ def write_stage(path: Path, plan: FloorPlan) -> None:
     import cv2
 
     path = Path(path)
-    plan = without_entrances(plan)
+    plan = wall_up_entrances(plan)
     x0, y0, x1, y1 = wall_area(plan).bounds
     cols, rows = math.ceil((x1 - x0) / RESOLUTION), math.ceil((y1 - y0) / RESOLUTION)
     if cols * rows > MAX_PIXELS:

@@ -1,4 +1,4 @@
-"""Whether a robot can leave a building, and the walls that keep it inside."""
+"""The ways out of a building: finds them and walls them up, since a robot that maps a floor must not leave it."""
 
 import itertools
 import math
@@ -23,8 +23,8 @@ FACING = 0.6
 SHORTEST = 0.01
 
 
-def leaks(plan: FloorPlan, radius: float = RADIUS) -> bool:
-    """Check whether a disc of ``radius`` [m] gets from a room to the outside, every door open."""
+def has_way_out(plan: FloorPlan, radius: float = RADIUS) -> bool:
+    """Check whether a disc of ``radius`` [m] can get from a room to the outside, with every door open."""
     walls = wall_area(plan)
     rooms = shapely.union_all([room.polygon for room in plan.rooms])
     x_min, y_min, x_max, y_max = shapely.total_bounds([walls, rooms])
@@ -46,13 +46,29 @@ def _part_at(area: BaseGeometry, point: shapely.Point) -> Polygon:
     return next((part for part in parts if part.covers(point)), Polygon())
 
 
-def without_leaks(plan: FloorPlan) -> FloorPlan:
-    """Wall up a plan where its outline has no wall and a robot would get out; said in ``remarks``.
+def wall_up_entrances(plan: FloorPlan) -> FloorPlan:
+    """Remove a plan's doors and openings to the outside, so that there is wall; ``meta["sealed"]`` names each."""
+    entrances = [p.id for p in plan.passages if None in p.rooms]
+    if not entrances:
+        return plan
+    return replace(
+        plan,
+        doors=tuple(door for door in plan.doors if None not in door.rooms),
+        openings=tuple(opening for opening in plan.openings if None not in opening.rooms),
+        meta={**plan.meta, "sealed": entrances},
+    )
+
+
+def wall_up_outline(plan: FloorPlan) -> FloorPlan:
+    """Add walls along the outline of a plan where it has none, if a robot could leave the building there.
 
     Args:
-        plan: Without doors and openings to the outside.
+        plan: Without doors and openings to the outside, see :func:`wall_up_entrances`.
+
+    Returns:
+        The plan itself where no robot gets out; else with more walls, and a remark that says so.
     """
-    if not leaks(plan):
+    if not has_way_out(plan):
         return plan
     rooms = shapely.union_all([room.polygon for room in plan.rooms])
     closed = rooms.buffer(FACING / 2, join_style="mitre").buffer(-FACING / 2, join_style="mitre")
