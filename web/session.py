@@ -15,7 +15,7 @@ from closedrooms.core.names import file_name
 from closedrooms.core.report import Report, counted
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.pipeline.edit import EditedPrediction, plan_edited_tour, predict_rooms, save_rooms
-from closedrooms.pipeline.map_config import PredictConfig
+from closedrooms.pipeline.options.predict import PredictConfig
 from closedrooms.predictor.structure.door_proposals import DoorProposal
 from closedrooms.web.config import EditConfig
 from closedrooms.web.document import USUAL_WIDTH, Document, History, as_saved, as_segment

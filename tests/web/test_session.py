@@ -8,7 +8,7 @@ import pytest
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError
 from closedrooms.core.files.geojson import read_doors, read_rooms
 from closedrooms.core.pose import Pose2
-from closedrooms.pipeline.map_config import PredictConfig
+from closedrooms.pipeline.options.predict import PredictConfig
 from closedrooms.pipeline.predict import predict_map
 from closedrooms.web.config import EditConfig
 from closedrooms.web.document import MOST_DOORS

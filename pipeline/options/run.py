@@ -1,4 +1,4 @@
-"""Options of runs and of recorded logs. Nothing heavy is imported, so that ``--help`` is quick."""
+"""Options of ``closedrooms run``."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,7 +10,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.pipeline.map_config import check_completions
+from closedrooms.pipeline.options.cover import check_completions
 from closedrooms.predictor.config import MethodConfig
 from closedrooms.predictor.methods import DEFAULT_METHOD, find_method
 from closedrooms.sim.config import Body, SimConfig, lidar_preset, noise_level
@@ -133,32 +133,3 @@ def named_sim(noise: str = "medium", lidar: str = "default", body: Body = "kinem
         InvalidInputError: No such level or lidar.
     """
     return SimConfig(noise=noise_level(noise), lidar=lidar_preset(lidar), body=body)
-
-
-@dataclass(frozen=True, kw_only=True)
-class MapConfig:
-    """Options of ``closedrooms map``."""
-
-    log: tyro.conf.Positional[Path]
-    """A recorded run: CARMEN log (also gzipped), rosbag or MCAP, or ``scans.npz`` of a run."""
-
-    out: Path
-    """Folder to write."""
-
-    record: bool = True
-    """Write the recording ``run.rrd`` for the rerun viewer."""
-
-    scan_topic: str | None = None
-    """Topic of the laser scans, where a bag holds several."""
-
-    odometry_topic: str | None = None
-    """Topic of the odometry, where a bag holds several; or of the transforms that hold it."""
-
-    mount: tuple[float, float, float] | None = None
-    """Where the lidar sits on the robot: x, y [m] and yaw [rad]; of a bag, in place of its transforms."""
-
-    upside_down: bool = False
-    """The lidar hangs with its z axis down; of a bag, in place of its transforms."""
-
-    mapper: MapperConfig = field(default_factory=MapperConfig)
-    """The mapper."""
