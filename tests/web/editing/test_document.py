@@ -8,7 +8,7 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import read_doors, write_doors
 from closedrooms.predictor.config import BestConfig
-from closedrooms.web.document import MOST_STEPS, Document, History, as_saved
+from closedrooms.web.editing.document import MOST_STEPS, Document, History, as_saved
 
 EMPTY = Document("best", BestConfig())
 ONE = EMPTY.with_door(((0.0, 0.0), (0.9, 0.0)))

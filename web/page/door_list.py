@@ -11,10 +11,10 @@ from closedrooms.core.names import shown
 from closedrooms.core.room import Room
 from closedrooms.predictor.structure.door_proposals import DoorProposal
 from closedrooms.visualization.colours import room_colours
-from closedrooms.web.door_row import DoorRow
-from closedrooms.web.map_board import css
-from closedrooms.web.prompts import plain_button
-from closedrooms.web.session import EditSession
+from closedrooms.web.editing.session import EditSession
+from closedrooms.web.page.door_row import DoorRow
+from closedrooms.web.page.map_board import css
+from closedrooms.web.page.prompts import plain_button
 
 
 class DoorList:

@@ -10,9 +10,9 @@ from closedrooms.core.names import shown
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.coverage.tour.tour_features import make_tour_features
 from closedrooms.visualization.colours import INK, TOURS, Colour, room_colours
-from closedrooms.web.map_board import MapBoard, css
-from closedrooms.web.pictures import paint_map
-from closedrooms.web.session import EditSession
+from closedrooms.web.editing.session import EditSession
+from closedrooms.web.page.map_board import MapBoard, css
+from closedrooms.web.page.pictures import paint_map
 
 # Rooms are filled this much where the slider is all on the side of the prediction.
 FILL = 0.35

@@ -14,8 +14,8 @@ from closedrooms.core.files.incoming import is_file, read_json
 from closedrooms.core.files.outgoing import clear_errors, write_json
 from closedrooms.core.numbers import FARTHEST, is_number
 from closedrooms.predictor.methods import find_method
-from closedrooms.web.document import Document, as_saved
-from closedrooms.web.settings_form import setting_rows, with_setting
+from closedrooms.web.editing.document import Document, as_saved
+from closedrooms.web.editing.settings_form import setting_rows, with_setting
 
 # A draft's settings are a few dozen numbers, and a place for each proposal that was dismissed.
 MOST_BYTES = 10_000_000

@@ -9,7 +9,7 @@ from closedrooms.core.files.rosmap import RosMap, read_ros_map
 from closedrooms.core.pose import Pose2
 from closedrooms.predictor.structure.door_proposals import DoorProposal, propose_doors
 from closedrooms.web.config import EditConfig
-from closedrooms.web.snapping import WallSnapper
+from closedrooms.web.editing.snapping import WallSnapper
 
 # More than these nobody goes through one by one.
 MOST_PROPOSALS = 100

@@ -5,9 +5,9 @@ import pytest
 
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError, OutputError
 from closedrooms.predictor.config import BestConfig, PaperConfig
-from closedrooms.web.document import Document
-from closedrooms.web.drafts import Drafts, state_folder
-from closedrooms.web.settings_form import with_setting
+from closedrooms.web.editing.document import Document
+from closedrooms.web.editing.drafts import Drafts, state_folder
+from closedrooms.web.editing.settings_form import with_setting
 
 MAP = Path("/maps/office.yaml")
 DOCUMENT = Document(

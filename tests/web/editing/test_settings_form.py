@@ -5,7 +5,7 @@ import pytest
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.predictor.config import BestConfig, PaperConfig, RoseConfig
 from closedrooms.predictor.methods import METHODS
-from closedrooms.web.settings_form import setting_rows, with_setting
+from closedrooms.web.editing.settings_form import setting_rows, with_setting
 
 
 @pytest.mark.parametrize("method", ["paper", "rose", "best", "learned", "line-of-sight", "geometric"])

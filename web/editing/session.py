@@ -18,9 +18,9 @@ from closedrooms.pipeline.edit import EditedPrediction, plan_edited_tour, predic
 from closedrooms.pipeline.options.predict import PredictConfig
 from closedrooms.predictor.structure.door_proposals import DoorProposal
 from closedrooms.web.config import EditConfig
-from closedrooms.web.document import USUAL_WIDTH, Document, History, as_saved, as_segment
-from closedrooms.web.drafts import Draft, Drafts
-from closedrooms.web.sheet import MapSheet
+from closedrooms.web.editing.document import USUAL_WIDTH, Document, History, as_saved, as_segment
+from closedrooms.web.editing.drafts import Draft, Drafts
+from closedrooms.web.editing.sheet import MapSheet
 
 # Pointing this near to a door means that door [m]: closer, the methods take two for the same.
 SAME_DOOR = 0.30

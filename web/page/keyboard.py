@@ -6,8 +6,8 @@ from collections.abc import Awaitable, Callable
 from nicegui import ui
 from nicegui.events import KeyEventArguments
 
-from closedrooms.web.map_board import MapBoard
-from closedrooms.web.session import EditSession
+from closedrooms.web.editing.session import EditSession
+from closedrooms.web.page.map_board import MapBoard
 
 # What a door or the view moves at a press of an arrow, x to the right and y up.
 ARROWS = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, 1), "ArrowDown": (0, -1)}

@@ -11,10 +11,10 @@ from closedrooms.core.pose import Pose2
 from closedrooms.pipeline.options.predict import PredictConfig
 from closedrooms.pipeline.predict import predict_map
 from closedrooms.web.config import EditConfig
-from closedrooms.web.document import MOST_DOORS
-from closedrooms.web.drafts import Drafts
-from closedrooms.web.session import NO_WALL, EditSession
-from closedrooms.web.sheet import open_sheet
+from closedrooms.web.editing.document import MOST_DOORS
+from closedrooms.web.editing.drafts import Drafts
+from closedrooms.web.editing.session import NO_WALL, EditSession
+from closedrooms.web.editing.sheet import open_sheet
 
 # Middles of the closed doors of the corridor [m].
 PLACES = ((3.0, -0.1), (8.0, -0.1), (13.0, 2.1))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.web.snapping import WallSnapper
+from closedrooms.web.editing.snapping import WallSnapper
 
 
 def wall(angle: float, *, recess: int = 2) -> OccupancyGrid:

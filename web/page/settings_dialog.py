@@ -6,8 +6,8 @@ from typing import Any
 from nicegui import ui
 
 from closedrooms.core.errors import InvalidInputError
-from closedrooms.web.document import Document
-from closedrooms.web.settings_form import SettingRow, setting_rows, with_setting
+from closedrooms.web.editing.document import Document
+from closedrooms.web.editing.settings_form import SettingRow, setting_rows, with_setting
 
 
 async def ask_settings(document: Document) -> Document | None:

@@ -6,9 +6,9 @@ from collections.abc import Awaitable, Callable
 from nicegui import ui
 
 from closedrooms.core.door import ClosedDoor
-from closedrooms.web.document import Document, as_segment
-from closedrooms.web.prompts import plain_button
-from closedrooms.web.session import EditSession
+from closedrooms.web.editing.document import Document, as_segment
+from closedrooms.web.editing.session import EditSession
+from closedrooms.web.page.prompts import plain_button
 
 # Turning by a button [rad].
 TURN = math.radians(15)

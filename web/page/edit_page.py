@@ -15,14 +15,14 @@ from closedrooms.core.errors import ClosedroomsError
 from closedrooms.core.report import counted
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.predictor.methods import METHODS
-from closedrooms.web.document import Document
-from closedrooms.web.door_list import DoorList
-from closedrooms.web.keyboard import Keyboard
-from closedrooms.web.map_board import PATIENCE, HandleEvent, MapBoard
-from closedrooms.web.map_layers import MapLayers
-from closedrooms.web.prompts import ask, icon_button, show_keys, switch, tell
-from closedrooms.web.session import EditSession
-from closedrooms.web.settings_dialog import ask_settings
+from closedrooms.web.editing.document import Document
+from closedrooms.web.editing.session import EditSession
+from closedrooms.web.page.door_list import DoorList
+from closedrooms.web.page.keyboard import Keyboard
+from closedrooms.web.page.map_board import PATIENCE, HandleEvent, MapBoard
+from closedrooms.web.page.map_layers import MapLayers
+from closedrooms.web.page.prompts import ask, icon_button, show_keys, switch, tell
+from closedrooms.web.page.settings_dialog import ask_settings
 
 CSS = """
 body { margin: 0; }
