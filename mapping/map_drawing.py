@@ -6,6 +6,7 @@ import numpy as np
 
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.pose import wrap_angle
+from closedrooms.core.remarks import Remark
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.glass.leaks import without_leaks
 from closedrooms.mapping.glass.panes import Panes
@@ -52,6 +53,16 @@ class MapDrawing:
             if keyframe.shown is not keyframe.beams:  # what no pane has cut need not be drawn anew
                 keyframe.shown = None
         self._drawn = 0
+
+    def remarks(self) -> tuple[Remark, ...]:
+        """Say that panes of glass were found, with the middle of each, map frame [m]."""
+        segments = self.panes.segments
+        if not len(segments):
+            return ()
+        why = "scans met them near their normal and saw through them at an angle; what was seen through them is left"
+        why = f"{why} unknown (--mapper.no-glass maps it)"
+        names = tuple(f"at {x:.1f}, {y:.1f}" for x, y in segments.mean(axis=1))
+        return (Remark(action="guessed", what="panes of glass", why=why, names=names, count=len(segments)),)
 
     def grid(self, keyframes: Sequence[Keyframe]) -> OccupancyGrid:
         """Draw the map.

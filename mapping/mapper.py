@@ -91,8 +91,8 @@ class Mapper:
 
     @property
     def events(self) -> tuple[Remark, ...]:
-        """Events so far (failed odometry, gaps, lost scans, submaps), counted, with times."""
-        return self._events.remarks()
+        """Events so far (failed odometry, gaps, lost scans, submaps), counted, with times; and the panes of glass."""
+        return (*self._events.remarks(), *self._drawing.remarks())
 
     def process(
         self,

@@ -161,13 +161,17 @@ def sample(segments: FloatArray, step: float) -> FloatArray:
     )
 
 
-def find_candidates(places: FloatArray, resolution: float) -> IntArray:
-    """List the places, of shape (n, 2) [m], that could be on a pane, or where one could go on.
+def find_candidates(places: FloatArray, unasked: IntArray, resolution: float) -> IntArray:
+    """List which of some places could be on a pane, or where one could go on: few are so many side by side.
 
-    Few are so many side by side.
+    Args:
+        places: All of them, shape (n, 2) [m].
+        unasked: Indices of those that are in question, shape (m,).
+        resolution: Size of a cell [m].
     """
     reach = FARTHEST + FRAME
-    near = np.zeros(len(places), dtype=np.bool_)
+    here = places[unasked]
+    near = np.zeros(len(here), dtype=np.bool_)
     groups = _groups(places, resolution)
     order = np.argsort(groups, kind="stable")
     firsts = np.flatnonzero(np.diff(groups[order], prepend=-1))
@@ -176,8 +180,8 @@ def find_candidates(places: FloatArray, resolution: float) -> IntArray:
     large = np.diff(firsts, append=len(groups)) >= FEWEST
     large &= np.hypot(*(highs - lows).T) >= SHORT
     for low, high in zip(lows[large], highs[large], strict=True):
-        near |= ((places > low - reach) & (places < high + reach)).all(axis=1)
-    return np.flatnonzero(near)
+        near |= ((here > low - reach) & (here < high + reach)).all(axis=1)
+    return unasked[near]
 
 
 def draw_lines(places: FloatArray, normals: FloatArray, resolution: float) -> list[FloatArray]:

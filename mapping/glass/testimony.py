@@ -18,6 +18,9 @@ ASKEW = math.radians(30.0)
 """Incidence from which on a beam that ends there tells a wall [rad]: normals are known to some 8 degrees."""
 DEPTH = 0.15
 """Distance from a place up to which a beam that ends there hits it [m]: three cells; twice as far it went past."""
+BEHIND = 0.5
+"""How far behind the plane of a pane a beam ends at least that went through it askew [m]: what ends nearer may have met
+a wall from a pose that had drifted."""
 EXACT = 0.08
 """The same of a beam that meets it askew [m]: the end of a wall beside a pane is hit not far beyond."""
 REACH = 12.0
@@ -161,6 +164,6 @@ class Witnesses:
         found[hit & (incidence < OBLIQUE)] = HIT_NEAR
         found[hit & (incidence >= ASKEW)] = HIT_OBLIQUE
         found[past & (incidence < NEAR)] = PAST_NEAR
-        found[past & (incidence >= OBLIQUE)] = PAST_OBLIQUE
+        found[past & (incidence >= OBLIQUE) & (beyond * met > BEHIND)] = PAST_OBLIQUE
         codes[near] = found
         return codes

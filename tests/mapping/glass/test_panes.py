@@ -42,6 +42,12 @@ def mapped(
     world: SegmentWorld, route: list[tuple[float, float]], *, glass: bool = True, drawn: int = 5
 ) -> tuple[OccupancyGrid, Pose2]:
     """Map a drive, drawing every so many scans; returns the map and where the world lies in it."""
+    (x0, y0), (x1, y1) = route[:2]
+    return mapper_of(world, route, glass, drawn).grid(), Pose2(x0, y0, math.atan2(y1 - y0, x1 - x0)).inverse()
+
+
+def mapper_of(world: SegmentWorld, route: list[tuple[float, float]], glass: bool = True, drawn: int = 5) -> Mapper:
+    """Let a mapper take in a drive, drawing every so many scans."""
     drive = world.drive(route, noise=0.01, beams=720)
     mapper = Mapper(MapperConfig(glass=glass))
     for number, (scan, odometry) in enumerate(zip(drive.scans, drive.odometry, strict=True)):
@@ -49,8 +55,8 @@ def mapped(
         if number % drawn == 0:
             mapper.grid()
     mapper.finish()
-    (x0, y0), (x1, y1) = route[:2]
-    return mapper.grid(), Pose2(x0, y0, math.atan2(y1 - y0, x1 - x0)).inverse()
+    mapper.grid()
+    return mapper
 
 
 def known_share(grid: OccupancyGrid, map_T_world: Pose2, box: tuple[float, float, float, float]) -> float:
@@ -76,6 +82,19 @@ def test_nothing_behind_a_pane_is_mapped_and_the_pane_is_a_wall() -> None:
     grid, map_T_world = mapped(GlassWorld(HALL), ROUTE)
     assert known_share(grid, map_T_world, ROOM_BEHIND) < 0.05
     assert occupied_share(grid, map_T_world, PANE) > 0.95
+
+
+def test_a_pane_is_said_and_where_it_is() -> None:
+    mapper = mapper_of(GlassWorld(HALL), ROUTE)
+    (remark,) = mapper.events
+    assert (remark.action, remark.what, remark.count, remark.loss) == ("guessed", "panes of glass", 1, False)
+    # Where it is, in the map, whose origin is where the robot began.
+    (x0, y0), (x1, y1) = ROUTE[:2]
+    begin = Pose2(x0, y0, math.atan2(y1 - y0, x1 - x0))
+    x, y = (float(word) for word in remark.names[0].removeprefix("at ").split(", "))
+    middle = begin.transform(np.array([[x, y]]))[0]
+    assert middle == pytest.approx([(PANE[0] + PANE[2]) / 2.0, (PANE[1] + PANE[3]) / 2.0], abs=0.15)
+    assert mapper_of(GlassWorld(HALL), ROUTE, glass=False).events == ()
 
 
 def test_without_it_the_room_behind_is_mapped_through_the_pane() -> None:
