@@ -34,33 +34,33 @@ COMMANDS = (
     Command(
         "run",
         "Simulate a robot in a building with closed doors, map it, predict the closed rooms, plan a tour.",
-        "pipeline.config:RunConfig",
+        "pipeline.options.run:RunConfig",
         "pipeline.runs:run_all",
         needs=(*SIMULATION, *TOURS),
     ),
     Command(
         "predict",
         "Predict the rooms behind the closed doors of a ROS map.",
-        "pipeline.map_config:PredictConfig",
+        "pipeline.options.predict:PredictConfig",
         "pipeline.predict:predict_map",
     ),
     Command(
         "cover",
         "Plan a coverage tour on a ROS map.",
-        "pipeline.map_config:CoverConfig",
+        "pipeline.options.cover:CoverConfig",
         "pipeline.cover:cover_map",
         needs=TOURS,
     ),
     Command(
         "map",
         "Build the map of a recorded run.",
-        "pipeline.config:MapConfig",
+        "pipeline.options.map:MapConfig",
         "pipeline.map:map_log",
     ),
     Command(
         "doors",
         "Propose closed doors on a ROS map, from the map alone.",
-        "pipeline.propose_doors_config:DoorsConfig",
+        "pipeline.options.doors:DoorsConfig",
         "pipeline.propose_doors:doors_map",
     ),
     Command(
@@ -72,29 +72,32 @@ COMMANDS = (
     Command(
         "view",
         "Open the recording of a result in the rerun viewer.",
-        "pipeline.view_config:ViewConfig",
+        "pipeline.options.view:ViewConfig",
         "pipeline.view:view_recording",
     ),
     Command(
         "worlds list",
         "List the bundled worlds, one a line, its name first.",
-        "pipeline.worlds_config:ListWorlds",
+        "pipeline.options.worlds:ListWorlds",
         "cli.work:report_worlds",
     ),
     Command(
         "worlds show",
         "Draw a floor plan.",
-        "pipeline.worlds_config:ShowWorld",
+        "pipeline.options.worlds:ShowWorld",
         "cli.work:report_world",
         needs=("matplotlib",),
     ),
     Command(
-        "worlds generate", "Generate a floor plan.", "pipeline.worlds_config:GenerateWorld", "cli.work:report_generated"
+        "worlds generate",
+        "Generate a floor plan.",
+        "pipeline.options.worlds:GenerateWorld",
+        "cli.work:report_generated",
     ),
     Command(
         "worlds convert",
         "Convert a floor plan to another format.",
-        "pipeline.worlds_config:ConvertWorld",
+        "pipeline.options.worlds:ConvertWorld",
         "cli.work:report_converted",
     ),
     Command(

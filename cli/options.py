@@ -169,7 +169,7 @@ def _starts(config: type[Any], line: _Named, saved: Mapping[str, Any]) -> dict[s
         if callable(item.default_factory) and is_dataclass(hints[item.name])
     }
     if "sim" in hints and "noise" in hints:
-        from closedrooms.pipeline.config import named_sim
+        from closedrooms.pipeline.options.run import named_sim
         from closedrooms.sim.config import Body
 
         named = {

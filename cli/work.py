@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from closedrooms.core.report import Report
+from closedrooms.pipeline.options.worlds import ConvertWorld, GenerateWorld, ListWorlds, ShowWorld
 from closedrooms.pipeline.reporting.progress import Progress
-from closedrooms.pipeline.worlds_config import ConvertWorld, GenerateWorld, ListWorlds, ShowWorld
 
 if TYPE_CHECKING:
     from closedrooms.worlds.plan import FloorPlan

@@ -4,8 +4,8 @@
 - Motion: ``motion``, ``motion_prediction``, ``sweep_motion``, ``scan_odometry`` (robots that recorded none),
   ``mapping_events``.
 - Surroundings: ``local_map``, ``lattice``, ``growing_array``; poses of keyframes: ``graph/``.
-- The map: ``map_drawing``, ``log_odds_grid``, ``door_fusion``, ``trajectory``; panes in it: ``glass/``.
-- Recorded runs: ``logs/`` reads them (rosbags too), ``map_builder`` maps them.
+- The map: ``map_drawing``, ``log_odds_grid`` and its ``fading``, ``door_fusion``; panes in it: ``glass/``.
+- Recorded runs: ``logs/`` reads them (rosbags too), ``map_builder`` maps them, ``trajectory`` measures their error.
 """
 
 from typing import TYPE_CHECKING

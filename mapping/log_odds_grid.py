@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
@@ -14,40 +13,26 @@ from closedrooms.core.grid import UNKNOWN, OccupancyGrid
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.beams import Beams
 from closedrooms.mapping.config import MapperConfig
+from closedrooms.mapping.fading import Counts, Fading, MetCells
 from closedrooms.mapping.lattice import Lattice, grown
 
 SUBCELL_BITS = 6
 """Fraction bits of OpenCV's fixed-point polygon corners: 1/64 cell."""
 CROSSED, CROSSED_SHARE = 3, 0.25
-"""Scans that went through a surface, and how many more for each that saw it, from which on it counts as crossed."""
-GONE, GONE_SHARE = 2, 0.4
-"""Scans that went through a place, at least, and for each that saw a surface there, from which on what stood there has
-gone: the place of somebody who was seen from ten keyframes, and from four not, is free."""
-NOISE = 0.10
-"""Distance around a cell in which these are counted [m]."""
-SAME_WALL = 0.20
-"""Within this distance of where its crossed space ends [m] a scan did not go through what was seen: of a wall that was
-seen from both sides, each with a pose of its own error, the faces lie behind each other, and either scan ends at the
-other; and who looks along a wall past a face that lies a little too far out sees it in few places only."""
-SAME_SIDE = 0.5
-"""Product of the mean directions from which a place was hit, and was missed by scans that end nearby, from which on
-both saw it from the same side: of a wall whose two faces fell on one cell both directions are mixed, and short."""
+"""A cell counts as crossed when so many scans went through it, and so many more for each that met a surface there."""
 AnyInts = npt.NDArray[np.int64] | npt.NDArray[np.int32]
 LatticeWindow = tuple[int, int, int, int]
 """First row and column in the arrays, and number of rows and columns."""
-Counts = np.ndarray[Any, np.dtype[Any]]
-WindowCells = tuple[IntArray, tuple[int, int]]
-"""Cells of a window, flat, and its rows and columns."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sides:
-    """From where the cells were seen that one scan hit, and those near the end of what it crossed.
+    """From which side one scan saw the cells that it hit, and the cells that it crossed just before its end.
 
     Attributes:
-        beside: The latter, as flat indices in the window of the scan.
-        towards: Direction of the viewpoint from the hit cells and then from these, rows and columns, shape (2, n), to
-            an eighth of a turn: -1, 0 or 1 each.
+        beside: The cells crossed within ``fading.SAME_WALL`` of its end, as flat indices in the window of the scan.
+        towards: Direction of the viewpoint as rows and columns, shape (2, n), each -1, 0 or 1 (to an eighth of a turn):
+            first from the cells that were hit, then from those in ``beside``.
     """
 
     beside: npt.NDArray[np.int32]
@@ -84,8 +69,8 @@ class EvidenceGrid:
     """Occupancy after Moravec and Elfes as counts of hits and misses; log-odds are their weighted difference.
 
     A scan counts once per cell. Counts are sums, so a keyframe that moved is taken out at its old pose and put in at
-    its new one without drawing the others again. Where something stood that has gone only misses count: what moves
-    fades by its miss count, and does not take as many misses as it had hits.
+    its new one without drawing the others again. Where a surface has gone (:mod:`~closedrooms.mapping.fading`) only
+    misses count: the place of a person who walked on is free without as many misses as it had hits.
     """
 
     def __init__(self, config: MapperConfig, *, draws: bool = True) -> None:
@@ -93,15 +78,11 @@ class EvidenceGrid:
 
         Args:
             config: Resolution, weights of hits and misses.
-            draws: Whether :meth:`grid` is asked for: what only that needs is not counted else.
+            draws: Whether :meth:`grid` will be called; what it alone needs is not counted otherwise.
         """
         self._config, self._draws = config, draws
         self._lattice = Lattice(config.resolution)
-        self._noise = math.ceil(NOISE / config.resolution)
-        same_wall = math.ceil(SAME_WALL / config.resolution)
-        self._same_wall = np.ones((2 * same_wall + 1, 2 * same_wall + 1), dtype=np.uint8)
-        # How far around it counts matter to how a cell is drawn.
-        self._reach = self._noise + same_wall
+        self._fading = Fading(config)
         shape = self._lattice.frame.shape
         self._hits = np.zeros(shape, dtype=np.int32)
         # Whole numbers, exact up to 2^24: OpenCV adds a mask to floats five times as quickly as to integers.
@@ -119,10 +100,10 @@ class EvidenceGrid:
         self._percent: CellArray = self._probabilities(1, 1)
 
     def add(self, beams: Beams, map_T_robot: Pose2, *, sign: int = 1) -> None:
-        """Count a scan in (``sign`` 1) or out again (-1, at the very pose it was added at).
+        """Count a scan in (``sign`` 1) or out again (-1, at the same pose that it was added at).
 
-        Free are the cells wholly inside the outline of what the beams crossed; the boundary itself is not, so that
-        a wall which is seen at a grazing angle is not worn away by the beams along it.
+        Cells wholly inside the outline of what the beams crossed are missed. Cells on the outline are not, so that a
+        wall which is seen at a grazing angle is not worn away by the beams along it.
         """
         self.add_all([(beams, map_T_robot)], sign=sign)
 
@@ -199,8 +180,8 @@ class EvidenceGrid:
         self._dirty = window if self._dirty is None else _union(self._dirty, window)
 
     def _sides_of(self, mask: Mask, flat: AnyInts, viewpoint: tuple[float, float]) -> Sides:
-        """Find from where a scan saw what it hit (``flat``), and what it crossed (``mask``) near the end of that."""
-        near = cv2.subtract(mask, cv2.erode(mask, self._same_wall))
+        """Find from which side a scan saw what it hit (``flat``) and what it crossed (``mask``) just before its end."""
+        near = cv2.subtract(mask, cv2.erode(mask, self._fading.same_wall))
         beside = np.flatnonzero(near.view(np.bool_))
         cells = np.concatenate((flat, beside))
         rows = cells // mask.shape[1]
@@ -256,7 +237,7 @@ class EvidenceGrid:
             return self._grid
         if self._dirty is not None:
             # What is drawn of a cell depends on those around it.
-            window = self._wider(self._dirty, self._reach)
+            window = self._wider(self._dirty)
             rows, cols = _slices(window)
             misses, (stands, hits) = self._misses[rows, cols], self._standing(window)
             most, (most_hits, most_misses) = (int(hits.max(initial=0)), int(misses.max())), self._percent.shape
@@ -291,19 +272,20 @@ class EvidenceGrid:
         share: float = CROSSED_SHARE,
         within: tuple[FloatArray, FloatArray] | None = None,
     ) -> tuple[int, int, BoolArray]:
-        """Mark the cells that scans went through, whether or not a surface was seen there.
+        """Mark the cells that scans went through, whether or not a surface was met there.
 
-        The noise of a wall is crossed, too: what is within ``apart`` [m] of a surface that is not crossed does not
-        count.
+        The noise of a wall is crossed, too. So cells within ``apart`` [m] of a surface that is not crossed are not
+        marked.
 
         Args:
             apart: Reach of the noise of a surface [m].
             least: Scans that went through a cell.
-            share: How many more for each that saw a surface there.
-            within: Lower left and upper right corner of what is looked at, map frame, ``(x, y)`` [m]; all without it.
+            share: How many more for each that met a surface there.
+            within: Lower left and upper right corner of the window to look at, map frame, ``(x, y)`` [m]; by default
+                the whole grid.
 
         Returns:
-            First row and column of the window that was looked at, on the lattice, and its cells.
+            First row and column of that window on the lattice, and its cells.
         """
         lattice = self._lattice
         row, col, n_rows, n_cols = (0, 0, *self._hits.shape)
@@ -322,58 +304,25 @@ class EvidenceGrid:
         return row + lattice.row0, col + lattice.col0, np.greater(through, beside.view(np.bool_), out=through)
 
     def _standing(self, window: LatticeWindow) -> tuple[IntArray, Counts]:
-        """List the cells of a window, flat, in which something was hit that has not gone since, and those hits.
-
-        The noise of a wall was gone through, too, often, but the wall beside it was not: what counts are the hits
-        around a cell, and how many of them were gone through as often.
-        """
-        around = self._wider(window, self._reach)
-        # Few cells were hit: what is asked of those is not computed for the others.
-        met = np.flatnonzero(self._hits[_slices(around)] > 0)
-        at, rows, cols = self._flat(met, around)
-        hits, misses, beside = self._hits.reshape(-1)[at], self._misses.reshape(-1)[at], self._beside.reshape(-1)[at]
-        # Who ended just behind what was seen from the same side went through its place.
-        (hit_row, hit_col), (row, col) = (
-            [sums.reshape(-1).take(at).astype(np.int32) for sums in both]
-            for both in (self._hit_from, self._beside_from)
+        """List the cells of a window, flat, in which a surface was met that still stands, and the hits in each."""
+        around = self._wider(window)
+        # Few cells were met: what is asked of those is not computed for the others.
+        cells = np.flatnonzero(self._hits[_slices(around)] > 0)
+        at, rows, cols = self._flat(cells, around)
+        hits, misses, beside = (counts.reshape(-1)[at] for counts in (self._hits, self._misses, self._beside))
+        hit_row, hit_col, beside_row, beside_col = (
+            sums.reshape(-1).take(at).astype(np.int32) for sums in (*self._hit_from, *self._beside_from)
         )
-        same_side = hit_row * row + hit_col * col > SAME_SIDE * (hits * beside)
-        cells = (met, around[2:])
-        faded = self._crossed_again(cells, hits, misses - np.where(same_side, np.int16(0), beside))
-        # That leaves standing what they ended at: two faces seen along their wall from one end take each other away.
-        config = self._config
-        solid = hits.astype(np.float32) * np.float32(config.log_odds_hit) > misses * np.float32(config.log_odds_miss)
-        faded &= self._near(cells, ~faded & solid, self._same_wall)
-        faded |= self._crossed_again(cells, hits, misses - beside)
-        stands = ~faded | (misses <= 0.0)
+        met = MetCells(cells, around[2:], hits, misses, beside, (hit_row, hit_col), (beside_row, beside_col))
+        stands = self._fading.standing(met)
         rows += around[0] - window[0]
         cols += around[1] - window[1]
         stands &= (rows >= 0) & (rows < window[2]) & (cols >= 0) & (cols < window[3])
         return (rows * window[3] + cols)[stands], hits[stands]
 
-    def _crossed_again(self, cells: WindowCells, hits: Counts, through: Counts) -> BoolArray:
-        """Mark the cells around which enough of the hits were gone through afterwards, of counts of each."""
-        (met, shape), span = cells, 2 * self._noise + 1
-        sums = []
-        for counts in (np.minimum(hits, through), hits):
-            # Of whole numbers of 16 bits in half the time that single precision takes.
-            whole = np.zeros(shape, dtype=np.int16)
-            whole.reshape(-1)[met] = counts
-            sums.append(cv2.boxFilter(whole, cv2.CV_32F, (span, span), normalize=False).reshape(-1).take(met))
-        enough: BoolArray = sums[0] >= GONE_SHARE * sums[1]
-        return enough & self._near(cells, through >= GONE, np.ones((span, span), dtype=np.uint8))
-
-    @staticmethod
-    def _near(cells: WindowCells, marked: BoolArray, reach: Mask) -> BoolArray:
-        """Mark the cells around which one is marked."""
-        met, shape = cells
-        mask = np.zeros(shape, dtype=np.uint8)
-        mask.reshape(-1)[met] = marked
-        near: BoolArray = cv2.dilate(mask, reach).reshape(-1).take(met) > 0
-        return near
-
-    def _wider(self, window: LatticeWindow, reach: int) -> LatticeWindow:
-        """Widen a window by ``reach`` cells to all sides, as far as the arrays go."""
+    def _wider(self, window: LatticeWindow) -> LatticeWindow:
+        """Widen a window by the reach of fading to all sides, as far as the arrays go."""
+        reach = self._fading.reach
         row, col = max(window[0] - reach, 0), max(window[1] - reach, 0)
         last_row = min(window[0] + window[2] + reach, self._hits.shape[0])
         last_col = min(window[1] + window[3] + reach, self._hits.shape[1])

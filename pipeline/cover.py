@@ -20,7 +20,7 @@ from closedrooms.coverage.tour.ros_tour import write_path_message, write_waypoin
 from closedrooms.coverage.tour.tour_features import make_tour_features
 from closedrooms.coverage.tour.tour_planner import plan_coverage
 from closedrooms.pipeline.given_doors import given_doors, misplaced_doors
-from closedrooms.pipeline.map_config import CoverConfig
+from closedrooms.pipeline.options.cover import CoverConfig
 from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
 from closedrooms.pipeline.reporting.report import spread_rows

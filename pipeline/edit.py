@@ -16,7 +16,7 @@ from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
 from closedrooms.coverage.tour.tour_features import make_tour_features
 from closedrooms.coverage.tour.tour_planner import plan_coverage
-from closedrooms.pipeline.map_config import PredictConfig
+from closedrooms.pipeline.options.predict import PredictConfig
 from closedrooms.pipeline.predict import predict_map
 from closedrooms.predictor.methods import METHODS, predict
 from closedrooms.predictor.prediction import Prediction

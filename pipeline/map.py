@@ -18,7 +18,7 @@ from closedrooms.mapping.logs.clocks import find_gaps
 from closedrooms.mapping.map_builder import BuiltMap, build_map
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.trajectory import align
-from closedrooms.pipeline.config import MapConfig
+from closedrooms.pipeline.options.map import MapConfig
 from closedrooms.pipeline.reporting.log_observer import TRACKS, LogWatch
 from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent

@@ -14,7 +14,7 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.report import Report
 from closedrooms.core.room import Room
 from closedrooms.pipeline.given_doors import given_doors, misplaced_doors
-from closedrooms.pipeline.map_config import PredictConfig
+from closedrooms.pipeline.options.predict import PredictConfig
 from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent
 from closedrooms.pipeline.reporting.stopwatch import Stopwatch

@@ -11,7 +11,7 @@ from closedrooms.core.files.geojson import GeoFeature, write_features
 from closedrooms.core.files.outgoing import new_files
 from closedrooms.core.files.rosmap import RosMap, read_ros_map
 from closedrooms.core.report import Report
-from closedrooms.pipeline.propose_doors_config import DoorsConfig
+from closedrooms.pipeline.options.doors import DoorsConfig
 from closedrooms.pipeline.reporting.progress import Progress, Silent
 from closedrooms.pipeline.reporting.stopwatch import Stopwatch
 from closedrooms.predictor.structure.door_proposals import DoorProposal, propose_doors

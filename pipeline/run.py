@@ -22,8 +22,8 @@ from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.navigation.tour.tour_follower import TourPlan
 from closedrooms.pipeline.bounds import check_size, check_width, too_narrow
-from closedrooms.pipeline.config import RunConfig
 from closedrooms.pipeline.drive import DriveSettings, drive_tour
+from closedrooms.pipeline.options.run import RunConfig
 from closedrooms.pipeline.reporting.live_recording import InterimPrediction
 from closedrooms.pipeline.reporting.manifest import resolved, versions
 from closedrooms.pipeline.reporting.progress import Progress, Silent

@@ -8,7 +8,7 @@ from typing import Any
 from closedrooms.core.errors import ClosedroomsError, InvalidInputError
 from closedrooms.core.names import file_name
 from closedrooms.core.report import Report
-from closedrooms.pipeline.config import RunConfig
+from closedrooms.pipeline.options.run import RunConfig
 from closedrooms.pipeline.reporting.progress import Progress, Silent
 from closedrooms.pipeline.reporting.report import figure
 from closedrooms.pipeline.run import run

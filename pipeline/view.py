@@ -18,8 +18,8 @@ from closedrooms.core.files.output_folders import MANIFEST
 from closedrooms.core.files.schema import check_schema
 from closedrooms.core.runtime.packages import require
 from closedrooms.core.runtime.stopping import ending_with
+from closedrooms.pipeline.options.view import ViewConfig
 from closedrooms.pipeline.reporting.progress import Progress
-from closedrooms.pipeline.view_config import ViewConfig
 
 RECORDING = "run.rrd"
 HOST = "127.0.0.1"

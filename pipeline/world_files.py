@@ -171,10 +171,10 @@ def map_stem(path: Path) -> Path:
 
 def exporters() -> dict[str, Callable[[Path, "FloorPlan"], None]]:
     """List the writers of floor plans by the name of their format."""
-    from closedrooms.worlds.formats.mesh import write_obj, write_urdf
+    from closedrooms.worlds.formats.exports.mesh import write_obj, write_urdf
+    from closedrooms.worlds.formats.exports.sdf import write_sdf
+    from closedrooms.worlds.formats.exports.stage import write_stage
     from closedrooms.worlds.formats.native import write_plan
-    from closedrooms.worlds.formats.sdf import write_sdf
-    from closedrooms.worlds.formats.stage import write_stage
 
     return {
         "json": write_plan,

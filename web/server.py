@@ -15,10 +15,10 @@ from closedrooms.core.files.incoming import check_regular
 from closedrooms.core.runtime.packages import require
 from closedrooms.pipeline.reporting.progress import Progress
 from closedrooms.web.config import EditConfig
-from closedrooms.web.drafts import Drafts
+from closedrooms.web.editing.drafts import Drafts
+from closedrooms.web.editing.session import EditSession
+from closedrooms.web.editing.sheet import MapSheet, open_sheet
 from closedrooms.web.gate import Gate
-from closedrooms.web.session import EditSession
-from closedrooms.web.sheet import MapSheet, open_sheet
 
 HOST = "127.0.0.1"
 # How long a page may be without its server, or a busy machine silent, before it begins anew from its draft [s].
@@ -104,7 +104,7 @@ def _server(config: EditConfig, token: str, port: int) -> Any:
     from nicegui import ui
     from starlette.requests import Request
 
-    from closedrooms.web.page import open_page
+    from closedrooms.web.page.edit_page import open_page
 
     desk = Desk(config)
     threading.Thread(target=desk.prepare, daemon=True).start()

@@ -1,8 +1,8 @@
 """The floor plan: ``plan`` is the model, ``library`` finds worlds by name or file.
 
-- Right or not: ``validation``, ``connectivity``, ``outline``.
+- Right or not: ``validation``, ``connectivity``.
 - Walls and doors: ``geometry``, ``wall_assembly``, ``door_hinges``, ``boxes``, ``extrusion``.
-- For a run: ``closing``, ``start_pose``, ``truth`` (the true map and rooms).
+- For a run: ``ways_out`` (walled up), ``closing``, ``start_pose``, ``truth`` (the true map and rooms).
 - ``formats/`` reads and writes other people's plans, ``generation/`` makes new ones, ``plans/`` holds the bundled.
 
 ``start_pose.start_pose`` is named like its module and so stands there.

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
-from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom
+from closedrooms.worlds.plan import Opening, PlanDoor, PlanRoom
 from closedrooms.worlds.start_pose import CIRCULATION
 
 
@@ -31,19 +31,3 @@ def hung(doors: Sequence[PlanDoor], openings: Sequence[Opening], rooms: Sequence
         inside = [room for room in door.rooms if room is not None]
         result.append(replace(door, opens_into=min(inside, key=closes)))
     return tuple(result)
-
-
-def without_entrances(plan: FloorPlan) -> FloorPlan:
-    """Wall up a plan's doors and openings to the outside, each named in ``meta["sealed"]``.
-
-    A robot that maps a floor must not leave it.
-    """
-    entrances = [p.id for p in plan.passages if None in p.rooms]
-    if not entrances:
-        return plan
-    return replace(
-        plan,
-        doors=tuple(door for door in plan.doors if None not in door.rooms),
-        openings=tuple(opening for opening in plan.openings if None not in opening.rooms),
-        meta={**plan.meta, "sealed": entrances},
-    )

@@ -61,11 +61,10 @@ def load_world(name_or_path: str, *, level: str | None = None) -> "FloorPlan":
         InvalidInputError: Neither a name nor a file (the message lists the names), an unknown format, a plan that
             is not valid.
     """
-    from closedrooms.worlds.door_hinges import without_entrances
-    from closedrooms.worlds.outline import without_leaks
+    from closedrooms.worlds.ways_out import wall_up_entrances, wall_up_outline
 
-    plan = without_entrances(read_world(name_or_path, level=level))
-    return plan if name_or_path in bundled_names() else without_leaks(plan)
+    plan = wall_up_entrances(read_world(name_or_path, level=level))
+    return plan if name_or_path in bundled_names() else wall_up_outline(plan)
 
 
 def read_world(name_or_path: str, *, level: str | None = None) -> "FloorPlan":
@@ -174,8 +173,8 @@ def importers() -> list[Importer]:
     from closedrooms.worlds.formats.luperto import read_luperto
     from closedrooms.worlds.formats.native import read_plan
     from closedrooms.worlds.formats.pyrobosim import read_pyrobosim
+    from closedrooms.worlds.formats.raster.rosmap import read_raster
     from closedrooms.worlds.formats.rmf import read_rmf
-    from closedrooms.worlds.formats.rosmap import read_raster
 
     return [
         Importer("picture", "a picture of a map (PNG or PGM)", _is_picture, lambda path, _: read_raster(path)),

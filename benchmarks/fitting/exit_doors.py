@@ -14,8 +14,8 @@ from closedrooms.core.door import ClosedDoor
 from closedrooms.experiments.evaluation.samples.sample_reader import Sample
 from closedrooms.experiments.training.synthetic_maps import DOOR_SD
 from closedrooms.predictor.structure.doorways import FacingDoor
-from closedrooms.worlds.outline import FACING
 from closedrooms.worlds.plan import FloorPlan
+from closedrooms.worlds.ways_out import FACING
 
 PUBLIC = frozenset(
     ("corridor", "entrance", "lobby", "hall", "stairs", "entrance hall", "reception", "openspace", "canteen", "gym")

@@ -41,8 +41,8 @@ from closedrooms.core.grid import GridFrame
 from closedrooms.core.shapes import polygon_iou
 from closedrooms.experiments.evaluation.samples.listing import find_samples
 from closedrooms.experiments.evaluation.samples.sample_reader import Sample, read_sample
-from closedrooms.experiments.evaluation.scoring.sample_evaluation import Starts
 from closedrooms.experiments.evaluation.scoring.sureness import cells_asked
+from closedrooms.experiments.evaluation.scoring.timed_prediction import Starts
 from closedrooms.experiments.training.buildings import group_of, use_of
 from closedrooms.predictor.confidence.belief import Belief
 from closedrooms.predictor.confidence.calibration import FILE

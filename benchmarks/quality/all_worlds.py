@@ -12,7 +12,7 @@ from pathlib import Path
 
 from closedrooms.core.errors import ClosedroomsError
 from closedrooms.core.report import Report
-from closedrooms.pipeline.config import RunConfig, named_sim
+from closedrooms.pipeline.options.run import RunConfig, named_sim
 from closedrooms.pipeline.reporting.report import figure
 from closedrooms.pipeline.run import run
 from closedrooms.worlds.library import bundled_names

@@ -19,7 +19,7 @@ from closedrooms.coverage.cost_spread import COST_NOISE, spread_cost
 from closedrooms.experiments.evaluation.samples.listing import find_samples
 from closedrooms.experiments.evaluation.samples.sample_reader import Sample, read_sample
 from closedrooms.experiments.evaluation.scoring.cost import SEED, find_start
-from closedrooms.experiments.evaluation.scoring.sample_evaluation import predict_with
+from closedrooms.experiments.evaluation.scoring.timed_prediction import predict_with
 from closedrooms.experiments.evaluation.scoring.tours import plan_cropped_tour
 
 NOISES = (0.0, 0.01, COST_NOISE, 0.02)

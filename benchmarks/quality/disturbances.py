@@ -24,7 +24,7 @@ import numpy as np
 import shapely
 
 from closedrooms.core.files.rosmap import read_map
-from closedrooms.pipeline.config import RunConfig, named_sim
+from closedrooms.pipeline.options.run import RunConfig, named_sim
 from closedrooms.pipeline.run import run
 from closedrooms.sim.building import building_solids
 from closedrooms.sim.config import SimConfig

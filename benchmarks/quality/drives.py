@@ -10,7 +10,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from closedrooms.pipeline.config import RunConfig
+from closedrooms.pipeline.options.run import RunConfig
 from closedrooms.pipeline.run import run
 
 RUNS = ("office-01", "office-02", "office-02:1", "office-07", "school-02", "school-03", "school-03:1", "school-05")

@@ -102,18 +102,18 @@ def only(method: str, folder: Path) -> None:
 def found_by(method: str, grid: Path, doors: Path, out: Path) -> int:
     """Count the rooms that a method predicts, the doors that are proposed, or the vertices of tours."""
     if method == "doors":
+        from closedrooms.pipeline.options.doors import DoorsConfig
         from closedrooms.pipeline.propose_doors import doors_map
-        from closedrooms.pipeline.propose_doors_config import DoorsConfig
 
         return len(doors_map(DoorsConfig(map=grid, out=out.with_suffix(".out.geojson"))).figures["doors"])
     if method == "cover":
         from closedrooms.coverage.config import CoverageConfig
         from closedrooms.pipeline.cover import cover_map
-        from closedrooms.pipeline.map_config import CoverConfig
+        from closedrooms.pipeline.options.cover import CoverConfig
 
         figures = cover_map(CoverConfig(map=grid, doors=doors, out=out, coverage=CoverageConfig(parts="all"))).figures
         return int(figures["tour"]["vertices"])
-    from closedrooms.pipeline.map_config import PredictConfig
+    from closedrooms.pipeline.options.predict import PredictConfig
     from closedrooms.pipeline.predict import predict_map
 
     return len(predict_map(PredictConfig(map=grid, doors=doors, out=out, method=method)).figures["rooms"])

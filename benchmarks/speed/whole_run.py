@@ -13,7 +13,7 @@ from pathlib import Path
 from statistics import median
 from time import process_time
 
-from closedrooms.pipeline.config import RunConfig
+from closedrooms.pipeline.options.run import RunConfig
 from closedrooms.pipeline.run import run
 from closedrooms.worlds.geometry import wall_area
 from closedrooms.worlds.library import load_world

@@ -2,5 +2,5 @@
 
 - In: ``incoming`` (the one opener), ``archives``, ``yaml_text``.
 - Out: ``outgoing`` (the one writer) and ``output_folders``; ``unfinished`` is what killed processes leave.
-- Formats: ``rosmap`` and its ``map_picture``, ``tum``, and ``geojson/``.
+- Formats: ``rosmap/``, ``geojson/`` and ``tum``.
 """

@@ -3,7 +3,7 @@
 Only regular files are opened (a FIFO would wait for ever, a device has no end), only a bounded part is read, and
 whatever a reader of any library raises becomes one :class:`~closedrooms.core.errors.InvalidInputError` that names the
 file and what was expected. Archives are in :mod:`closedrooms.core.files.archives`, YAML in
-:mod:`closedrooms.core.files.yaml_text`, pictures in :mod:`closedrooms.core.files.map_picture`.
+:mod:`closedrooms.core.files.yaml_text`, pictures in :mod:`closedrooms.core.files.rosmap.map_picture`.
 """
 
 import contextlib

@@ -1,6 +1,7 @@
-"""SHA-256 of what a sample holds, to tell a file that was changed since."""
+"""SHA-256 of files: of a sample, to tell one that was changed since; of code, to tell results of older code."""
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError
@@ -25,6 +26,14 @@ def digest(path: Path) -> str:
     """
     with opened(path, "a file of a dataset") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def code_digest(files: Sequence[Path]) -> str:
+    """Compute the digest of the names and contents of some files."""
+    content = hashlib.sha256()
+    for path in sorted(files):
+        content.update(path.name.encode() + digest(path).encode())
+    return content.hexdigest()
 
 
 def check(folder: Path) -> None:

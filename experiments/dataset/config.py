@@ -11,7 +11,7 @@ from closedrooms.experiments.places import Place, Url
 from closedrooms.experiments.scheduler_address import check_scheduler
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.navigation.config import NavigationConfig
-from closedrooms.pipeline.config import NoiseName, named_sim
+from closedrooms.pipeline.options.run import NoiseName, named_sim
 from closedrooms.sim.config import SimConfig
 
 # Of what stands in a dataset.

@@ -10,7 +10,7 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.runtime.options import check_least
 from closedrooms.experiments.places import Place
 from closedrooms.experiments.scheduler_address import check_scheduler
-from closedrooms.pipeline.map_config import check_completions
+from closedrooms.pipeline.options.cover import check_completions
 from closedrooms.predictor.methods import find_method
 
 COMPARED = ("paper", "best", "rose", "line-of-sight", "geometric")

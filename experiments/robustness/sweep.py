@@ -18,8 +18,8 @@ from closedrooms.core.remarks import Remark
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.claimed_folder import claim_folder, write_manifest
+from closedrooms.experiments.dataset.checksums import code_digest
 from closedrooms.experiments.dataset.variants import given_worlds, remarks_on, world_sources
-from closedrooms.experiments.evaluation.scoring.tours import code_digest
 from closedrooms.experiments.robustness.config import FACTORS, RobustnessConfig
 from closedrooms.experiments.robustness.levels import Case, Setting, cases
 from closedrooms.experiments.robustness.onset import Onset

@@ -16,8 +16,8 @@ from closedrooms.core.random import stream
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.claimed_folder import claim_folder, write_manifest
+from closedrooms.experiments.dataset.checksums import code_digest
 from closedrooms.experiments.evaluation.samples.listing import find_samples
-from closedrooms.experiments.evaluation.scoring.tours import code_digest
 from closedrooms.experiments.training.config import TrainConfig
 from closedrooms.experiments.training.examples import Examples, Gathered, gather_examples
 from closedrooms.pipeline.reporting.manifest import input_path, resolved, versions

@@ -11,7 +11,7 @@ from closedrooms.core.grid import OccupancyGrid
 from closedrooms.core.remarks import Remark
 from closedrooms.core.report import counted
 from closedrooms.core.shapes import polygon_iou
-from closedrooms.pipeline.config import RunConfig
+from closedrooms.pipeline.options.run import RunConfig
 from closedrooms.predictor.prediction import Prediction
 
 if TYPE_CHECKING:

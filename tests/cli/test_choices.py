@@ -2,9 +2,9 @@
 
 from typing import get_args, get_type_hints
 
-from closedrooms.pipeline.config import LidarName, NoiseName
+from closedrooms.pipeline.options.run import LidarName, NoiseName
+from closedrooms.pipeline.options.worlds import ConvertWorld
 from closedrooms.pipeline.world_files import exporters
-from closedrooms.pipeline.worlds_config import ConvertWorld
 from closedrooms.sim.config import LIDAR_PRESETS, NOISE_LEVELS
 
 

@@ -254,7 +254,7 @@ def test_values_are_laid_over_what_is_there():
 
 
 def test_plain_values_become_what_fields_take():
-    config = load("pipeline.map_config:CoverConfig")
+    config = load("pipeline.options.cover:CoverConfig")
     values = field_values(config, {"start": [1, 2.5], "map": "m.yaml"}, current={})
     assert values["start"] == (1.0, 2.5)
     assert values["map"].name == "m.yaml"

@@ -10,7 +10,7 @@ from closedrooms.core.files.geojson import write_doors
 from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.pipeline.cover import cover_map
-from closedrooms.pipeline.map_config import CoverConfig
+from closedrooms.pipeline.options.cover import CoverConfig
 
 
 @pytest.fixture

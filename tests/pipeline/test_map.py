@@ -10,8 +10,8 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.logs import RecordedRun
 from closedrooms.mapping.logs.npz import write_scans
 from closedrooms.mapping.map_builder import build_map
-from closedrooms.pipeline.config import MapConfig
 from closedrooms.pipeline.map import map_log
+from closedrooms.pipeline.options.map import MapConfig
 
 
 def carmen(folder: Path, *lines: str) -> Path:

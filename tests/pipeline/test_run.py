@@ -14,7 +14,7 @@ from closedrooms.core.files.geojson import read_doors, read_features, read_rooms
 from closedrooms.core.files.rosmap import read_map
 from closedrooms.core.files.tum import read_trajectory
 from closedrooms.mapping.logs import read_run
-from closedrooms.pipeline.config import RunConfig
+from closedrooms.pipeline.options.run import RunConfig
 from closedrooms.pipeline.run import choose_closed
 from closedrooms.sim.config import NOISE_LEVELS, SimConfig
 from closedrooms.worlds.library import DEFAULT_WORLD, load_world

@@ -18,8 +18,9 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.rosmap import read_ros_map
 from closedrooms.core.report import Report
 from closedrooms.pipeline import runs
-from closedrooms.pipeline.config import MapConfig, RunConfig
 from closedrooms.pipeline.map import map_log
+from closedrooms.pipeline.options.map import MapConfig
+from closedrooms.pipeline.options.run import RunConfig
 from closedrooms.pipeline.reporting.progress import Silent
 from closedrooms.pipeline.runs import plan_runs, run_all
 from closedrooms.visualization.rerun import live

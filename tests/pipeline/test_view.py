@@ -13,8 +13,8 @@ import pytest
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.pipeline import view
+from closedrooms.pipeline.options.view import ViewConfig
 from closedrooms.pipeline.view import ViewerError, find_recording, view_recording
-from closedrooms.pipeline.view_config import ViewConfig
 
 
 def write_recording(path: Path) -> Path:

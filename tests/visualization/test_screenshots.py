@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from closedrooms.core.grid import FREE, GridFrame, OccupancyGrid
-from closedrooms.pipeline.config import RunConfig
+from closedrooms.pipeline.options.run import RunConfig
 from closedrooms.pipeline.run import run
 from closedrooms.visualization.rerun.recorder import Recorder
 from closedrooms.visualization.rerun.stream import Stage

@@ -3,8 +3,8 @@ from dataclasses import replace
 import pytest
 from shapely.geometry import box
 
-from closedrooms.worlds.door_hinges import hung, is_circulation, without_entrances
-from closedrooms.worlds.plan import FloorPlan, Opening, PlanDoor, PlanRoom
+from closedrooms.worlds.door_hinges import hung, is_circulation
+from closedrooms.worlds.plan import Opening, PlanDoor, PlanRoom
 
 SEGMENT = ((4.0, 1.0), (4.0, 1.9))
 
@@ -55,17 +55,3 @@ def test_of_rooms_with_as_many_passages_it_is_the_one_that_is_no_corridor_then_t
 def test_a_door_to_the_outside_opens_into_the_building() -> None:
     rooms = [room("a")]
     assert [d.opens_into for d in hung([door("d0", "a", None), door("d1", None, "a")], (), rooms)] == ["a", "a"]
-
-
-def test_ways_out_are_walled_up_and_named(small: FloorPlan) -> None:
-    assert without_entrances(small) is small
-    out = replace(
-        small,
-        doors=(door("e0", None, "r0"), *small.doors, door("e1", "r1", None)),
-        openings=(Opening("e2", SEGMENT, ("r2", None)), *small.openings),
-        meta={"source": "here"},
-    )
-    shut = without_entrances(out)
-    assert (shut.doors, shut.openings) == (small.doors, small.openings)
-    assert shut.meta == {"source": "here", "sealed": ["e0", "e1", "e2"]}
-    assert (shut.rooms, shut.walls, shut.start) == (small.rooms, small.walls, small.start)

@@ -17,29 +17,27 @@ from closedrooms.core.names import markdown_text
 from closedrooms.core.pose import Pose2
 from closedrooms.core.room import Room
 from closedrooms.core.scan import LaserScan
-from closedrooms.core.shapes import Shape, polygon_iou
 from closedrooms.visualization import colours
 from closedrooms.visualization.rerun import drawables
 from closedrooms.visualization.rerun.blueprint import make_blueprint
 from closedrooms.visualization.rerun.curves import Curves
 from closedrooms.visualization.rerun.documents import LEGEND, configuration_text, room_line, rooms_table, text_document
-from closedrooms.visualization.rerun.drawn_prediction import draw_doors, draw_input, draw_rooms, draw_trace
-from closedrooms.visualization.rerun.drawn_sureness import draw_nothing_yet, draw_sureness
+from closedrooms.visualization.rerun.drawn_prediction import draw_doors
 from closedrooms.visualization.rerun.drawn_tours import draw_tours
 from closedrooms.visualization.rerun.live import LiveViewer
+from closedrooms.visualization.rerun.recorded_prediction import RecordedPrediction
 from closedrooms.visualization.rerun.recorded_robot import RecordedRobot
 from closedrooms.visualization.rerun.stream import RecordingStream, Stage
 from closedrooms.visualization.rerun.tabs import Contents
-from closedrooms.visualization.rerun.weighed import draw_weighed, room_name
 
 if TYPE_CHECKING:
     from closedrooms.coverage.tour.coverage_tour import CoverageTour
-    from closedrooms.predictor.prediction import Level, Prediction
+    from closedrooms.predictor.prediction import Prediction
     from closedrooms.sim.bystanders import Mover
     from closedrooms.visualization.rerun.recorded_building import RecordedBuilding
     from closedrooms.worlds.plan import FloorPlan
 
-# A map every so often: what the eye can follow [s].
+# Time between two maps [s]: what the eye can follow.
 MAP_PERIOD = 2.0
 # Larger maps come less often, by the square of their size in cells: a larger one takes longer to drive through and to
 # draw (one of 40 million cells 25 s, when a loop has moved all of it).
@@ -80,11 +78,10 @@ class Recorder:
         self._bounds = bounds
         self._robot = RecordedRobot(self._stream, robot_radius)
         self._building: RecordedBuilding | None = None
-        self._palette: dict[str, colours.Colour] = {}
+        self._predicted = RecordedPrediction(self._stream, self._curves)
         self._stage: int = Stage.BUILDING
         self._seen: set[str] = set()
         self._grids: dict[str, OccupancyGrid] = {}
-        self._truth: dict[str, Shape] = {}
         self._last_map, self._map_period = -np.inf, MAP_PERIOD
 
     def __enter__(self) -> Self:
@@ -125,7 +122,7 @@ class Recorder:
         from closedrooms.visualization.rerun.recorded_building import RecordedBuilding
         from closedrooms.worlds.truth import truth_bounds
 
-        self._palette = colours.room_colours(closed)
+        self._predicted.give_colours(closed)
         self._stream.at(0.0, Stage.BUILDING)
         doors, rooms = len(plan.doors), len(plan.rooms)
         text = f"{markdown_text(plan.name)}: {rooms} rooms, {doors} doors, {len(closed)} of them closed"
@@ -191,7 +188,7 @@ class Recorder:
         if first:
             # Until something is predicted, what is predicted is what is known.
             self._stream.log("prediction/input", drawables.grid_map(grid))
-            self._draw_nothing_yet(grid)
+            self._predicted.draw_nothing_yet(grid)
         if self._bounds is None or (final and self._building is None):
             self._bounds = _known_bounds(grid)
         if final:
@@ -201,11 +198,6 @@ class Recorder:
         self._curves.add("metrics/known_area/map", area, name, colour, stamp=stamp, stage=self._stage)
         self._robot.draw_paths()
         self._hold(mapping=True)
-
-    def _draw_nothing_yet(self, grid: OccupancyGrid) -> None:
-        """Draw what there is before the first prediction, so that no view is empty."""
-        self._stream.log("rooms/predicted/grid", drawables.grid_map(grid))
-        draw_nothing_yet(self._stream, grid)
 
     def frontiers(self, points: FloatArray, goal: Point | None, path: FloatArray | None, stamp: float) -> None:
         """Record frontiers, the goal and the path there."""
@@ -248,8 +240,7 @@ class Recorder:
 
     def truth(self, grid: OccupancyGrid, rooms: Sequence[Room]) -> None:
         """Record the true map and rooms, there whatever the time."""
-        draw_rooms(self._stream, "rooms/truth", grid, rooms, self._palette, static=True)
-        self._truth = {door: room.polygon for room in rooms for door in room.doors}
+        self._predicted.draw_truth(grid, rooms)
         self._hold(truth=True)
 
     def prediction(
@@ -272,8 +263,9 @@ class Recorder:
             self._bounds = _known_bounds(prediction.grid)
         if not self._holds.mapping:
             self._stream.at(stage=Stage.SEGMENTS)
-            self._draw_nothing_yet(observed)
-        self._draw_prediction(observed, doors, prediction, iou or {}, staged=True)
+            self._predicted.draw_nothing_yet(observed)
+        stamp = self._last_map if np.isfinite(self._last_map) else None
+        self._hold(**self._predicted.draw_final(observed, doors, prediction, iou or {}, stamp))
         failures = {markdown_text(door): markdown_text(why) for door, why in prediction.failures.items()}
         failed = "".join(f"\n- {door}: {why}" for door, why in failures.items())
         self._stream.say("Rooms", f"{len(prediction.rooms)} rooms predicted, {len(prediction.failures)} failed{failed}")
@@ -303,50 +295,7 @@ class Recorder:
             stamp: Simulated time [s].
             iou: Of each room, by door id, where the truth is known.
         """
-        self._stream.at(stamp, self._stage)
-        self._draw_prediction(observed, doors, prediction, iou or {}, stamp=stamp)
-
-    def _draw_prediction(
-        self,
-        observed: OccupancyGrid,
-        doors: Sequence[ClosedDoor],
-        prediction: "Prediction",
-        iou: Mapping[str, float],
-        *,
-        staged: bool = False,
-        stamp: float | None = None,
-    ) -> None:
-        """Draw a prediction and how it came about, each step at its stage where ``staged``; else at ``stamp`` [s]."""
-        from closedrooms.predictor.prediction import WeighedTrace
-
-        self._palette = colours.room_colours({*self._palette, *(door.id for door in doors)})
-        if staged:
-            self._stream.at(stage=Stage.SEGMENTS)
-        draw_input(self._stream, observed, doors)
-        trace = prediction.trace
-        if isinstance(trace, WeighedTrace):
-            draw_weighed(self._stream, trace, self._palette, staged=staged)
-            self._hold(weighed=tuple(room_name(room) for room in trace.rooms) if staged else self._holds.weighed)
-        elif trace is not None:
-            draw_trace(self._stream, trace, self._palette, staged=staged)
-            self._hold(expansion=True)
-        if staged:
-            self._add_levels(() if trace is None else trace.levels)
-            self._stream.at(stage=Stage.ROOMS)
-        draw_rooms(self._stream, "rooms/predicted", prediction.grid, prediction.rooms, self._palette, iou=iou)
-        draw_sureness(self._stream, observed, prediction, iou)
-        when = self._last_map if staged and np.isfinite(self._last_map) else stamp
-        self._curves.add_iou(iou, self._palette, stamp=when, stage=Stage.ROOMS if staged else self._stage)
-        sure = self._holds.sureness or prediction.probability is not None
-        self._hold(rooms=True, sureness=sure, room_iou=self._holds.room_iou or bool(iou))
-
-    def _add_levels(self, levels: Sequence["Level"]) -> None:
-        """Add how well each room is predicted level by level to the curves over the stages."""
-        for level in levels:
-            true = {door: self._truth[door] for door in level.layouts if door in self._truth}
-            iou = {door: polygon_iou(level.layouts[door], shape) for door, shape in true.items()}
-            stage = min(Stage.EXPANSION + level.k, Stage.ROOMS - 1)
-            self._curves.add_iou(iou, self._palette, stamp=None, stage=stage)
+        self._hold(**self._predicted.draw_interim(observed, doors, prediction, iou or {}, stamp, self._stage))
 
     def tours(self, tours: Mapping[str, "CoverageTour"]) -> None:
         """Record graphs and tours."""
@@ -364,7 +313,7 @@ class Recorder:
         self._stage = Stage.DRIVING
         self._stream.at(stamp, self._stage)
         self._stream.say("Driving", f"{len(prediction.rooms)} rooms are still predicted")
-        draw_rooms(self._stream, "driving/predicted", prediction.grid, prediction.rooms, self._palette)
+        self._predicted.draw_remaining(prediction)
         self._stream.log("driving/tour", drawables.strips([np.asarray(tour)], colours.GOAL))
         self._hold(driving=True, active="Driving")
 

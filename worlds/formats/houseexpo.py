@@ -14,8 +14,8 @@ from closedrooms.core.files.incoming import read_json
 from closedrooms.core.numbers import FARTHEST
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.door_hinges import hung
-from closedrooms.worlds.formats.room_outlines import repaired
-from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
+from closedrooms.worlds.formats.import_checks import Source, no_rooms, settle
+from closedrooms.worlds.formats.rooms_only.room_outlines import repaired
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom
 from closedrooms.worlds.wall_assembly import RoomEdge, clean_coverage, shared_edges, walls_along

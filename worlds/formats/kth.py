@@ -11,10 +11,10 @@ from shapely.geometry import Polygon
 from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.formats.door_stretches import straight_at_doors
-from closedrooms.worlds.formats.portals import Portal, pair_portals, plan_of_portals
-from closedrooms.worlds.formats.room_outlines import GAP, clean_outlines, hull_areas, outline_lines, repaired
-from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
+from closedrooms.worlds.formats.import_checks import Source, no_rooms, settle
+from closedrooms.worlds.formats.rooms_only.door_stretches import straight_at_doors
+from closedrooms.worlds.formats.rooms_only.portals import Portal, pair_portals, plan_of_portals
+from closedrooms.worlds.formats.rooms_only.room_outlines import GAP, clean_outlines, hull_areas, outline_lines, repaired
 from closedrooms.worlds.formats.xml_text import attribute, child, descendants, parse_xml, text
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
 

@@ -13,9 +13,9 @@ from closedrooms.core.door import Point
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.names import shown
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.formats.portals import Portal, pair_portals, plan_of_portals
-from closedrooms.worlds.formats.room_outlines import GAP, clean_outlines, hull_areas, outline_lines, repaired
-from closedrooms.worlds.formats.settlement import Source, no_rooms, settle
+from closedrooms.worlds.formats.import_checks import Source, no_rooms, settle
+from closedrooms.worlds.formats.rooms_only.portals import Portal, pair_portals, plan_of_portals
+from closedrooms.worlds.formats.rooms_only.room_outlines import GAP, clean_outlines, hull_areas, outline_lines, repaired
 from closedrooms.worlds.formats.xml_text import attribute, child, children, descendants, parse_xml, text
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
 

@@ -15,7 +15,7 @@ from closedrooms.core.files.outgoing import write_bytes
 from closedrooms.core.names import is_name, is_path, shown
 from closedrooms.core.numbers import is_number, repr_of
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.formats.settlement import Source, settle
+from closedrooms.worlds.formats.import_checks import Source, settle
 from closedrooms.worlds.plan import FloorPlan, Furniture, Material, Opening, PlanDoor, PlanRoom, Wall
 
 # Numbers beyond this are mistakes; an integer may be too large for a float.

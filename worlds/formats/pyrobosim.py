@@ -15,10 +15,10 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.yaml_text import parse_yaml
 from closedrooms.core.pose import Pose2
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.formats.hallways import Hallway, JoinedRooms, extend_into_rooms
-from closedrooms.worlds.formats.portals import plan_of_portals
-from closedrooms.worlds.formats.room_outlines import cut_out_inner_rooms
-from closedrooms.worlds.formats.settlement import Source, not_in_plan, settle
+from closedrooms.worlds.formats.import_checks import Source, not_in_plan, settle
+from closedrooms.worlds.formats.rooms_only.hallways import Hallway, JoinedRooms, extend_into_rooms
+from closedrooms.worlds.formats.rooms_only.portals import plan_of_portals
+from closedrooms.worlds.formats.rooms_only.room_outlines import cut_out_inner_rooms
 from closedrooms.worlds.plan import FloorPlan, PlanRoom
 from closedrooms.worlds.wall_assembly import clean_coverage
 
@@ -51,22 +51,10 @@ def read_pyrobosim(path: str | Path) -> FloorPlan:
     if not rows:
         raise InvalidInputError("a plan without rooms", expected=WHAT, where=path)
     remarks = not_in_plan(data, {"locations": "the shape of such furniture stands in another file"})
-    # Rooms without a name are counted, as pyrobosim does.
-    names = [str(row.get("name") or f"room_{number}") for number, row in enumerate(rows)]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise InvalidInputError(f"two rooms named {twice!r}", expected="names used once", where=path)
+    names = _room_names(rows, path)
     wall = _wall_width(rows, remarks)
+    footprints = _floors(rows, names, wall, path, remarks)
     # Footprints are free floor: the walls' centre lines lie half a wall further out.
-    footprints = _placed_footprints(rows, names, path)
-    footprints, inner = cut_out_inner_rooms(footprints, apart=wall)
-    if inner:
-        why, told = "inside another room, cut out of that", tuple(names[number] for number in inner)
-        remarks.append(Remark(action="repaired", what="rooms", why=why, names=told, count=len(told)))
-    overlap = sum(footprint.area for footprint in footprints) - shapely.union_all(footprints).area
-    if overlap > 0.01:
-        why = f"{overlap:.2f} square metres given to one room each"
-        remarks.append(Remark(action="repaired", what="overlaps of rooms", why=why))
     outlines = [footprint.buffer(wall / 2, join_style="mitre") for footprint in footprints]
     hallways = _hallways(halls, names, footprints, path, remarks)
     building = JoinedRooms(footprints, [*outlines], [*names], wall)
@@ -99,6 +87,38 @@ def read_pyrobosim(path: str | Path) -> FloorPlan:
         door_widths=[hallway.width for hallway in hallways],
     )
     return settle(plan, remarks, source, path)
+
+
+def _room_names(rows: list[dict[str, Any]], path: Path) -> list[str]:
+    """List the names of rooms, each used once; rooms without one are counted, as pyrobosim does."""
+    names = [str(row.get("name") or f"room_{number}") for number, row in enumerate(rows)]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InvalidInputError(f"two rooms named {twice!r}", expected="names used once", where=path)
+    return names
+
+
+def _floors(
+    rows: list[dict[str, Any]], names: list[str], wall: float, path: Path, remarks: list[Remark]
+) -> list[Polygon]:
+    """Make the free floor of every room, without the rooms that stand inside it.
+
+    Args:
+        rows: The rooms in the file.
+        names: Theirs.
+        wall: Thickness of walls [m].
+        path: The file, for messages.
+        remarks: Told what was cut out and what overlaps.
+    """
+    footprints, inner = cut_out_inner_rooms(_placed_footprints(rows, names, path), apart=wall)
+    if inner:
+        why, told = "inside another room, cut out of that", tuple(names[number] for number in inner)
+        remarks.append(Remark(action="repaired", what="rooms", why=why, names=told, count=len(told)))
+    overlap = sum(footprint.area for footprint in footprints) - shapely.union_all(footprints).area
+    if overlap > 0.01:
+        why = f"{overlap:.2f} square metres given to one room each"
+        remarks.append(Remark(action="repaired", what="overlaps of rooms", why=why))
+    return footprints
 
 
 def _hallways(

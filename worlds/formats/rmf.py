@@ -16,8 +16,8 @@ from closedrooms.core.door import Segment
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.remarks import Remark
 from closedrooms.worlds.door_hinges import hung
+from closedrooms.worlds.formats.import_checks import Source, merged, no_rooms, settle
 from closedrooms.worlds.formats.rmf_level import RmfLevel, read_level
-from closedrooms.worlds.formats.settlement import Source, merged, no_rooms, settle
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import FloorPlan, PlanDoor, PlanRoom, Wall
 

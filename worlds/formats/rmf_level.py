@@ -15,7 +15,7 @@ from closedrooms.core.door import Point, Segment
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.yaml_text import parse_yaml
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.formats.settlement import not_in_plan
+from closedrooms.worlds.formats.import_checks import not_in_plan
 from closedrooms.worlds.geometry import areal
 from closedrooms.worlds.plan import DoorKind
 

@@ -16,8 +16,8 @@ from closedrooms.experiments.evaluation.reporting.figures import TITLE, same_ext
 from closedrooms.experiments.evaluation.reporting.score_summary import MEASURES, estimates
 from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
 from closedrooms.experiments.evaluation.samples.sample_reader import Sample, read_sample
-from closedrooms.experiments.evaluation.scoring.sample_evaluation import predict_with
 from closedrooms.experiments.evaluation.scoring.scores import Scores, hidden_area
+from closedrooms.experiments.evaluation.scoring.timed_prediction import predict_with
 from closedrooms.experiments.evaluation.scoring.tours import cropped, plan_cropped_tour
 from closedrooms.visualization.colours import DOOR_CLOSED, FREE, OCCUPIED, ROOM_COLOURS, UNKNOWN
 

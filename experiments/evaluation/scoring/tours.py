@@ -17,7 +17,7 @@ from closedrooms.core.files.outgoing import write_json
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
-from closedrooms.experiments.dataset.checksums import digest
+from closedrooms.experiments.dataset.checksums import code_digest
 from closedrooms.pipeline.reporting.manifest import versions
 
 # The robot starts at the origin of the map.
@@ -103,11 +103,3 @@ def tour_code() -> str:
         *(root / "predictor" / "structure").glob("*.py"),
     ]
     return code_digest([*files, Path(__file__)])
-
-
-def code_digest(files: Sequence[Path]) -> str:
-    """Compute the digest of the names and contents of some files."""
-    content = hashlib.sha256()
-    for path in sorted(files):
-        content.update(path.name.encode() + digest(path).encode())
-    return content.hexdigest()

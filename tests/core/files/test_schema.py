@@ -13,7 +13,7 @@ from closedrooms.experiments.claimed_folder import claim_folder
 from closedrooms.experiments.dataset.layout import read_manifest
 from closedrooms.experiments.evaluation.samples.sample_path import SamplePath
 from closedrooms.experiments.evaluation.samples.sample_reader import read_sample
-from closedrooms.pipeline.map_config import PredictConfig
+from closedrooms.pipeline.options.predict import PredictConfig
 from closedrooms.pipeline.view import find_recording
 
 NEWER = f"schema version {SCHEMA + 1}, written by a newer closedrooms; expected at most {SCHEMA}.*"

@@ -11,8 +11,8 @@ from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.formats.houseexpo import read_houseexpo
 from closedrooms.worlds.geometry import wall_area
 from closedrooms.worlds.library import load_world
-from closedrooms.worlds.outline import leaks
 from closedrooms.worlds.plan import FloorPlan
+from closedrooms.worlds.ways_out import has_way_out
 
 
 def read(folder: Path, outline: list[list[float]], **boxes: object) -> FloorPlan:
@@ -32,7 +32,7 @@ def test_boxes_that_touch_have_a_wall_and_one_door_between_them(tmp_path: Path) 
     assert sorted(pairs) == [("bedroom", "hall"), ("bedroom", "kitchen"), ("hall", "kitchen")]
     assert [door.width for door in plan.doors] == pytest.approx([0.9] * 3)
     assert wall_area(plan).covers(shapely.Point(1.0, 3.0))
-    assert not leaks(plan)
+    assert not has_way_out(plan)
     assert len(closable_rooms(plan, several_doors=True)) == 2
 
 
@@ -58,14 +58,14 @@ def test_a_strip_between_boxes_is_their_wall_and_no_corridor(tmp_path: Path) -> 
     pairs = {frozenset(labels[side] for side in door.rooms if side) for door in plan.doors}
     assert frozenset({"bedroom", "kitchen"}) in pairs
     assert frozenset({"bedroom", "bath"}) in pairs
-    assert not leaks(plan)
+    assert not has_way_out(plan)
 
 
 def test_boxes_that_touch_over_less_than_a_door_have_wall_only(tmp_path: Path) -> None:
     outline = [[0.0, 0.0], [4.0, 0.0], [4.0, 3.5], [8.0, 3.5], [8.0, 8.0], [4.0, 8.0], [4.0, 4.0], [0.0, 4.0]]
     plan = read(tmp_path, outline, Bedroom=[[0, 0, 4, 4]], Kitchen=[[4, 3.5, 8, 8]])
     assert not plan.doors
-    assert not leaks(plan)
+    assert not has_way_out(plan)
 
 
 def test_a_broken_box_costs_that_room_and_is_named(tmp_path: Path) -> None:

@@ -16,8 +16,8 @@ from closedrooms.worlds.formats.houseexpo import read_houseexpo
 from closedrooms.worlds.formats.kth import read_kth
 from closedrooms.worlds.formats.native import read_plan, write_plan
 from closedrooms.worlds.formats.pyrobosim import read_pyrobosim
+from closedrooms.worlds.formats.raster.rosmap import read_raster
 from closedrooms.worlds.formats.rmf import read_rmf
-from closedrooms.worlds.formats.rosmap import read_raster
 from closedrooms.worlds.geometry import room_interior, wall_area
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.worlds.formats.kth import read_kth
 from closedrooms.worlds.geometry import room_interior, solid_walls, wall_area
-from closedrooms.worlds.outline import leaks
 from closedrooms.worlds.plan import FloorPlan
+from closedrooms.worlds.ways_out import has_way_out
 
 PIXELS, GAP, DOOR = 20.0, 0.16, 0.9
 Corner = tuple[float, float]
@@ -65,7 +65,7 @@ def check_floor(plan: FloorPlan) -> None:
     walls = solid_walls(plan.walls)
     for room in plan.rooms:
         assert room.polygon.boundary.difference(walls.buffer(1e-3)).length < 1e-3, room.id
-    assert not leaks(plan)
+    assert not has_way_out(plan)
     assert wall_area(plan).is_valid
     assert not [remark for remark in plan.remarks if remark.loss]
 
@@ -120,7 +120,7 @@ def test_a_wall_that_is_missing_from_a_plan_lets_a_robot_out(tmp_path: Path) -> 
     path.write_text(floor_xml(0.3, 0.001, 1))
     plan = read_kth(path)
     longest = max(plan.walls, key=lambda wall: math.dist(*wall.segment))
-    assert leaks(replace(plan, walls=tuple(wall for wall in plan.walls if wall is not longest)))
+    assert has_way_out(replace(plan, walls=tuple(wall for wall in plan.walls if wall is not longest)))
 
 
 def test_a_scale_that_makes_doors_too_narrow_is_said_with_the_one_that_fits(tmp_path: Path) -> None:
@@ -143,7 +143,7 @@ def test_rooms_of_an_absurd_size_are_said_too(tmp_path: Path) -> None:
 
 
 def test_what_the_plan_lost_of_the_files_walls_is_measured(tmp_path: Path) -> None:
-    from closedrooms.worlds.formats.settlement import Source, settle
+    from closedrooms.worlds.formats.import_checks import Source, settle
 
     path = tmp_path / "floor.xml"
     path.write_text(floor_xml(0.0, 0.0, 0))

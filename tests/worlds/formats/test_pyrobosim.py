@@ -15,9 +15,9 @@ from closedrooms.core.pose import Pose2
 from closedrooms.worlds.closing import closable_rooms
 from closedrooms.worlds.formats.pyrobosim import read_pyrobosim
 from closedrooms.worlds.geometry import room_interior
-from closedrooms.worlds.outline import leaks
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.start_pose import start_pose, start_room
+from closedrooms.worlds.ways_out import has_way_out
 
 QUARTER = math.pi / 2
 
@@ -114,7 +114,7 @@ def test_rooms_at_any_distance_are_joined_by_a_door_of_the_hallways_width(
         assert room_interior(plan, ids["bed"]).area == pytest.approx(9.0, rel=0.01)
     assert start_room(plan) in (ids["living"], ids.get("hallway"))
     assert set(closable_rooms(plan)) == {ids["bed"]}
-    assert not leaks(plan)
+    assert not has_way_out(plan)
 
 
 def test_a_bad_hallway_costs_that_hallway_and_is_named(tmp_path: Path) -> None:

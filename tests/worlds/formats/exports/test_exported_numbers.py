@@ -18,10 +18,10 @@ from shapely.geometry import Polygon, box
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.worlds.boxes import BoxLeaf, box_leaves, open_leaf, wall_boxes
 from closedrooms.worlds.extrusion import WALL_HEIGHT
-from closedrooms.worlds.formats import stage
-from closedrooms.worlds.formats.mesh import write_obj, write_urdf
-from closedrooms.worlds.formats.sdf import write_sdf
-from closedrooms.worlds.formats.stage import write_stage
+from closedrooms.worlds.formats.exports import stage
+from closedrooms.worlds.formats.exports.mesh import write_obj, write_urdf
+from closedrooms.worlds.formats.exports.sdf import write_sdf
+from closedrooms.worlds.formats.exports.stage import write_stage
 from closedrooms.worlds.geometry import wall_area
 from closedrooms.worlds.plan import FloorPlan, Furniture
 

@@ -12,8 +12,8 @@ from shapely.geometry import Polygon
 
 from closedrooms.pipeline.world_files import convert_world
 from closedrooms.worlds.boxes import Box, box_leaves, open_leaf, wall_boxes
-from closedrooms.worlds.formats.sdf import write_sdf
-from closedrooms.worlds.formats.stage import write_stage
+from closedrooms.worlds.formats.exports.sdf import write_sdf
+from closedrooms.worlds.formats.exports.stage import write_stage
 from closedrooms.worlds.geometry import door_leaf, rectangles, wall_area
 from closedrooms.worlds.library import load_world
 from closedrooms.worlds.plan import FloorPlan, Furniture

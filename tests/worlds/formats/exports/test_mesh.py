@@ -7,9 +7,9 @@ import pytest
 import trimesh
 
 from closedrooms.pipeline.world_files import beside, convert_world
-from closedrooms.worlds.door_hinges import without_entrances
 from closedrooms.worlds.extrusion import WALL_HEIGHT
 from closedrooms.worlds.geometry import wall_area
+from closedrooms.worlds.ways_out import wall_up_entrances
 
 
 @pytest.mark.parametrize("world", ["office-01", "office-11", "school-07"])
@@ -17,7 +17,7 @@ def test_the_mesh_of_a_building_is_closed_and_as_large_as_its_walls(tmp_path: Pa
     plan = convert_world(world, tmp_path / "a.obj", "obj")
     mesh = trimesh.load(tmp_path / "a.obj", process=False)
     assert mesh.is_watertight
-    assert mesh.volume == pytest.approx(wall_area(without_entrances(plan)).area * WALL_HEIGHT, rel=1e-4)
+    assert mesh.volume == pytest.approx(wall_area(wall_up_entrances(plan)).area * WALL_HEIGHT, rel=1e-4)
     assert mesh.bounds[:, 2] == pytest.approx([0.0, WALL_HEIGHT])
 
 

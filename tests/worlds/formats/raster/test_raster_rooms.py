@@ -10,7 +10,7 @@ from closedrooms.core.door import ClosedDoor, Segment
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.remarks import Remark
 from closedrooms.core.shapes import cells_inside
-from closedrooms.worlds.formats.raster_rooms import (
+from closedrooms.worlds.formats.raster.raster_rooms import (
     _blocked_share,
     _fault,
     _outlines,

@@ -12,8 +12,8 @@ from hypothesis.extra import numpy as arrays
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
 from closedrooms.core.remarks import Remark
-from closedrooms.worlds.formats import raster_walls
-from closedrooms.worlds.formats.raster_walls import _strips, box_corners, check_pieces, find_boxes, trace_walls
+from closedrooms.worlds.formats.raster import raster_walls
+from closedrooms.worlds.formats.raster.raster_walls import _strips, box_corners, check_pieces, find_boxes, trace_walls
 
 FILE = Path("map.yaml")
 

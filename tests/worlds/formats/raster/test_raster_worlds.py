@@ -23,12 +23,12 @@ from closedrooms.sim.physics_world import PhysicsWorld
 from closedrooms.sim.robot.differential_drive import Drive
 from closedrooms.sim.solids import upright
 from closedrooms.worlds.extrusion import extrude
-from closedrooms.worlds.formats import raster_walls, rosmap
-from closedrooms.worlds.formats.rosmap import _differences, read_raster
+from closedrooms.worlds.formats.raster import raster_walls, rosmap
+from closedrooms.worlds.formats.raster.rosmap import _differences, read_raster
 from closedrooms.worlds.geometry import room_interior
-from closedrooms.worlds.outline import leaks
 from closedrooms.worlds.plan import FloorPlan
 from closedrooms.worlds.truth import rasterise
+from closedrooms.worlds.ways_out import has_way_out
 
 CELL = 0.05
 PILLARS = st.lists(
@@ -109,7 +109,7 @@ def test_truth_rays_and_map_agree_cell_by_cell(
     cells[0], cells[-1], cells[:, 0], cells[:, -1] = UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN
     plan, grid = plan_of(cells, tmp_path_factory.mktemp("map"))
     check_cells(plan, grid)
-    assert not leaks(plan)
+    assert not has_way_out(plan)
 
 
 @pytest.mark.simulation
@@ -127,7 +127,7 @@ def test_free_space_that_ends_in_the_unknown_or_at_the_edge_is_walled_and_said(t
     cells[2, 20:40] = UNKNOWN
     cells[:, -3:] = FREE
     plan, grid = plan_of(cells, tmp_path)
-    assert not leaks(plan)
+    assert not has_way_out(plan)
     (remark,) = [remark for remark in plan.remarks if remark.what == "cells"]
     assert remark.action == "guessed"
     assert remark.count > 20
@@ -144,7 +144,7 @@ def test_rooms_are_the_free_cells_and_doors_stand_between_them(tmp_path: Path) -
     plan, grid = plan_of(cells, tmp_path, [door])
     assert [made.rooms for made in plan.doors] == [("r00", "r01")]
     assert room_interior(plan, "r00").area == pytest.approx(54 * 37 * CELL**2, rel=0.03)
-    assert not leaks(plan)
+    assert not has_way_out(plan)
     check_truth_but_jambs(plan, grid)
 
 

@@ -10,8 +10,8 @@ from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.geojson import write_doors
 from closedrooms.core.files.rosmap import write_map
 from closedrooms.core.grid import FREE, OCCUPIED, UNKNOWN, GridFrame, OccupancyGrid
-from closedrooms.worlds.formats import rosmap
-from closedrooms.worlds.formats.rosmap import _bordered, _checked, _differences, read_raster
+from closedrooms.worlds.formats.raster import rosmap
+from closedrooms.worlds.formats.raster.rosmap import _bordered, _checked, _differences, read_raster
 from closedrooms.worlds.geometry import wall_area
 
 DOOR = ClosedDoor("beside", (1.55, 1.0), ((1.55, 0.5), (1.55, 1.4)))
