@@ -187,8 +187,7 @@ class Panes:
         no_pane = (past > 1) & (past > hit)
         may_be, before = places[~no_pane & (through >= SEEN_THROUGH)], sample(self.segments, self._resolution)
         walls = places[(past <= DOUBT * hit) & (askew > DOUBT * through)]
-        drawn = draw_lines(places[glass], normals[glass], self._resolution)
-        lines = [line for line in join_lines(drawn, grid, walls) if not self._is_wall(line)]
+        lines = join_lines(draw_lines(places[glass], normals[glass], self._resolution), grid, walls)
         lengths = [math.dist(*line) + self._resolution for line in lines]  # from middle to middle of whole cells
         reach = [FARTHEST if length >= LENGTH else FRAME for length in lengths]
         turned = [turn_into_walls(line, grid, far) for line, far in zip(lines, reach, strict=True)]
@@ -242,11 +241,6 @@ class Panes:
         """Check that all along a line more was seen through near the normal than ``most`` of what was hit there."""
         hit, _, past, _ = self._counts[:, self._on(line)].sum(axis=1)
         return bool(past > most * max(hit, 1))
-
-    def _is_wall(self, line: FloatArray) -> bool:
-        """Check that all along a line more was met askew than a pane lets be, against what was seen through."""
-        _, askew, _, through = self._counts[:, self._on(line)].sum(axis=1)
-        return bool(askew > DOUBT * through)
 
     def _on(self, line: FloatArray) -> BoolArray:
         """Mark the places that are asked about, shape (n,), on a line."""
