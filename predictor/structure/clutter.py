@@ -92,7 +92,7 @@ def without_specks(grid: OccupancyGrid) -> OccupancyGrid:
 
     _, pieces, figures, _ = cv2.connectedComponentsWithStats(grid.known.view(np.uint8), connectivity=8)
     small = figures[:, cv2.CC_STAT_AREA] * grid.frame.resolution**2 < SPECK
-    small[np.unique(pieces[~grid.known])] = False
+    small[0] = False  # all that is unknown
     floor = np.zeros(len(figures), dtype=np.bool_)
     floor[pieces[grid.free]] = True
     gone = small & floor
