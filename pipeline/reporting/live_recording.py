@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 # What is known has grown much when it has by this factor.
-GROWN = 1.5
+GROWN = 2.0
 # Cells of a map from which on a prediction takes seconds: then a door more is no reason for one.
 LARGE = 5_000_000
 
@@ -33,7 +33,7 @@ LARGE = 5_000_000
 class InterimPrediction:
     """Prediction made anew whenever a closed door is first seen, so that a recording shows how it changes.
 
-    With a door known, it also does when what is known has grown by half: else it would stand still for minutes. Of a
+    With a door known, it also does when what is known has doubled: else it would stand still for minutes. Of a
     large map, that alone is a reason.
     """
 

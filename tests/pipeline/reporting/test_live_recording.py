@@ -38,5 +38,5 @@ def test_a_prediction_is_made_for_each_new_door_but_of_a_large_map_only_as_it_gr
     assert interim(a_map(150), DOORS[:1], 2.0) is None
     interim(a_map(150), DOORS, 3.0)
     assert made == ([1] if large else [1, 2])
-    interim(a_map(300), DOORS, 4.0)
+    interim(a_map(301), DOORS, 4.0)
     assert made == ([1, 2] if large else [1, 2, 2])
