@@ -28,7 +28,7 @@ def digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def code_digest(files: Sequence[Path]) -> str:
+def files_digest(files: Sequence[Path]) -> str:
     """Compute the digest of the names and contents of some files."""
     content = hashlib.sha256()
     for path in sorted(files):

@@ -18,7 +18,7 @@ from closedrooms.core.remarks import Remark
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.claimed_folder import claim_folder, write_manifest
-from closedrooms.experiments.dataset.checksums import code_digest
+from closedrooms.experiments.dataset.checksums import files_digest
 from closedrooms.experiments.dataset.variants import given_worlds, remarks_on, world_sources
 from closedrooms.experiments.robustness.config import FACTORS, RobustnessConfig
 from closedrooms.experiments.robustness.levels import Case, Setting, cases
@@ -261,4 +261,6 @@ def _code() -> str:
         "experiments/robustness",
     )
     files = [path for folder in folders for path in (root / folder).rglob("*.py")]
-    return code_digest([path for path in files if path.name not in {"report.py", "figures.py", "onset.py", "sweep.py"}])
+    return files_digest(
+        [path for path in files if path.name not in {"report.py", "figures.py", "onset.py", "sweep.py"}]
+    )

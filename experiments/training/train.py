@@ -16,7 +16,7 @@ from closedrooms.core.random import stream
 from closedrooms.core.report import Report
 from closedrooms.core.runtime.packages import require
 from closedrooms.experiments.claimed_folder import claim_folder, write_manifest
-from closedrooms.experiments.dataset.checksums import code_digest
+from closedrooms.experiments.dataset.checksums import files_digest
 from closedrooms.experiments.evaluation.samples.listing import find_samples
 from closedrooms.experiments.training.config import TrainConfig
 from closedrooms.experiments.training.examples import Examples, Gathered, gather_examples
@@ -134,5 +134,5 @@ def _fingerprint(examples: Examples, config: TrainConfig) -> str:
     root = Path(__file__).parents[2]
     files: Sequence[Path] = [*Path(__file__).parent.glob("*.py"), root / "predictor" / "learned" / "patches.py"]
     content = json.dumps(resolved(config, leave_out=("datasets", "out", "patience")))
-    parts = [content, json.dumps(versions()), code_digest(list(files)), examples.digest()]
+    parts = [content, json.dumps(versions()), files_digest(list(files)), examples.digest()]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.core.files.incoming import read_json
-from closedrooms.experiments.dataset.checksums import code_digest, digest
+from closedrooms.experiments.dataset.checksums import files_digest
 from closedrooms.experiments.evaluation.scoring.scores import Scores
 from closedrooms.experiments.evaluation.scoring.tours import tour_code
 from closedrooms.pipeline.reporting.manifest import versions
@@ -46,10 +46,7 @@ def plans_tours(method: str) -> bool:
 
 def content_digest(folder: Path) -> str:
     """Digest the files of a sample's folder that an evaluation reads."""
-    content = hashlib.sha256()
-    for path in sorted(path for path in folder.glob("*") if path.suffix in INPUTS and path.is_file()):
-        content.update(path.name.encode() + digest(path).encode())
-    return content.hexdigest()
+    return files_digest([path for path in folder.glob("*") if path.suffix in INPUTS and path.is_file()])
 
 
 def fingerprint(content: str, method: str, extras: Extras) -> str:
@@ -83,7 +80,7 @@ def _code() -> str:
         here.parent / "samples" / "sample_reader.py",
         *(here / name for name in SCORING),
     ]
-    return code_digest(files)
+    return files_digest(files)
 
 
 def read_kept(path: Path, key: str) -> Scores | None:

@@ -17,7 +17,7 @@ from closedrooms.core.files.outgoing import write_json
 from closedrooms.core.grid import OccupancyGrid
 from closedrooms.coverage.config import CoverageConfig
 from closedrooms.coverage.tour.coverage_tour import CoverageTour
-from closedrooms.experiments.dataset.checksums import code_digest
+from closedrooms.experiments.dataset.checksums import files_digest
 from closedrooms.pipeline.reporting.manifest import versions
 
 # The robot starts at the origin of the map.
@@ -102,4 +102,4 @@ def tour_code() -> str:
         *(root / "core").rglob("*.py"),
         *(root / "predictor" / "structure").glob("*.py"),
     ]
-    return code_digest([*files, Path(__file__)])
+    return files_digest([*files, Path(__file__)])
