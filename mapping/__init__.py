@@ -1,8 +1,7 @@
 """SLAM and nothing else: scans and odometry in, poses, the map and closed doors out; ``mapper`` is where to begin.
 
 - A scan: ``beams``, ``scan_preparation``, ``visibility``; where it fits: ``matching/``.
-- Motion: ``motion``, ``motion_prediction``, ``sweep_motion``, ``scan_odometry`` (robots that recorded none),
-  ``mapping_events``.
+- How the robot moved: ``motion/``; what befell it on the way: ``mapping_events``.
 - Surroundings: ``local_map``, ``lattice``, ``growing_array``; poses of keyframes: ``graph/``.
 - The map: ``map_drawing``, ``log_odds_grid`` and its ``fading``, ``door_fusion``; panes in it: ``glass/``.
 - Recorded runs: ``logs/`` reads them (rosbags too), ``map_builder`` maps them, ``trajectory`` measures their error.

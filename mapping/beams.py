@@ -10,7 +10,7 @@ import numpy as np
 from closedrooms.core.arrays import BoolArray, FloatArray, IntArray
 from closedrooms.core.pose import Pose2
 from closedrooms.core.scan import LaserScan
-from closedrooms.mapping.sweep_motion import SweepMotion, beam_ages
+from closedrooms.mapping.motion.sweep_motion import SweepMotion, beam_ages
 
 OUTLIER_GAP = 0.30
 """A beam that is longer than its surroundings, or shorter than both its neighbours, by this [m] (six sigma of a noisy

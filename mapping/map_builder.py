@@ -14,7 +14,7 @@ from closedrooms.core.remarks import Remark
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.logs.recorded_run import RecordedRun
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.mapping.scan_odometry import ScanOdometry
+from closedrooms.mapping.motion.scan_odometry import ScanOdometry
 from closedrooms.mapping.scan_preparation import prepare_scans
 from closedrooms.mapping.trajectory import ate
 

@@ -25,10 +25,10 @@ from closedrooms.mapping.mapping_events import Event, EventLog
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.relocalisation import relocalise
 from closedrooms.mapping.matching.scan_matcher import ADVANTAGE, Match, match_scan
-from closedrooms.mapping.motion import UncertainMotion
-from closedrooms.mapping.motion_prediction import MotionPrediction, PredictedStep
+from closedrooms.mapping.motion.motion_prediction import MotionPrediction, PredictedStep
+from closedrooms.mapping.motion.sweep_motion import SweepMotion
+from closedrooms.mapping.motion.uncertain_motion import UncertainMotion
 from closedrooms.mapping.scan_preparation import PreparedScan
-from closedrooms.mapping.sweep_motion import SweepMotion
 from closedrooms.mapping.visibility import conflict
 
 SCORE_MEMORY = 0.05

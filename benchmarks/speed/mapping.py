@@ -41,7 +41,7 @@ from closedrooms.mapping.logs import RecordedRun, read_run
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
-from closedrooms.mapping.scan_odometry import ScanOdometry
+from closedrooms.mapping.motion.scan_odometry import ScanOdometry
 from closedrooms.mapping.scan_preparation import prepare_scans
 from closedrooms.mapping.trajectory import ate
 

@@ -13,7 +13,7 @@ from closedrooms.mapping.graph.pose_graph import Edge, PoseGraph, optimise
 from closedrooms.mapping.growing_array import GrowingArray
 from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
-from closedrooms.mapping.motion import UncertainMotion
+from closedrooms.mapping.motion.uncertain_motion import UncertainMotion
 
 
 class KeyframeGraph:

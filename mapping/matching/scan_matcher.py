@@ -13,7 +13,7 @@ from closedrooms.mapping.matching.gauss_newton_matcher import Refined, refine
 from closedrooms.mapping.matching.heading_search import search_heading
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 from closedrooms.mapping.matching.sparse_walls import find_sparse_walls
-from closedrooms.mapping.motion import UncertainMotion
+from closedrooms.mapping.motion.uncertain_motion import UncertainMotion
 
 ADVANTAGE = 0.03
 """Mean likelihood by which a searched pose must beat the refined odometry to replace it."""

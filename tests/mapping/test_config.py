@@ -8,7 +8,7 @@ import pytest
 
 from closedrooms.core.errors import InvalidInputError
 from closedrooms.mapping.config import LoopConfig, MapperConfig, MatcherConfig, RecoveryConfig
-from closedrooms.mapping.motion import UncertainMotion
+from closedrooms.mapping.motion.uncertain_motion import UncertainMotion
 
 POSITIVE = {
     MatcherConfig: {"point_spacing", "max_points", "iterations"},

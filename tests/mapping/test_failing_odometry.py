@@ -163,7 +163,7 @@ def test_a_step_that_counts_twice_along_a_corridor_is_halved_where_the_scans_say
     assert error(mapper, drive) < 0.05
     assert told(mapper) == {"sudden leaps of the odometry": 3}
     assert mapper.keyframes[-1].travelled == pytest.approx(32.0, abs=0.4)
-    monkeypatch.setattr("closedrooms.mapping.motion_prediction.SUDDEN", 1e9)
+    monkeypatch.setattr("closedrooms.mapping.motion.motion_prediction.SUDDEN", 1e9)
     assert error(slowly(drive, odometry), drive) > 0.5
 
 

@@ -17,8 +17,8 @@ from closedrooms.mapping.map_drawing import _outdated
 from closedrooms.mapping.mapper import Mapper
 from closedrooms.mapping.matching.gauss_newton_matcher import Refined
 from closedrooms.mapping.matching.scan_matcher import Match
-from closedrooms.mapping.motion import UncertainMotion
-from closedrooms.mapping.motion_prediction import PredictedStep
+from closedrooms.mapping.motion.motion_prediction import PredictedStep
+from closedrooms.mapping.motion.uncertain_motion import UncertainMotion
 
 CONFIG = MapperConfig()
 HESSIAN = np.diag([1.0, 2.0, 3.0])

@@ -16,7 +16,7 @@ from closedrooms.mapping.graph.keyframe import Keyframe
 from closedrooms.mapping.graph.keyframe_graph import KeyframeGraph
 from closedrooms.mapping.graph.loop_closure import Loop, recent_points
 from closedrooms.mapping.matching.gauss_newton_matcher import Refined
-from closedrooms.mapping.motion import UncertainMotion
+from closedrooms.mapping.motion.uncertain_motion import UncertainMotion
 
 CONFIG = MapperConfig()
 NOTHING = np.empty((0, 2))

@@ -13,7 +13,7 @@ from closedrooms.mapping.matching.gauss_newton_matcher import refine
 from closedrooms.mapping.matching.heading_search import search_heading
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 from closedrooms.mapping.matching.scan_matcher import match_scan
-from closedrooms.mapping.motion import UncertainMotion
+from closedrooms.mapping.motion.uncertain_motion import UncertainMotion
 
 
 def shape(n: int = 240) -> np.ndarray:

@@ -13,7 +13,7 @@ from closedrooms.mapping.matching.correlative_matcher import BestPose, SearchWin
 from closedrooms.mapping.matching.gauss_newton_matcher import Refined
 from closedrooms.mapping.matching.likelihood_field import LikelihoodField
 from closedrooms.mapping.matching.scan_matcher import ADVANTAGE, Match, match_scan
-from closedrooms.mapping.motion import UncertainMotion
+from closedrooms.mapping.motion.uncertain_motion import UncertainMotion
 
 CONFIG = MatcherConfig()
 FIELD = LikelihoodField(0.05, CONFIG)

@@ -8,7 +8,7 @@ from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.logs import RecordedRun
 from closedrooms.mapping.map_builder import build_map
-from closedrooms.mapping.scan_odometry import STALE, SURROUNDINGS, ScanOdometry
+from closedrooms.mapping.motion.scan_odometry import STALE, SURROUNDINGS, ScanOdometry
 from closedrooms.mapping.scan_preparation import prepare_scans
 from closedrooms.mapping.trajectory import ate
 

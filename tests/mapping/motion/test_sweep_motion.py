@@ -12,7 +12,7 @@ from closedrooms.core.scan import LaserScan
 from closedrooms.mapping.beams import clean, hit_points
 from closedrooms.mapping.config import MapperConfig
 from closedrooms.mapping.mapper import Mapper
-from closedrooms.mapping.sweep_motion import SweepMotion, beam_ages
+from closedrooms.mapping.motion.sweep_motion import SweepMotion, beam_ages
 
 BEAMS, PERIOD = 720, 0.1
 ROOM = 4.0

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from closedrooms.core.pose import Pose2
 from closedrooms.mapping.config import MatcherConfig, RecoveryConfig
 from closedrooms.mapping.mapping_events import Event, EventLog
-from closedrooms.mapping.motion import FADING, NEGLIGIBLE, STILL, SURPRISE, UncertainMotion
-from closedrooms.mapping.motion_prediction import (
+from closedrooms.mapping.motion.motion_prediction import (
     GAP_MOTION,
     LONG_STEP,
     MOVING,
@@ -19,6 +18,7 @@ from closedrooms.mapping.motion_prediction import (
     MotionPrediction,
     PredictedStep,
 )
+from closedrooms.mapping.motion.uncertain_motion import FADING, NEGLIGIBLE, STILL, SURPRISE, UncertainMotion
 
 CONFIG = MatcherConfig()
 lengths, turns = st.floats(0.0, 3.0), st.floats(0.0, 3.0)
